@@ -12,7 +12,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
-from ..policies import MAX_EXTRAPOLATION, SILENT
+from ..policies import SILENT
 from .compose import FrozenRules, joined
 
 
@@ -40,12 +40,12 @@ def frozen(model, X, policy, rule=None):
     scaler, features, line = (step for _, step in model.steps)
     if features.degree == 1:
         return _line(model, rule)
-    # Beyond the box a polynomial of some degree is no line, which may go on for long.
-    shorter = replace(rule.model, max_extrapolation=MAX_EXTRAPOLATION)
+    # Beyond the box it is held: there the tangent of a cubic leads far away soon.
+    held = rule.model.with_out_of_bounds("clip" if policy == "linear" else policy)
     powers = np.vstack([np.zeros_like(features.powers_[:1]), features.powers_])
     coefficients = np.append(line.intercept_, line.coef_)
     return FrozenPolynomial(
-        replace(rule, model=shorter), scaler.mean_, scaler.scale_, powers, coefficients
+        replace(rule, model=held), scaler.mean_, scaler.scale_, powers, coefficients
     )
 
 
@@ -64,10 +64,10 @@ def _giving(rule, constant, slopes=()):
 
 @dataclass(frozen=True, eq=False)
 class FrozenPolynomial:
-    """The sum of coefficients c times products of powers of z = (x - center) / scale.
+    """The sum of coefficients times products of powers of z = (x - center) / scale.
 
-    ``powers`` (n_terms, n_inputs). Beyond the box of the single ``rule``, which gives zero, its
-    policy holds: the tangent, as of rules. All columns of X are inputs.
+    ``powers`` (n_terms, n_inputs). Beyond the box of the single ``rule``, which gives zero, the
+    value at the edge is held, or there is none. All columns of X are inputs.
     """
 
     rule: FrozenRules
@@ -81,27 +81,11 @@ class FrozenPolynomial:
         X, model = np.asarray(X, dtype=float), self.rule.model
         nearest = np.clip(X, model.minimum, model.maximum)
         Z = (nearest - self.center) / self.scale
-        found = self._products(Z, self.powers) @ self.coefficients
-        outside = (nearest != X).any(axis=1)
+        found = np.zeros(len(X))
+        for coefficient, powers in zip(self.coefficients, self.powers, strict=True):
+            found += coefficient * np.prod(Z**powers, axis=1)
         if model.out_of_bounds in SILENT:
-            found[outside] = np.nan
-        elif model.out_of_bounds == "linear" and outside.any():
-            way = model.way_out(X[outside]) / self.scale
-            for j, step in enumerate(way.T):
-                found[outside] += step * self._slope(Z[outside], j)
-        return found
-
-    def _slope(self, Z, j):
-        """Derivative by z_j."""
-        lower = self.powers - (np.arange(self.center.size) == j) * (self.powers > 0)
-        return self._products(Z, lower) @ (self.coefficients * self.powers[:, j])
-
-    @staticmethod
-    def _products(Z, powers):
-        found = np.ones((len(Z), len(powers)))
-        for j, column in enumerate(Z.T):
-            table = np.stack([column**k for k in range(powers[:, j].max(initial=0) + 1)], axis=1)
-            found *= table[:, powers[:, j]]
+            found[(nearest != X).any(axis=1)] = np.nan
         return found
 
     def in_bounds(self, X):
@@ -112,18 +96,10 @@ class FrozenPolynomial:
         """Tell how well the rows fitted to cover each row."""
         return self.rule.coverage(X)
 
-    def bounds(self, box=None):
-        """Limits of what it gives in a box (n_inputs, 2), and the box.
-
-        Beside the constant no term, its tangent included, is larger than |c| (|z| + |dz|)^powers.
-        """
-        model = self.rule.model
-        own = np.stack([model.minimum, model.maximum], axis=1)
-        box = own if box is None else np.asarray(box, dtype=float)
-        near = np.clip(box.T, model.minimum, model.maximum)
-        reach = np.abs(model.way_out(box.T)).max(axis=0) * (model.out_of_bounds == "linear")
-        sizes = (np.abs(near - self.center).max(axis=0) + reach) / self.scale
+    def bounds(self, box):
+        """Limits of what it gives in a box (n_inputs, 2): no term exceeds |c| max |z|^powers."""
+        near = np.clip(box.T, self.rule.model.minimum, self.rule.model.maximum)
+        sizes = np.abs(near - self.center).max(axis=0) / self.scale
         varies = self.powers.any(axis=1)
-        most = np.prod(sizes**self.powers, axis=1) @ (np.abs(self.coefficients) * varies)
-        middle, rounding = self.coefficients @ ~varies, 1.0 + 1e-12
-        return np.array([middle - rounding * most, middle + rounding * most]), box
+        most = np.prod(sizes**self.powers, axis=1) @ np.abs(self.coefficients * varies)
+        return self.coefficients @ ~varies + np.array([-1.0, 1.0]) * (1.0 + 1e-12) * most

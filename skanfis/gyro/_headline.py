@@ -14,13 +14,14 @@ effects of a one-way analysis of variance, with the chi^2 interval of G - 1 degr
 Model: the root mean square over the rows of the posterior's deviation without its noise.
 """
 
-from typing import Any, NamedTuple
+from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from scipy.stats import chi2
 
-from ..bounds import Bounds, bounds, gradient_bounds
+from ..bounds import bounds, gradient_bounds
 from ..inspection import readability
 from ._columns import RATE_UNITS, evenly_chosen
 from ._frozen import FrozenPolynomial
@@ -226,55 +227,46 @@ def scatter_between(errors, groups):
 
 
 class Proven(NamedTuple):
-    """What is proven over a box.
+    """What is proven over a box, of what the rules give [deg/s].
 
-    ``found`` are :class:`~skanfis.bounds.Bounds` of what the rules give [deg/s]; no compensation in
-    the box exceeds ``largest`` in size, and ``attained`` is the largest size that was met, and the
-    inputs where it was. ``rate_rises`` is whether the compensated rate is proven to go with the
-    output, in the sense of the scale factor; None where the output is no input, or a law beside the
-    rules is not bounded.
+    It lies between ``limits``; ``met`` is the largest size that was met, and the inputs where it
+    was. ``rate_rises`` is whether the compensated rate is proven to go with the output, in the
+    sense of the scale factor; None where the output is no input, or what is beside the rules is not
+    bounded. ``box`` is by ``names``.
     """
 
-    found: Any
-    largest: float
-    attained: tuple
+    limits: np.ndarray
+    met: tuple
     rate_rises: bool | None
+    names: tuple
+    box: np.ndarray
+
+    @property
+    def largest(self):
+        """No compensation in the box exceeds it in size."""
+        return float(np.abs(self.limits).max())
 
 
 def proven_bounds(calibration):
     """Bounds over the box of the recipe, other inputs in the range of the calibration."""
     recipe, compensator = calibration.recipe, calibration.compensator
-    own, box = 1.0 / compensator.scale_factor, {name: ends for name, *ends in recipe.box} or None
-    if isinstance(compensator.estimator, FrozenPolynomial):
-        return _proven_polynomial(calibration)
-    rules = getattr(compensator.estimator, "residual_", compensator.estimator)
+    own, given = 1.0 / compensator.scale_factor, {name: ends for name, *ends in recipe.box} or None
+    rules, rises = compensator.estimator, None
+    if isinstance(rules, FrozenPolynomial):
+        X = calibration.X
+        box = np.array([(given or {}).get(name, [X[name].min(), X[name].max()]) for name in X])
+        rows = X.to_numpy()[((box[:, 0] <= X) & (box[:, 1] >= X)).all(axis=1)]
+        sizes = np.abs(rules.predict(rows))
+        met = max(zip(sizes, rows, strict=True), key=itemgetter(0), default=(np.nan, None))
+        return Proven(rules.bounds(box), met, None, recipe.inputs, box)
+    rules = getattr(rules, "residual_", rules)
     rules = rules.model if isinstance(rules, FrozenRules) else rules
-    found = bounds(rules, box, max_boxes=_MOST_BOXES)
-    sizes = [float(abs(found.lowest[0])), float(abs(found.highest[0]))]
-    side = int(np.argmax(sizes))
-    attained = sizes[side], (found.at_lowest[0], found.at_highest[0])[side]
-    rises = None
+    found = bounds(rules, given, max_boxes=_MOST_BOXES)
+    ends = (found.lowest[0], found.at_lowest[0]), (found.highest[0], found.at_highest[0])
+    size, place = max(((abs(value), at) for value, at in ends), key=itemgetter(0))
     if compensator.predicts == "error" and "output" in recipe.inputs:
         # rate = output / factor - error: its slope has the factor's sign where the error's is less.
-        slope = gradient_bounds(rules, "output", box, max_boxes=_MOST_BOXES)
+        slope = gradient_bounds(rules, "output", given, max_boxes=_MOST_BOXES)
         rises = bool(np.all(slope.upper[0] < own if own > 0.0 else slope.lower[0] > own))
-    return Proven(found, float(found.magnitude[0]), attained, rises)
-
-
-def _proven_polynomial(calibration):
-    """Bounds of a polynomial; what was met is that on the rows of the calibration."""
-    polynomial, names = calibration.compensator.estimator, calibration.recipe.inputs
-    box = np.stack([calibration.X.min(), calibration.X.max()], axis=1)
-    for name, *ends in calibration.recipe.box:
-        box[names.index(name)] = ends
-    limits, box = polynomial.bounds(box)
-    rows = calibration.X.to_numpy()
-    rows = rows[((rows >= box[:, 0]) & (rows <= box[:, 1])).all(axis=1)]
-    rows = np.vstack([rows, polynomial.center])
-    values = polynomial.predict(rows)
-    low, high = values.argmin(), values.argmax()
-    met = (values[[low]], values[[high]], rows[[low]], rows[[high]])
-    found = Bounds(limits[:1], limits[1:], *met, box, 1, False, tuple(names), ("error",))
-    largest = int(np.abs(values).argmax())
-    attained = float(abs(values[largest])), rows[largest]
-    return Proven(found, float(np.abs(limits).max()), attained, None)
+    limits = np.array([found.lower[0], found.upper[0]])
+    return Proven(limits, (float(size), place), rises, found.input_names, found.box)

@@ -89,8 +89,8 @@ def make_parser():
     add("--physics", told, action="store_true")
     group = parser.add_argument_group("where it holds, and how it is checked")
     told = (
-        "beyond the range of the calibration, where rows are flagged: hold the value at its edge "
-        "(clip), go on along the tangent for a while (linear, default), or give no rate (nan)"
+        "beyond the range of the calibration, where rows are flagged: hold the edge (clip), go on "
+        "along the tangent for a while (linear, default; a cubic is held), or give none (nan)"
     )
     add("--outside", told, choices=("clip", "linear", "nan"), default=Recipe.outside)
     told = "where the report proves how large the compensation can be"

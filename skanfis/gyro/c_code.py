@@ -217,9 +217,8 @@ def export_c_physics(
 def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
     """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
     if saturate is not None:
-        ends = np.stack([saturate.lower, saturate.upper], axis=1)
         # A constant's limits are the same: a hair is between them.
-        saturate = ends + [-1e-12, 1e-12] * (1.0 + np.abs(ends))
+        saturate = (saturate + [-1e-12, 1e-12] * (1.0 + np.abs(saturate)))[None]
     found, units = found_by_search(compensator.estimator), units_of(compensator)
     if is_rate := isinstance(found, ResidualRegressor):
         use = "y[0] is the compensated rate: take it in the place of the raw rate."

@@ -24,133 +24,78 @@ from ..policies import SILENT
 
 _SUFFIX = "_r"
 
-_PRODUCT = """
-/* The product of powers of z; of a derivative one power is less by one. */
-static $real $name_product(const $real *z, const unsigned char *power, int lowered)
-{
-    $real product = 1.0R;
-    int i, k;
-    for (i = 0; i < $NAME_N_INPUTS; ++i) {
-        for (k = (i == lowered) ? 1 : 0; k < (int)power[i]; ++k) {
-            product *= z[i];
-        }
-    }
-    return product;
-}
-
+_PREDICT = """
 int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
 {
-    $real z[$NAME_N_INPUTS], way[$NAME_N_INPUTS], left[1], sum = 0.0R;
-    int i, k, status;
+    $real z[$NAME_N_INPUTS], sum = 0.0R;
+    int i, j, k, status;
 
-"""
-_PREDICT = """    }
-    status = $rules_predict(x, left);
+$finite_input
+    }
+    status = $rules_predict(x, y);
     if ((status & $NAME_NO_OUTPUT) != 0) {
         return $NAME_REJECT(y, status);
     }
-
-    /* The nearest point of the box, and the way beyond it that the tangent is followed. */
     for (i = 0; i < $NAME_N_INPUTS; ++i) {
-        $real nearest = x[i];
-        if (nearest < $name_low[i]) {
-            nearest = $name_low[i];
-        }
-        if (nearest > $name_high[i]) {
-            nearest = $name_high[i];
-        }
-        way[i] = x[i] - nearest;
-        if (way[i] < -$name_reach[i]) {
-            way[i] = -$name_reach[i];
-        }
-        if (way[i] > $name_reach[i]) {
-            way[i] = $name_reach[i];
-        }
-        way[i] /= $name_scale[i];
-        z[i] = (nearest - $name_center[i]) / $name_scale[i];
+        /* Of the nearest point of the box. */
+        z[i] = x[i] < $name_low[i] ? $name_low[i] : x[i];
+        z[i] = z[i] > $name_high[i] ? $name_high[i] : z[i];
+        z[i] = (z[i] - $name_center[i]) / $name_scale[i];
     }
-
     for (k = 0; k < $n_terms; ++k) {
-        $real term = $name_product(z, $name_powers[k], -1);
+        $real term = $name_coefficients[k];
         for (i = 0; i < $NAME_N_INPUTS; ++i) {
-            if ($name_powers[k][i] > 0 && (way[i] < 0.0R || way[i] > 0.0R)) {
-                term += way[i] * ($real)$name_powers[k][i]
-                    * $name_product(z, $name_powers[k], i);
+            for (j = 0; j < (int)$name_powers[k][i]; ++j) {
+                term *= z[i];
             }
         }
-        sum += $name_coefficients[k] * term;
+        sum += term;
     }
-$limits    y[0] = sum;
+    y[0] = sum < $least ? $least : sum;
+    y[0] = y[0] > $most ? $most : y[0];
     return status;
 }
-"""
-_LIMITS = """    if (sum < $least) {
-        sum = $least;
-    }
-    if (sum > $most) {
-        sum = $most;
-    }
 """
 
 
 def export_c_polynomial(
-    polynomial,
-    path=None,
-    *,
-    name=None,
-    dtype="double",
-    std="c99",
-    min_coverage=0.1,
-    saturate=None,
-    units=None,
-    notes=(),
+    polynomial, path, *, std, dtype="double", min_coverage=0.1, saturate=None, units=None, notes=()
 ):
-    """The C code of a FrozenPolynomial; arguments as of :func:`skanfis.export.export_c`.
-
-    ``units`` of the inputs by name, and ``notes``, sentences, are for the header.
-    """
+    """The C code of a FrozenPolynomial; arguments as of :func:`skanfis.export.export_c`."""
     longest = LONGEST_NAME - len(_SUFFIX)
-    stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
+    stem, name = check_arguments(path, None, dtype, std, min_coverage, longest)
     dialect = Dialect(name, dtype, std)
     part = RulesPart(polynomial.rule.model, dialect, _SUFFIX, min_coverage)
-    model, kind = part.model, dialect.dtype
-    reach = model.max_extrapolation * model.spread * (model.out_of_bounds == "linear")
-    tables = {"low": part.low, "high": part.high, "reach": reach, "center": polynomial.center}
-    tables |= {"scale": polynomial.scale, "coefficients": polynomial.coefficients}
+    model, kind, powers = part.model, dialect.dtype, polynomial.powers
+    tables = {key: getattr(polynomial, key) for key in ("center", "scale", "coefficients")}
+    tables = {"low": part.low, "high": part.high} | tables
     tables = {key: np.asarray(values, dtype=kind) for key, values in tables.items()}
-    n_terms, n_inputs = polynomial.powers.shape
-    limits = None if saturate is None else np.ravel(saturate).astype(kind)
-    words = {"rules": name + _SUFFIX, "n_terms": n_terms}
-    if limits is not None:
-        words |= dict(zip(("least", "most"), map(dialect.number, limits), strict=True))
-    body = _PRODUCT + FINITE_INPUT.strip("\n") + "\n" + _PREDICT
-    body = body.replace("$limits", "" if limits is None else _LIMITS)
+    largest = np.finfo(kind).max
+    limits = np.ravel([-largest, largest] if saturate is None else saturate).astype(kind)
+    words = dict(zip(("least", "most"), map(dialect.number, limits), strict=True))
+    words |= {"rules": name + _SUFFIX, "n_terms": len(powers)}
     silent = model.out_of_bounds if model.out_of_bounds in SILENT else None
-    code = "".join(
-        [
-            f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
-            part.text(),
-            "\n/* Of the polynomial: coefficients times powers of (x - center) / scale. */\n",
-            *(f"{dialect.table(key, values)}\n" for key, values in tables.items()),
-            dialect.table("powers", polynomial.powers.astype(int), "unsigned char"),
-            dialect.write(rejection(silent, std)),
-            dialect.write(body, **words),
-            self_test(_known_answers(polynomial, part, kind, limits), dialect),
-        ]
-    )
-    powers = polynomial.powers
+    code = [
+        f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
+        part.text(),
+        "\n/* Of the polynomial: coefficients times powers of (x - center) / scale. */\n",
+        *(f"{dialect.table(key, values)}\n" for key, values in tables.items()),
+        dialect.table("powers", powers.astype(int), "unsigned char"),
+        dialect.write(rejection(silent, std)),
+        dialect.write(_PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n")), **words),
+        self_test(_known_answers(polynomial, part, kind, limits), dialect),
+    ]
+    n_bytes = sum(values.nbytes for values in tables.values()) + powers.size
     price = replace(
         part.cost,
-        multiply_adds=part.cost.multiply_adds + int(polynomial.powers.sum()) + n_terms,
-        divisions=part.cost.divisions + 2 * n_inputs,
-        table_bytes=part.cost.table_bytes
-        + sum(values.nbytes for values in tables.values())
-        + polynomial.powers.size,
-        stack_bytes=part.cost.stack_bytes + (2 * n_inputs + 1) * kind.itemsize,
+        multiply_adds=part.cost.multiply_adds + int(powers.sum()) + len(powers),
+        divisions=part.cost.divisions + model.n_inputs,
+        table_bytes=part.cost.table_bytes + n_bytes,
+        stack_bytes=part.cost.stack_bytes + model.n_inputs * kind.itemsize,
     )
     lines = [
         *map(remark, notes),
-        f"A polynomial of degree {polynomial.powers.sum(axis=1).max()} with {n_terms} terms; "
+        f"A polynomial of degree {powers.sum(axis=1).max()} with {len(powers)} terms; "
         f"{std.upper()}, {dtype}.",
         *cost_lines(price),
         "",
@@ -158,13 +103,12 @@ def export_c_polynomial(
         "",
         policy_line(model, "Outside this range"),
         "A row that is not finite gets no output either way.",
+        f"A row is uncovered where its coverage is below {min_coverage:g}.",
     ]
-    if part.min_coverage is not None:
-        lines.append(f"A row is uncovered where its coverage is below {part.min_coverage:g}.")
-    if limits is not None:
+    if saturate is not None:
         lines.append(f"The output is held between {limits[0]:.9g} and {limits[1]:.9g}.")
-    header = header_of("A polynomial", lines, dialect, n_inputs, 1)
-    written = CCode(name, header, code, price)
+    header = header_of("A polynomial", lines, dialect, model.n_inputs, 1)
+    written = CCode(name, header, "".join(code), price)
     write_files(written, path)
     return written
 
@@ -176,10 +120,10 @@ def _known_answers(polynomial, part, kind, limits):
         model=part.model, dtype=kind, low=part.low, high=part.high, reference=model.reference
     )
     X, _, status, _ = known_answers(numbers, part.min_coverage)
-    policy = "clip" if model.out_of_bounds in SILENT else model.out_of_bounds
-    rule = replace(polynomial.rule, model=part.model.with_out_of_bounds(policy))
-    y = replace(polynomial, rule=rule).predict(X)
-    y = y if limits is None else np.clip(y, *limits.astype(float))
+    held = replace(
+        polynomial, rule=replace(polynomial.rule, model=part.model.with_out_of_bounds("clip"))
+    )
+    y = np.clip(held.predict(X), *limits.astype(float))
     y[status & STATUS["NO_OUTPUT"] != 0] = 0.0
     # What is summed, at most; rounding of an input far from zero moves it too.
     ends = np.stack([model.minimum, model.maximum])

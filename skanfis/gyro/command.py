@@ -230,7 +230,7 @@ def _write(calibration, options, files, folder):
             compensator,
             folder / "compensator",
             std=options.c,
-            saturate=proven_bounds(calibration).found if options.saturate else None,
+            saturate=proven_bounds(calibration).limits if options.saturate else None,
         )
 
 

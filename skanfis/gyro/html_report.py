@@ -314,10 +314,11 @@ def _pictures(results):
 def _use(results):
     """The box of the calibration, and what lies beyond."""
     calibration = results.calibration
-    compensator, recipe = calibration.compensator, calibration.recipe
-    policy = "no rate is given"
-    if recipe.outside != "nan":
-        policy = policy_in_words(recipe.outside, _reach(compensator.estimator))
+    compensator = calibration.compensator
+    rules = compensator.estimator
+    rules = getattr(rules, "residual_", getattr(rules, "rule", rules))
+    model = rules.model if isinstance(rules, FrozenRules) else rules[-1].model_
+    policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     text = (
         f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
         "Inside them, rows near which there are hardly any data "
@@ -345,12 +346,11 @@ def _sure(results):
     lines[1][2] = _interval(budget.scatter_low, budget.scatter_high, results.shown)
     head = ["part", f"standard deviation [{results.symbol}]", "95 % interval", "meaning"]
     caption = "Of one compensated row in range, in a group that the model has not seen"
-    size, names = certain.attained[0], certain.found.input_names
     added = hasattr(calibration.compensator.estimator, "residual_")
     what = "addition to the arcsine law" if added else "compensation"
     proven = [
         (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}"),
-        ("largest that was met", f"{results.shown(size)} {results.symbol}"),
+        ("largest that was met", f"{results.shown(certain.met[0])} {results.symbol}"),
     ]
     if certain.rate_rises is not None:
         told = "proven" if certain.rate_rises else "not proven"
@@ -361,7 +361,7 @@ def _sure(results):
         Block("heading", "What is proven"),
         _table(["over the box below", "result"], proven),
         # What rounding leaves of zero, where a box is in the units before a scaler, is zero.
-        _box(calibration, names, np.round(certain.found.box, 9) + 0.0),
+        _box(calibration, certain.names, np.round(certain.box, 9) + 0.0),
         Block("soft", _PROOF),
     ]
 
@@ -406,13 +406,6 @@ def _log(results):
         unit = f"{calibration.recipe.output_unit} per °/s"
         lines.append(("scale factor", f"{calibration.compensator.scale_factor:.8g}", unit))
     return "The log", [_table(["quantity", "value", "unit"], lines)]
-
-
-def _reach(estimator):
-    """How far the tangent is followed, in standard deviations."""
-    estimator = getattr(estimator, "residual_", getattr(estimator, "rule", estimator))
-    model = estimator.model if isinstance(estimator, FrozenRules) else estimator[-1].model_
-    return model.max_extrapolation
 
 
 def _box(calibration, names, ends, caption=""):

@@ -35,7 +35,7 @@ def test_answers_as_python(tmp_path, policy, dtype, std, tolerance):
     reach = rng.choice([1.0, 1.5], 3000)[:, None]
     rows = low + (high - low) * (0.5 + reach * rng.uniform(-0.5, 0.5, (3000, 4)))
     rows = rows.astype(np.float32 if dtype == "float" else float)
-    code = export_c_polynomial(estimator, name="gyro", dtype=dtype, std=std)
+    code = export_c_polynomial(estimator, tmp_path / "gyro", dtype=dtype, std=std)
     flags = SANITIZE if policy == "linear" else []
     [(y, status)] = evaluate_all([code], rows, tmp_path, std, [1], flags)
     compensator = GyroCompensator(estimator, INPUTS)
@@ -60,7 +60,9 @@ def test_it_is_held_and_rows_that_are_not_finite_get_no_output(tmp_path):
     X = log[["temperature", "output"]]
     estimator = frozen(make_polynomial(3).fit(X, log["output"] - log["rate"]), X, "clip")
     said = {"units": {"temperature": "degC"}, "notes": ["Subtract y[0]."]}
-    code = export_c_polynomial(estimator, name="gyro", saturate=[[-0.01, 0.02]], **said)
+    code = export_c_polynomial(
+        estimator, tmp_path / "gyro", std="c99", saturate=[-0.01, 0.02], **said
+    )
     assert " * Subtract y[0].\n" in code.header
     assert "[0] temperature [degC]: " in code.header
     rows = np.vstack([X.to_numpy(), [[np.nan, 0.0], [20.0, np.inf]]])

@@ -170,7 +170,7 @@ def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
     text = " ".join(Outline(report_page(calibration, "rest.csv")).text)
     assert "°/h" in text
     assert "Scale-factor error against rate" not in text
-    assert "no rate is given" in text
+    assert "there is no value" in text
 
 
 def test_the_verdict_comes_first(page, calibration):

@@ -18,37 +18,29 @@ from ..physics import OpenLoopArcsineRegressor
 
 
 class ErrorModel:
-    """The indicated minus the compensated rate [deg/s], as a function of the inputs ``axes``.
+    """The indicated minus the compensated rate [deg/s], as a function of the inputs.
 
     ``estimator`` is that of the compensator, or of a fold, and X what it was fitted to: its range
-    is ``ends`` (n_axes, 2). ``uses`` are the inputs that the error depends on.
+    is ``ends`` (n_inputs, 2).
     """
 
-    def __init__(self, compensator, estimator, axes, X):
-        self.ends = np.stack([X[list(axes)].min(), X[list(axes)].max()], axis=1)
-        self._inputs, self._estimator = list(compensator.inputs), estimator
-        self._others, self._parts = X.iloc[0].to_numpy(dtype=float), _parts_of(estimator)
-        inputs = self._inputs
-        self._output = inputs.index("output") if "output" in inputs else None
+    def __init__(self, compensator, estimator, X):
+        self.ends = np.stack([X.min(), X.max()], axis=1)
+        self.names, self._estimator, self._parts = list(X), estimator, _parts_of(estimator)
+        self._output = self.names.index("output") if "output" in self.names else None
         self._own = 1.0 / compensator.scale_factor
         self._is_rate = compensator.predicts == "rate"
-        used = {column for part in self._parts for column in part.used}
-        used |= {self._output} if self._is_rate else set()
-        self.uses = [inputs[column] for column in sorted(used)]
-        self._places = [inputs.index(name) for name in axes]
 
     def __call__(self, points):
-        """The error at points (n_points, n_axes); outside the range that at its edge."""
-        X = self._spread(np.clip(points, *self.ends.T).T).T
+        """The error at points (n_points, n_inputs); outside the range that at its edge."""
+        X = np.clip(points, *self.ends.T)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", OutOfBoundsWarning)
-            table = pd.DataFrame(X, columns=self._inputs)
-            predicted = self._estimator.predict(table)
+            predicted = self._estimator.predict(pd.DataFrame(X, columns=self.names))
         return self._own * X[:, self._output] - predicted if self._is_rate else predicted
 
     def ranges(self, low, high):
-        """Range of the error over boxes (n_axes, n_boxes), and of its slopes by axis."""
-        low, high = self._spread(low), self._spread(high)
+        """Range of the error over boxes (n_inputs, n_boxes), and of its slopes by input."""
         value, slopes = np.zeros((2, low.shape[1])), np.zeros((2, *low.shape))
         with np.errstate(all="ignore"):
             for part in self._parts:
@@ -62,13 +54,7 @@ class ErrorModel:
         # Rounding, of what has no account of its own.
         steep, far = np.abs(slopes).max(axis=0), np.maximum(np.abs(low), np.abs(high))
         slack = ROUNDINGS * EPS * (np.abs(value).max(axis=0) + (steep * far).sum(axis=0))
-        return np.add(value, [-slack, slack]), slopes[:, self._places]
-
-    def _spread(self, values):
-        """Values of the axes (n_axes, n_boxes) as those of all inputs."""
-        full = np.repeat(self._others[:, None], values.shape[1], axis=1)
-        full[self._places] = values
-        return full
+        return np.add(value, [-slack, slack]), slopes
 
 
 def polynomial_ranges(powers, coefficients, low, high):
@@ -109,12 +95,8 @@ def _parts_of(estimator):
 
 class _Rules:
     def __init__(self, rules):
-        self.columns, model = list(rules.positions), rules.model
-        slopes = np.zeros((model.n_rules, model.n_inputs))
-        slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:, 0]
-        matters = {*model.antecedent.term_inputs, *np.flatnonzero(slopes.any(axis=0))}
-        self.used = [self.columns[j] for j in matters]
-        self._sides = [Enclosure(model, 0, sign) for sign in (-1.0, 1.0)]
+        self.columns = list(rules.positions)
+        self._sides = [Enclosure(rules.model, 0, sign) for sign in (-1.0, 1.0)]
 
     def ranges(self, low, high):
         values, slopes = [], []
@@ -131,7 +113,6 @@ class _Polynomial:
     def __init__(self, polynomial):
         self._polynomial = polynomial
         self.columns = list(range(polynomial.powers.shape[1]))
-        self.used = list(np.flatnonzero(polynomial.powers.any(axis=0)))
 
     def ranges(self, low, high):
         own = self._polynomial
@@ -142,14 +123,10 @@ class _Polynomial:
 
 
 class _Law:
-    """asin((V - V0) / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond.
-
-    Of a law without a lag of the thermometer, which a simple target could not say.
-    """
+    """asin((V - V0) / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
 
     def __init__(self, law):
         self._law, self.columns = law, list(law.columns_)
-        self.used = self.columns[: 3 if law.thermometer_lag_ else 2]
 
     def ranges(self, low, high):
         law = self._law

@@ -18,9 +18,8 @@ TYPES = {
     "q31": ("int_least32_t", "int_least64_t", 31),
     "q15": ("int_least16_t", "int_least32_t", 15),
 }
-# Their inputs, and cells of each.
-TABLES = {"table": ("temperature",), "rate-table": ("temperature", "output")}
-N_CELLS = {1: 64, 2: 24}
+# By the number of inputs: what it is called, and cells of each input.
+NAMES, _N_CELLS = {1: "gyro_table", 2: "gyro_rate_table"}, {1: 64, 2: 24}
 _MARGIN = 1.001  # of a fixed-point scale, for what is rounded
 
 _CODE = """
@@ -69,11 +68,6 @@ plane |    }
 """
 
 
-def name_of(kind):
-    """What files and identifiers of a kind of table start with."""
-    return f"gyro_{kind.replace('-', '_')}"
-
-
 class Table:
     """A table of an ErrorModel, with the numbers as C holds them.
 
@@ -81,11 +75,11 @@ class Table:
     stand for so many ``scale``, and ``counts`` the cells; a value stands for so many ``unit``.
     """
 
-    def __init__(self, error, kind, type_name, n_cells=None):
-        self.names = TABLES[kind]
-        n_cells = n_cells or N_CELLS[len(self.names)]
+    def __init__(self, error, type_name, n_cells=None):
+        self.names = error.names
+        n_cells = n_cells or _N_CELLS[len(self.names)]
         real, self.wide, self.bits = TYPES[type_name]
-        self.dialect = Dialect(name_of(kind), real, "c99")
+        self.dialect = Dialect(NAMES[len(self.names)], real, "c99")
         self._place(error.ends[:, 0], error.ends[:, 1], n_cells)
         axes = zip(self.low, self.high, self.step, self.counts, self.scale, strict=True)
         at = [

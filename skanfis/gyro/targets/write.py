@@ -11,10 +11,11 @@ from ..metrics import rms
 from .autopilots import NOTES, Cubic
 from .error_model import ErrorModel
 from .piecewise import difference
-from .tables import TABLES, Table, name_of
+from .tables import NAMES, Table
 
 FILES = {
-    **{kind: (f"{name_of(kind)}.h", f"{name_of(kind)}.c") for kind in TABLES},
+    "table": ("gyro_table.h", "gyro_table.c"),
+    "rate-table": ("gyro_rate_table.h", "gyro_rate_table.c"),
     "px4": ("px4.params",),
     "ardupilot": ("ardupilot.parm",),
 }
@@ -39,28 +40,25 @@ def write_targets(calibration, texts, folder):
 
 def _write(calibration, text, folder):
     name, *details = text.split(":")
-    axes, compensator, X = (
-        TABLES.get(name, ("temperature",)),
-        calibration.compensator,
-        calibration.X,
-    )
-    again = f"Calibrate again with --inputs {' '.join(axes)}, or ask for another target."
-    if missing := [axis for axis in axes if axis not in X]:
-        raise RefusedError(f"the model does not take the {missing[0]}. {again}")
-    error = ErrorModel(compensator, compensator.estimator, axes, X)
-    if lacking := [each for each in error.uses if each not in axes]:
-        needs = " and ".join(lacking)
-        raise RefusedError(f"the model needs {needs}, which this target cannot say. {again}")
+    compensator, X = calibration.compensator, calibration.X
+    axes = ("temperature", "output") if name == "rate-table" else ("temperature",)
+    if set(X) != set(axes):
+        raise RefusedError(
+            f"the model needs {' and '.join(X)}, and this target says what follows from "
+            f"{' and '.join(axes)}. Calibrate again with --inputs {' '.join(axes)}, or ask for "
+            "another target."
+        )
     make: Any = partial(Cubic, autopilot=name)
-    if name in TABLES:
-        make = partial(Table, kind=name, type_name=(details or ["float"])[0])
+    if name.endswith("table"):
+        make = partial(Table, type_name=(details or ["float"])[0])
+    error = ErrorModel(compensator, compensator.estimator, X)
     made = make(error)
     low, high = difference(error, made.piecewise)
     # ArduPilot: of the difference at T less that at T_cal.
     is_relative = name == "ardupilot"
     largest = high - low if is_relative else max(-low, high)
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
-    left = _held_out_rms(calibration, axes, make, is_relative)
+    left = _held_out_rms(calibration, make, is_relative)
     if not np.isfinite(largest):
         raise RefusedError("no bound of its difference from the model could be proven.")
     if left > _MOST_TIMES * model_rms:
@@ -74,16 +72,16 @@ def _write(calibration, text, folder):
         f"RMS on rows held out, and the model {model_rms:.4g}"
     )
     notes = [f"In the place of the model in compensator.json: {worth}.", _THERMOMETER]
-    if name in TABLES:
+    if name.endswith("table"):
         use = f"{SUBTRACT} {raw_rate_of(compensator)}"
-        write_files(made.code([use, *notes], units_of(compensator)), folder / name_of(name))
+        write_files(made.code([use, *notes], units_of(compensator)), folder / NAMES[len(axes)])
     else:
         written = made.text([NOTES[name], *notes], *details)
         (folder / FILES[name][0]).write_text(written, encoding="ascii", newline="\n")
     return worth
 
 
-def _held_out_rms(calibration, axes, make, is_relative):
+def _held_out_rms(calibration, make, is_relative):
     """RMS error of rows in range by targets of models that are new to them [deg/s].
 
     ``is_relative``: for the worst T_cal, where the offset at boot is what the model says there.
@@ -93,10 +91,10 @@ def _held_out_rms(calibration, axes, make, is_relative):
     at, squares = np.linspace(low, high, _N_CALIBRATION_TEMPERATURES)[:, None], 0.0
     folds = zip(calibration.split.folds, calibration.fold_models, strict=True)
     for (train, test), estimator in folds:
-        error = ErrorModel(calibration.compensator, estimator, axes, X.iloc[train])
+        error = ErrorModel(calibration.compensator, estimator, X.iloc[train])
         made = make(error).piecewise
         rows = test[calibration.in_range[test]]
-        left = errors[rows] - made(X[list(axes)].iloc[rows].to_numpy())
+        left = errors[rows] - made(X.iloc[rows].to_numpy())
         shift = made(at) - error(at) if is_relative else np.zeros(1)
         squares = squares + (left**2).sum() + 2.0 * shift * left.sum() + left.size * shift**2
     return float(np.sqrt(np.max(squares) / calibration.in_range.sum()))

@@ -13,8 +13,7 @@ from ...quick import quick
 
 ENDS = np.array([(-20.0, 60.0), (-2500.0, 2500.0)])  # degC, counts
 COUNTS = -25.0  # per deg/s
-INPUTS = ("output", "temperature")  # another order than that of the axes
-AXES = ("temperature", "output")
+AXES = INPUTS = ("temperature", "output")
 
 
 def rows(n_rows, seed=0):
@@ -55,7 +54,7 @@ def law_and_line():
 
 @cache
 def error_of(kind):
-    """The ErrorModel of both axes, of a kind of estimator."""
+    """The ErrorModel of both inputs, of a kind of estimator."""
     points = rows(800)
     X = pd.DataFrame(points, columns=AXES)[list(INPUTS)]
     error = planted(*points.T)
@@ -70,7 +69,7 @@ def error_of(kind):
     estimator = make(X, rate if is_rate else error)
     predicts = "rate" if is_rate else "error"
     compensator = GyroCompensator(estimator, INPUTS, predicts, COUNTS, "counts")
-    return ErrorModel(compensator, estimator, AXES, framed(X))
+    return ErrorModel(compensator, estimator, framed(X))
 
 
 @cache
@@ -81,4 +80,4 @@ def error_over_temperature(kind="rules"):
     make = {"rules": quick([4]).fit, "polynomial": Polynomial}[kind]
     estimator = make(X, planted(points[:, 0], 0.0))
     compensator = GyroCompensator(estimator, AXES[:1])
-    return ErrorModel(compensator, estimator, AXES[:1], framed(X))
+    return ErrorModel(compensator, estimator, framed(X))

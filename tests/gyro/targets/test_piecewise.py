@@ -7,7 +7,7 @@ import pytest
 from skanfis.gyro import GyroCompensator
 from skanfis.gyro.targets.error_model import ErrorModel
 from skanfis.gyro.targets.piecewise import Piecewise, difference, spread
-from skanfis.gyro.targets.tables import TABLES, Table
+from skanfis.gyro.targets.tables import Table
 
 from .models import ENDS, Polynomial, error_of, error_over_temperature, rows
 
@@ -26,7 +26,7 @@ def line_through(function, edges, shift=0.0):
 def parabola():
     x = pd.DataFrame({"temperature": np.linspace(-20.0, 60.0, 50)})
     model = Polynomial(x, BEND * x["temperature"] ** 2, degree=2)
-    return ErrorModel(GyroCompensator(model, ("temperature",)), model, ("temperature",), x)
+    return ErrorModel(GyroCompensator(model, ("temperature",)), model, x)
 
 
 @pytest.mark.parametrize("n_cells", [1, 7, 16])
@@ -46,7 +46,7 @@ def test_lines_through_a_parabola_by_the_closed_form(parabola, n_cells):
 @pytest.mark.parametrize("kind", ["rules", "polynomial", "law and line"])
 def test_no_point_is_beyond_and_some_is_near(kind):
     error = error_of(kind)
-    target = Table(error, "rate-table", "double", 8).piecewise
+    target = Table(error, "double", 8).piecewise
     low, high = difference(error, target)
     points = rows(100_000, seed=3)
     off = error(points) - target(points)
@@ -57,7 +57,7 @@ def test_no_point_is_beyond_and_some_is_near(kind):
 @pytest.mark.parametrize("type_name", ["double", "float", "q31", "q15"])
 def test_over_the_temperature(type_name):
     error = error_over_temperature()
-    target = Table(error, "table", type_name, 12).piecewise
+    target = Table(error, type_name, 12).piecewise
     low, high = difference(error, target)
     points = rows(50_000, seed=4)[:, :1]
     off = (error(points) - target(points))[(points >= target.ends[0, 0]).ravel()]
@@ -67,8 +67,7 @@ def test_over_the_temperature(type_name):
 
 
 def test_beyond_its_ends_a_target_is_held():
-    assert {len(axes) for axes in TABLES.values()} == {1, 2}
-    target = Table(error_over_temperature(), "table", "double", 5).piecewise
+    target = Table(error_over_temperature(), "double", 5).piecewise
     ends = target(np.array([[-20.0], [60.0]]))
     np.testing.assert_array_equal(target(np.array([[-99.0], [99.0]])), ends)
     assert spread(ENDS).shape == (64**2, 2)

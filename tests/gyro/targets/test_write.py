@@ -65,13 +65,13 @@ def test_errors_on_rows_held_out_by_hand(calibration, tmp_path):
     left = {"table": np.empty(len(X)), "px4": np.empty(len(X))}
     lefts = np.empty((len(X), 50))
     for (train, test), model in zip(calibration.split.folds, calibration.fold_models, strict=True):
-        error = ErrorModel(calibration.compensator, model, ("temperature",), X.iloc[train])
+        error = ErrorModel(calibration.compensator, model, X.iloc[train])
         # Of the definition: the model's own prediction of rows that are new to it.
         inside = test[calibration.in_range[test]]
         by_hand = calibration.before[inside] - error(X.iloc[inside].to_numpy())
         np.testing.assert_allclose(by_hand, after[inside], atol=1e-12)
         for name, made in (
-            ("table", Table(error, "table", "float", n_cells)),
+            ("table", Table(error, "float", n_cells)),
             ("px4", Cubic(error, "px4")),
         ):
             off = calibration.before - rate - made.piecewise(X.to_numpy())
@@ -119,18 +119,18 @@ def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
 @pytest.mark.parametrize(
     ("inputs", "options", "target", "message"),
     [
-        (BOTH, {"terms": (2, 1)}, "px4:x", "needs output, which this target"),
+        (BOTH, {"terms": (2, 1)}, "px4:x", "the model needs temperature and output, and"),
         (
             ("temperature", "output"),
             {"terms": (1, 1), "physics": True},
             "table",
-            "needs output, which this target",
+            "the model needs temperature and output, and",
         ),
         (
             ("temperature",),
             {"terms": (2,)},
             "rate-table",
-            "does not take the output. Calibrate again with --inputs",
+            "Calibrate again with --inputs temperature output, or",
         ),
     ],
 )
