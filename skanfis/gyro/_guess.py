@@ -99,8 +99,7 @@ def checked_request(request):
 class Layout:
     """Places of the parts in a file and their units there; ``others`` would do as well.
 
-    ``assumed`` says in words which units are neither told nor in the names: name in the file and
-    sentence, by part.
+    ``assumed`` has sentences by part on units that are neither told nor in the names.
     """
 
     header: list
@@ -276,7 +275,7 @@ def _settle_units(columns, layout, of_first):
         found = {part: of_first.get(part, CANONICAL[part]) for part in lacking}
     layout.units |= found
     layout.assumed = {
-        part: (layout.name(part), assumed_text(values, part, layout.name(part), found[part]))
+        part: assumed_text(values[part], part, layout.name(part), found[part])
         for part in PARTS
         if part in found
     }

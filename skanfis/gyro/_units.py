@@ -45,25 +45,24 @@ def settle_units(values, units, *, is_all=True):
     return readings[0]
 
 
-def settle_by_all(log, units, assumed):
-    """What :func:`settle_units` finds by all rows of a log that was read in these units."""
+def settle_by_all(log, layout):
+    """What :func:`settle_units` finds by all rows of a log that was read in this layout."""
+    units = layout.units
     parts = [part for part in ("temperature", "output", "rate") if part in log]
     values = {part: convert_back(log[part].to_numpy(), part, units[part]) for part in parts}
-    told = {part: unit for part, unit in units.items() if part == "time" or part not in assumed}
-    found = settle_units(values, told)
-    texts = {part: assumed_text(values, part, assumed[part][0], found[part]) for part in found}
-    return found, texts
+    told = {part: units[part] for part in units if part == "time" or part not in layout.assumed}
+    return settle_units(values, told)
 
 
 def assumed_text(values, part, name, unit):
     """What was assumed of a part, with its range and another reading."""
     if unit in SIGNALS:
-        return f"{name!r} has no unit, taken as a raw signal ({_range(values[part])})"
-    others = {"temperature": "degF", "time": "ms"}.get(part, "rad/s")
-    others = CANONICAL[part] if unit == others else others
+        return f"{name!r} has no unit, taken as a raw signal ({_range(values)})"
+    other = {"temperature": "degF", "time": "ms"}.get(part, "rad/s")
+    other = CANONICAL[part] if unit == other else other
     return (
-        f"{name!r} has no unit, taken as {unit} ({_range(values[part])}; "
-        f"{others}? give --units {part}={others})"
+        f"{name!r} has no unit, taken as {unit} ({_range(values)}; {other}? give --units "
+        f"{part}={other})"
     )
 
 

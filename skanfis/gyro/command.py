@@ -316,7 +316,7 @@ def _compensated(file, compensator, stem, tell):
             labels = labels.map(lambda number: stem if number in "1" else f"{stem} / {number}")
         log["run"] = labels.to_numpy()[log["run"]]
         yield log if any(labels) else log.drop(columns="run"), compensated
-    assumed = [f"units as in the calibration: {text}" for _, text in file.layout.assumed.values()]
+    assumed = [f"units as in the calibration: {text}" for text in file.layout.assumed.values()]
     for note in [*file.notes, *assumed, *filter(None, [finder.note])]:
         tell(f"note: {note}")
     tell(f"{file.n_rows:,} rows")

@@ -152,15 +152,12 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     code, runs = table["run"].to_numpy(), finder.runs
     log = table[[part for part in parts if part not in LABELS]].reset_index(drop=True)
     layout = files[0].layout
-    assumed = {part: text for part, (_, text) in layout.assumed.items()}
-    if assumed and request.assumed is None:
-        found, texts = settle_by_all(log, layout.units, layout.assumed)
-        if any(layout.units[part] != unit for part, unit in found.items()):
+    if layout.assumed and request.assumed is None:
+        found = settle_by_all(log, layout)
+        if not found.items() <= layout.units.items():
             # All rows tell otherwise than the first ones.
-            retold = replace(request, units=request.units | found)
-            reading = read(paths, retold, tell=tell, most_rows=most_rows)
-            return replace(reading, assumed=assumed | texts)
-        assumed |= texts
+            retold = replace(request, assumed=layout.units | found)
+            return read(paths, retold, tell=tell, most_rows=most_rows)
     names = _names_of_runs(runs, paths, "run" in parts or finder.note)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
@@ -169,7 +166,7 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     notes = [note for file in files for note in file.notes]
     notes = list(dict.fromkeys([*notes, *filter(None, [finder.note, thinned.note])]))
     file, row = runs["file"].to_numpy()[code], table.index.to_numpy()
-    return Reading(log, file, row, files, notes, thinned.n_rows, digests, assumed)
+    return Reading(log, file, row, files, notes, thinned.n_rows, digests, layout.assumed)
 
 
 class LogFile:
