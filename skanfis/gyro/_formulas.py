@@ -71,23 +71,6 @@ def _term(value, factor=""):
     return f" {'-' if value < 0 else '+'} {abs(value):.8g}{factor}" if value else ""
 
 
-def on_board(compensator):
-    """The steps around the model, as they run on the gyro's processor."""
-    arguments, lines = ", ".join(compensator.inputs), []
-    if "temperature_rate" in compensator.inputs:
-        lines += [
-            "/* at power-on temperature_rate = 0, previous = temperature; then every h seconds */",
-            f"temperature_rate += (1 - exp(-h / {compensator.time_constant:g}))",
-            "    * ((temperature - previous) / h - temperature_rate);",
-            "previous = temperature;",
-        ]
-    if compensator.predicts == "error":
-        lines.append(f"rate = output / {compensator.scale_factor:.9g} - error({arguments});")
-    else:
-        lines.append(f"rate = law({arguments}) + rules({arguments});")
-    return "\n".join(lines)
-
-
 def _polynomial(what, pipeline, inputs):
     """In standardised inputs, which keep the digits that count in a cubic."""
     scaler, powers, line = (step for _, step in pipeline.steps)

@@ -38,6 +38,7 @@ from .physics import past_phase
 
 _SUFFIX = "_r"
 SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
+_TAKE = "y[0] is the compensated rate: take it in the place of the raw rate."
 
 # Of inputs of a compensator: units, and how they are made.
 _UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
@@ -220,23 +221,13 @@ def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
         # A constant's limits are the same: a hair is between them.
         saturate = (saturate + [-1e-12, 1e-12] * (1.0 + np.abs(saturate)))[None]
     found, units = found_by_search(compensator.estimator), units_of(compensator)
-    if is_rate := isinstance(found, ResidualRegressor):
-        use = "y[0] is the compensated rate: take it in the place of the raw rate."
-    else:
-        is_polynomial = isinstance(found, FrozenPolynomial)
-        if not is_polynomial:
-            found = FrozenRules.of(found, len(compensator.inputs)).model
-        model = found.rule.model if is_polynomial else found
-        units[model.output_names[0]] = "deg/s"
-        use = SUBTRACT
-    notes = [
-        f"{use} {raw_rate_of(compensator)}",
-        *(note for name, note in _NOTES.items() if name in compensator.inputs),
-        *(f"Unit assumed: {text}" for text in compensator.assumed.values()),
-    ]
-    export: Any = export_c_physics if is_rate else export_c
+    export: Any = export_c_physics
     if isinstance(found, FrozenPolynomial):
         export = export_c_polynomial
+    elif not isinstance(found, ResidualRegressor):
+        export, found = export_c, FrozenRules.of(found, len(compensator.inputs)).model
+        units[found.output_names[0]] = "deg/s"
+    assumed = [f"Unit assumed: {text}" for text in compensator.assumed.values()]
     return export(
         found,
         path,
@@ -244,8 +235,16 @@ def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
         min_coverage=compensator.min_coverage,
         saturate=saturate,
         units=units,
-        notes=[note.replace("$lag", f"{compensator.time_constant:g}") for note in notes],
+        notes=notes_on(compensator) + assumed,
     )
+
+
+def notes_on(compensator):
+    """What to do with the output, and how inputs are made, as sentences."""
+    use = SUBTRACT if compensator.predicts == "error" else _TAKE
+    notes = [f"{use} {raw_rate_of(compensator)}"]
+    notes += [note for name, note in _NOTES.items() if name in compensator.inputs]
+    return [note.replace("$lag", f"{compensator.time_constant:g}") for note in notes]
 
 
 def units_of(compensator):

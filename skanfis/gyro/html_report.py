@@ -14,7 +14,7 @@ from .. import __version__
 from ..inspection.labels import printable
 from ..policies import policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
-from ._formulas import formula_of, law_text, on_board, rules_text
+from ._formulas import formula_of, law_text, rules_text
 from ._headline import (
     ARTICLES,
     budget_of,
@@ -27,11 +27,11 @@ from ._headline import (
 from ._options import ReportOptions
 from ._results import Results
 from ._simpler import NAMES, NOTHING
+from .c_code import notes_on, units_of
 from .compose import FrozenRules
 from .displays import figures, signs
 from .metrics import rms
 
-_UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
 _BUDGET = (
     "Combined and RMS error are two ways to one figure: where the error is clearly larger, the "
     "rules cannot follow the gyro between the groups, and no part of the budget knows of it."
@@ -274,8 +274,7 @@ def _instead(results):
         "compensation, with its own report, with --write: rules, " + ", ".join(NAMES) + "."
     )
     formula = Block("open", formula_of(calibration, name), "What to compute")
-    steps = Block("details", on_board(calibration.compensator), "What to compute on board")
-    return "What is written", [Block("text", text), formula, steps]
+    return "What is written", [Block("text", text), formula, _on_board(calibration)]
 
 
 def _merit(results):
@@ -377,16 +376,21 @@ def _rules(results):
         blocks += [Block("text", text), Block("details", law, "The arcsine law")]
     blocks.append(Block("pictures", list(results.memberships())))
     found = readability_of(calibration)
-    text, steps = rules_text(calibration, found), on_board(calibration.compensator)
+    text = rules_text(calibration, found)
     n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         *blocks,
         Block("details", text, f"All rules as text ({n_rules}, {terms})"),
-        Block("details", steps, "What to compute on board"),
+        _on_board(calibration),
         Block("heading", "Can the rules be read?"),
         *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
     ]
+
+
+def _on_board(calibration):
+    notes = "\n".join(notes_on(calibration.compensator))
+    return Block("details", f"y[0] is what it gives.\n{notes}", "What to compute on board")
 
 
 def _log(results):
@@ -429,7 +433,7 @@ def _words(name):
 
 
 def _unit_of(calibration, name):
-    return signs(_UNITS.get(name, calibration.recipe.output_unit))
+    return signs(units_of(calibration.compensator).get(name, "deg/s"))
 
 
 def _terms_text(terms):
