@@ -11,6 +11,7 @@ from .report import Results, machine, markdown
 
 ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "file_size", "command")
 ON_REQUEST = (
+    "structure",
     "real_sets",
     "battery",
     "small_problems",
@@ -47,7 +48,7 @@ def parse():
         metavar="N",
         help="long_logs: rows of a log",
     )
-    many = parser.add_argument_group("real_sets, battery, small_problems, how_sure")
+    many = parser.add_argument_group("structure, real_sets, battery, small_problems, how_sure")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
     many.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")

@@ -12,7 +12,7 @@ def readability(model, X, y):
 
     "strongest": the strongest rule alone, RMS to the model in deviations of the target. "false" and
     "alike": terms that are nowhere on the rows truer than 0.5, and pairs of neighbours that cross
-    above 0.9.
+    above 0.9. "cost": numerals in the rules' sentences.
     """
     strengths, consequents = model.strengths(X), model.consequents_
     rows = np.arange(X.shape[0])
@@ -25,6 +25,7 @@ def readability(model, X, y):
         "false": n_false,
         "alike": n_alike,
         "rules": int(model.n_rules_),
+        "cost": model.readability_.reading_cost,
     }
 
 

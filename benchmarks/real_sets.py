@@ -185,6 +185,7 @@ def measure(real_set, options):
         "beyond": beyond,
         "strongest": float(np.median([each["strongest"] for each in read])),
         "rules": float(np.median([each["rules"] for each in read])),
+        "cost": float(np.median([each["cost"] for each in read])),
         "false": sum(each["false"] for each in read),
         "alike": sum(each["alike"] for each in read),
         "rivals": {rival: figures[0] for rival, figures in found.items()},
@@ -219,6 +220,10 @@ def run(options):
                 Measure("median", float(np.median(strongest)), "", 0.3, 0.15),
                 Measure("worst", max(strongest), "", 0.6, 0.3),
             ],
+        ),
+        Row(
+            f"{work}: reading cost, numerals in the rules",
+            [Measure("median", float(np.median([figures["cost"] for figures in found])), "")],
         ),
         Row(
             f"{work}: terms nowhere truer than 0.5, or crossing a neighbour above 0.9",
@@ -267,11 +272,12 @@ def seconds(found):
 
 
 def rules(found):
-    keys = ("rules", "strongest", "false", "alike", "beyond")
+    keys = ("rules", "cost", "strongest", "false", "alike", "beyond")
     lines = [[label(figures), *(figures[key] for key in keys)] for figures in found]
     head = [
         "data",
         "rules",
+        "reading cost [numerals]",
         "strongest alone [sd]",
         "terms never true",
         "terms alike",

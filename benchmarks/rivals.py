@@ -12,6 +12,7 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from sklearn.linear_model import RidgeCV
 from sklearn.model_selection import GridSearchCV
+from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer, PolynomialFeatures, StandardScaler
 from sklearn.svm import SVR
@@ -51,6 +52,15 @@ def gaussian_process(n_inputs):
     return make_pipeline(StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True))
 
 
+def network():
+    """One hidden layer or two, tuned in three folds, on a standardised target."""
+    grid = {"hidden_layer_sizes": [(50,), (50, 50)], "alpha": [1e-4, 1e-2]}
+    model = MLPRegressor(solver="lbfgs", max_iter=500, random_state=0)
+    pipeline = make_pipeline(StandardScaler(), model)
+    search = tuned(pipeline, {f"mlpregressor__{name}": values for name, values in grid.items()})
+    return TransformedTargetRegressor(search, transformer=StandardScaler())
+
+
 def explainable_boosting(n_inputs):
     from interpret.glassbox import ExplainableBoostingRegressor
 
@@ -70,6 +80,7 @@ RIVALS = {
     "quadratic ridge": quadratic_ridge,
     "SVR": lambda n_inputs: support_vectors(),
     "Gaussian process": gaussian_process,
+    "neural network": lambda n_inputs: network(),
     "GradientBoosting": lambda n_inputs: boosting(),
     "EBM": explainable_boosting,
     "cubist": cubist,

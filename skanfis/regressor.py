@@ -62,31 +62,32 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     r"""Adaptive neuro-fuzzy inference system for regression.
 
     A first-order Takagi-Sugeno-Kang model [1]_: rules "IF temperature is low AND rate is high THEN
-    y = p0 + p1 temperature + p2 rate", whose outputs are averaged with the strengths at which the
-    rules fire. The memberships are trained; the consequents are the solution of a linear
-    least-squares problem at every step [2]_. Inputs and targets are standardised inside: the fit
-    does not depend on their units, and everything that comes out is in the user's units.
+    y = p0 + p1 temperature + p2 rate", averaged with the strengths at which they fire. Memberships
+    are trained; consequents are the solution of a linear least-squares problem at every step [2]_.
+    The fit does not depend on units, and everything that comes out is in the user's.
 
     Parameters
     ----------
     n_mfs : "auto", int, or array-like of shape (n_features,), default="auto"
-        Number of membership functions (terms) per input. A number makes a grid, with a rule for
-        every combination of terms; 1 leaves the input to the consequents alone. "auto" leaves it to
-        ``partition``.
-    partition : {"auto", "grid", "subtractive", "fcm"}, clusterer or model, default="auto"
-        Where the rules come from, if ``n_mfs`` is "auto". "grid": a grid grown term by term where
-        it pays most. "auto": such a grid, or scattered rules from k-means, whichever promises the
-        smaller error on new rows. "subtractive" and "fcm": a rule per cluster of
-        :class:`~skanfis.cluster.SubtractiveClustering` or :class:`~skanfis.cluster.FuzzyCMeans`,
-        as many as promise the smallest error; so too any scikit-learn clusterer, of
-        standardised inputs and target. A fitted ANFISRegressor or its ``model_``: training starts
-        from its rules; with ``solver="lse"`` only the consequents are learnt, with ``max_iter=0``
-        nothing is.
+        Number of membership functions (terms) per input: a grid, with a rule for every combination
+        of terms; 1 leaves the input to the consequents alone. "auto" leaves it to ``partition``.
+    partition : {"auto", "grid", "scattered"}, clusterer or model, default="auto"
+        Where the rules come from, if ``n_mfs`` is "auto". "grid": grids that grow term by term;
+        "scattered": rules with terms of their own, around clusters; "auto": both are searched. A
+        scikit-learn clusterer: a rule per cluster of standardised inputs and target. A fitted
+        ANFISRegressor or its ``model_``: training starts from its rules; with ``solver="lse"``
+        only the consequents are learnt, with ``max_iter=0`` nothing is.
+    simplicity : float, default=0.05
+        Part of the error, from 0 to 1, that is given up for a model that is read sooner; of weak
+        signals at most ``(1 + simplicity)**2 - 1`` of the variance explained. Of candidates within,
+        the one of the smallest reading cost is taken; what is left goes into ``agreement``, of
+        given rules too. 0: the best. R2 alone always picks 0 in GridSearchCV (:doc:`/choosing`).
+    max_rules : int, default=None
+        Most rules that the search may take. ValueError where given rules are more.
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
         Family of the membership functions, for all inputs or one each: "gaussian", "bell",
         "triangular", "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",
-        "sigmoid_difference", "sigmoid_product", or a class of one's own. Not used where
-        ``partition`` is a model.
+        "sigmoid_difference", "sigmoid_product", or a class of one's own. Not used with a model.
     premise_features, consequent_features : array-like of str, int or bool, default=None
         Columns of X in the rules' IF parts, and in their THEN parts, by name, position or mask;
         None is all.
@@ -106,13 +107,11 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         How the premises are learnt: :class:`~skanfis.learning.VariableProjection`, Gauss-Newton
         steps in a trust region; :class:`~skanfis.learning.Hybrid`, Jang's rule [1]_;
         :class:`~skanfis.learning.GradientDescent`, back-propagation;
-        :class:`~skanfis.learning.LeastSquares`, premises stay. An object has settings of its own,
-        such as ``tol`` and ``stiffness``.
+        :class:`~skanfis.learning.LeastSquares`, premises stay. Objects have settings: ``tol``, ...
     agreement : "auto" or float, default="auto"
         Weight of the penalty on rules that disagree where they fire together, in variances of the
         target. 0 lets rules compensate one another, 1 makes every rule a model of its own rows.
-        "auto": found by the evidence [3]_, and raised until the strongest rule alone is near the
-        model, unless that would cost too much.
+        "auto": found by the evidence [3]_, and raised as far as ``simplicity`` leaves room.
     alpha : "auto" or float, default="auto"
         Ridge penalty on the consequents, in standard deviations of inputs and target: on each
         rule's departure from the rules' common line, and on the slopes of that line. Of a single
@@ -155,9 +154,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Of each component of the departures its "inputs" and its weight in ``alpha_``, "pull"; the
         weight of the slope by each input in ``slope_alpha_``. Empty where alpha is given.
     structures_ : list of dict
-        The candidates that were compared, best first: "structure", "n_mfs", "expected_error" on new
-        rows in standard deviations of the target, with groups "held_out_error", and more. Empty
-        where the structure was given.
+        What was compared, best first, or the one given: "structure" in words, "kind", "rules",
+        "n_mfs" of a grid, "reading_cost" (numerals in the rules' sentences), "expected_error" (RMS
+        on new rows, in sd of the target), "chosen". Empty where all weights are given too.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
         Standard deviation of the noise of a row of mean weight, in the units of y.
     readability_ : skanfis.inspection.Readability
@@ -174,7 +173,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     n_samples_seen_ : int
         After ``partial_fit``: rows with weight, of all calls.
     n_features_in_, feature_names_in_ : int, ndarray of shape (n_features,)
-        Number of inputs, and their names where X had names that are all strings.
+        Number of inputs; their names where X had names that are all strings.
 
     References
     ----------

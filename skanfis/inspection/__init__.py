@@ -3,12 +3,14 @@
 from .displays import MembershipDisplay, ResponseSurfaceDisplay
 from .readability import Readability, readability
 from .rules import explain, memberships_table, rules_table
+from .structures import StructureDisplay
 from .text import export_text, rules_html
 
 __all__ = [
     "MembershipDisplay",
     "Readability",
     "ResponseSurfaceDisplay",
+    "StructureDisplay",
     "explain",
     "export_text",
     "memberships_table",

@@ -11,12 +11,15 @@ from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import check_finite, positive_weights
 from ..export.folding import fold_with_reader
-from ..learning.penalty import GREATEST_ALONE
 from ..membership import GREATEST_CROSSING, LEAST_TRUTH
 from ..model import TSKModel
+from ..reading_cost import reading_cost
 from .measures import Measures, crossings, distinct_terms, measure
 from .rules import premise_texts, rules_frame, writable
 
+# In standardised units: whoever reads the strongest rule alone is then as wrong as a model that
+# explains three quarters of the variance; beyond, the rule says too little of the model.
+GREATEST_ALONE = 0.5
 # A sentence names so many terms or pairs, and counts the others.
 _MOST_NAMED = 5
 
@@ -43,6 +46,8 @@ class Readability:
         One row per rule and output: "if", its terms; "output"; "weight", the part of the rows'
         weight on which it fires; "rows", the weight of the rows on which it is the strongest;
         "alone", the RMS of its value less the model on these, in sd of the target.
+    reading_cost : int
+        Numerals that a person reads in the rules' sentences, as ``structures_`` counts them.
     summary, limits : Series, dict
         The worst "strongest_alone", "least_truth" and "greatest_crossing", and what just passes.
     findings, line : list of str, str
@@ -99,6 +104,13 @@ class Readability:
             },
             index=pd.Index(np.repeat(np.arange(model.n_rules), model.n_outputs), name="rule"),
         )
+
+    @property
+    def reading_cost(self) -> int:
+        """Numerals that a person reads in the rules' sentences; see the class."""
+        slopes = self.model.coefficients[:, 1:]
+        n_slopes = int(np.count_nonzero(slopes.any(axis=(0, 2))))
+        return reading_cost(self.model.antecedent, n_slopes, self.model.n_outputs)
 
     @property
     def summary(self) -> Any:

@@ -367,28 +367,6 @@ class SeparableProblem:
             target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
         return target
 
-    def strongest_alone(self, evaluation):
-        """RMS of the strongest rule's distance from the model, of the output where it is largest.
-
-        In deviations of the target.
-        """
-        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
-        total, total_weight = np.zeros(self.n_outputs), 0.0
-        for chunk in self.rows.chunks(self._block_rows):
-            for part in chunk:
-                Z, _, weight = self.rows.read(part)
-                strengths = evaluation.antecedent.strengths(Z)
-                basis_rows = self._design.basis(Z)
-                strongest = strengths.argmax(axis=0)
-                for k in range(self.n_outputs):
-                    own = by_rule[:, :, k]
-                    distance = np.einsum("nb,bn->n", own[strongest], basis_rows)
-                    distance -= rule_outputs(own, strengths, basis_rows)[1]
-                    square = distance**2
-                    total[k] += square.sum() if weight is None else square @ weight
-                total_weight += strongest.size if weight is None else weight.sum()
-        return float(np.sqrt(total.max() / total_weight))
-
     def mean_squares(self, evaluation):
         """Mean square of the residual of every standardised output, (n_outputs,)."""
         if self.n_outputs == 1:
@@ -434,10 +412,6 @@ class SeparableProblem:
         """
         Z, _, _ = self.rows.read(part)
         return self._half_at(evaluation, *self._firing(evaluation, Z)) / np.sqrt(self._weight)
-
-    def leverage_at(self, evaluation, Z, n_rows):
-        """Leverages of any places (n_inputs, n_places), where the weights are those of n rows."""
-        return _leverage(self._half_at(evaluation, *self._firing(evaluation, Z))) / n_rows
 
     def _half_at(self, evaluation, strengths, basis_rows):
         """L^-1 phi of some places."""

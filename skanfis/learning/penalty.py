@@ -42,9 +42,6 @@ from ..antecedent import Antecedent
 from ..consequent import LocalBasis, NormalFactor
 from .departures import Departures
 
-# In standardised units: whoever reads the strongest rule alone is then as wrong as a model that
-# explains three quarters of the variance; beyond, the rule says too little of the model.
-GREATEST_ALONE = 0.5
 # What comes first in a row of weights; after these, those on all slopes and on all components.
 WEIGHTS = ("agreement", "stiffness")
 # Penalties whose weights are kept.

@@ -21,6 +21,8 @@ from .tuning import Tuned
 
 KINDS = ("grid", "scattered")
 _MORE_CLUSTERS = 1.5
+# Digits that rounding leaves alone where units change.
+_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -91,12 +93,14 @@ class RuleBases:
         if not candidate.n_clusters:
             return grid_antecedent(self.families, candidate.counts, self.spacing)
         clusterer = KMeans(candidate.n_clusters, n_init=1, random_state=self.seed)
-        return clustered_antecedent(
-            self.families,
-            rows,
-            lambda table, weight: clusterer.fit(table, sample_weight=weight).labels_,
-            self.inputs,
-        )
+
+        def label(table, weight):
+            # It begins at some of the rows: the order of columns is to have no part in which.
+            order = np.lexsort(np.round(np.sort(table, axis=1), _DIGITS).T)
+            labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
+            return labels[np.argsort(order)]
+
+        return clustered_antecedent(self.families, rows, label, self.inputs)
 
 
 def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):

@@ -117,15 +117,8 @@ class StructureRequest:
     def _tuned(self, antecedent, rows):
         self._check_number(antecedent.n_rules)
         self._warn_if_underdetermined(antecedent.n_rules, rows)
-        return tuned_start(
-            antecedent,
-            rows,
-            self.order,
-            self.consequent_inputs,
-            self.weights,
-            self.premises_move,
-            self.simplicity,
-        )
+        plan = self._plan(rows)
+        return tuned_start(antecedent, rows, plan, self.premises_move, self.simplicity)
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
         """A start found on a sample, with the weights that were not given those of all rows."""

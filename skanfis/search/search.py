@@ -14,7 +14,7 @@ from ..reading_cost import reading_cost
 from .candidates import KINDS, Candidate
 from .choice import Judged, Judges, best_of, chosen, tolerated
 from .judging import dealt_rows, splits
-from .start import Start, begun
+from .start import Start, started
 from .trials import Plan, Trials
 
 # Sizes without a gain after which a sequence ends.
@@ -53,7 +53,7 @@ class StructureSearch:
         most = tolerated(best.squared_error, self._variance(), self.simplicity)
         found = chosen(self.judged, most)
         left = most / found.squared_error
-        return begun(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
+        return started(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
 
     def _grow(self, kind, one_rule):
         """Judge a kind from small to large."""

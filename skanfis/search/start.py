@@ -12,7 +12,7 @@ import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent
 from ..learning.data import StandardisedData
-from ..learning.evidence import FREE, ROWS_EACH
+from ..learning.evidence import ROWS_EACH
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
@@ -20,9 +20,9 @@ from ..model import TSKModel
 from ..reading_cost import reading_cost
 from .choice import tolerated
 from .sample import effective_weight, search_sample
+from .trials import Plan
 from .tuning import (
     ARRIVING,
-    FIRST_PENALTY,
     FIRST_STEPS,
     MOST_COLUMNS,
     MOST_TURNS,
@@ -54,72 +54,52 @@ class Start:
     term_names: tuple[str, ...] = ()  # where they are given with the rules
 
 
-def begun(tuned: Tuned, plan, left: float, candidates) -> Start:
-    """A start from a candidate's training, with the agreement that the tolerance leaves room for.
+def started(tuned: Tuned, plan: Plan, left: float, candidates, is_free=False) -> Start:
+    """A start from a training, with the agreement that the tolerance leaves room for.
 
     ``left`` is the factor by which the squared error may still rise.
     """
-    problem, rows = tuned.problem, tuned.problem.rows
-    premise = Premise.of(problem.antecedent, *rows.inputs.box)
-    n_rows = tuned.posterior.n_rows
-    tuned = with_most_agreement(tuned, premise, plan.free, n_rows, left)
+    problem, n_rows = tuned.problem, tuned.posterior.n_rows
+    premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
+    if not is_free:
+        tuned = with_most_agreement(tuned, premise, plan.free, n_rows, left)
     return Start(
         problem.antecedent,
         scaled(tuned.penalty, plan.free, n_rows / plan.n_all, tuned.agreement_is_raised),
         settled(tuned.displacement),
-        agreement_is_raised=tuned.agreement_is_raised,
-        candidates=candidates,
+        is_free,
+        tuned.agreement_is_raised,
+        candidates,
     )
 
 
 def tuned_start(
-    antecedent: Antecedent,
-    rows: StandardisedData,
-    order,
-    consequent_inputs,
-    weights,
-    premises_move,
-    simplicity,
+    antecedent: Antecedent, rows: StandardisedData, plan: Plan, premises_move, simplicity
 ) -> Start:
-    """A start from rules that are given, with the weights that are not given found on the rows.
-
-    ``weights`` are those of the penalty that are given, by their names in ``evidence.FREE``.
-    """
-    free = [key for key in FREE if key not in weights]
-    penalty = replace(FIRST_PENALTY, **weights)
-    if not premises_move:
+    """A start from rules that are given, with the weights that are not given found on the rows."""
+    free, penalty = plan.free, plan.first
+    if not premises_move and "stiffness" in free:
         free = [key for key in free if key != "stiffness"]
-        penalty = replace(penalty, stiffness=weights.get("stiffness", 0.0))
-    if not free:
-        return Start(antecedent, penalty)
+        penalty = replace(penalty, stiffness=0.0)
     sample = search_sample(rows, _MOST_ROWS)
-    problem = SeparableProblem(
-        sample, antecedent, order, penalty, consequent_inputs=consequent_inputs
-    )
+    slopes = plan.consequent_inputs
+    problem = SeparableProblem(sample, antecedent, plan.order, penalty, consequent_inputs=slopes)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box
     premise, is_free = Premise.of(antecedent, low, high), False
-    turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move else (0, ARRIVING)
+    turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move and free else (0, ARRIVING)
     best = tune(problem, premise, free, n_sample, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
-    if premises_move and premise.size and has_rows and problem.n_columns <= MOST_COLUMNS:
+    if turns and premise.size and has_rows and problem.n_columns <= MOST_COLUMNS:
         unbounded = Premise.of(antecedent, low, high, is_free=True)
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
-            best, premise, is_free = freed, unbounded, True
-    if premises_move and not is_free:
+            best, is_free = freed, True
+    left, error = 1.0, best.expected_error
+    if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))
-        error = best.expected_error
-        left = tolerated(error, variance, simplicity) / error if error > 0.0 else 1.0
-        best = with_most_agreement(best, premise, free, n_sample, left)
-    return Start(
-        antecedent,
-        scaled(best.penalty, free, n_sample / effective_weight(rows), best.agreement_is_raised),
-        settled(best.displacement),
-        is_free,
-        best.agreement_is_raised,
-        [_as_given(best)],
-    )
+        left = tolerated(error, variance, simplicity) / error
+    return started(best, replace(plan, free=free), left, [_as_given(best)], is_free)
 
 
 def _as_given(tuned: Tuned):

@@ -35,7 +35,7 @@ _MOST_OPERATIONS = 1e9
 # Turns of weights and premises of a candidate.
 _TURNS = 2
 # Of the inputs of which the residual says most, so many are tried.
-_TRIED = 8
+_TRIED = 4
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
 _SIGNIFICANT = 2.0
 
@@ -98,7 +98,8 @@ class Trials:
         ]
 
     def _scores(self, candidate):
-        counts = [candidate.counts[j] + 1 for j in self.plan.inputs]
+        # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
+        counts = [candidate.counts[j] + 2 for j in self.plan.inputs]
         return term_scores(self.begun(candidate), self.plan.inputs, counts, self.spacing)
 
     def rows_for(self, candidate):

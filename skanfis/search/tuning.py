@@ -252,7 +252,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
     The consequents alone tell how much that is at least; then the premises follow, which makes room
     for more.
     """
-    if "agreement" not in free or not tuned.displacement.size:
+    if "agreement" not in free or not tuned.displacement.size or left <= 1.0:
         return tuned
     others = [key for key in free if key != "agreement"]
     most, best = left * tuned.expected_error, tuned

@@ -34,7 +34,7 @@ class Printer:
     def tell_start(self, start):
         """Write what the structure and the weights are."""
         penalty, n_candidates = start.penalty, len(start.candidates)
-        found = f"{n_candidates} candidates compared, " if n_candidates else ""
+        found = f"{n_candidates} candidates compared, " if n_candidates > 1 else ""
         self._write(
             f"{found}{start.antecedent.n_rules} rules, agreement {penalty.agreement:.3g}, "
             f"alpha {penalty.alpha:.3g}, stiffness {penalty.stiffness:.3g}"

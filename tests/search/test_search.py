@@ -1,4 +1,4 @@
-"""Structure by itself: what the search finds, and what its score means."""
+"""Structure by itself: what the search finds, what it says of it, and that nothing else matters."""
 
 from itertools import pairwise
 
@@ -7,16 +7,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import LeaveOneOut, cross_val_predict
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
 from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
-from skanfis.membership import Gaussian
-from skanfis.search import search
-from skanfis.search.candidates import Candidate, term_scores
-from skanfis.search.trials import Trials
+from skanfis.search.judging import dealt_rows, splits
 
 pytestmark = pytest.mark.theory
 
@@ -76,18 +72,6 @@ def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
     assert ANFISRegressor(order=0).fit(X, y).n_rules_ > linear
 
 
-def test_expected_error_of_the_linear_model_is_that_of_rows_left_out(rng):
-    X = inputs(rng, 80)
-    y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(80)
-    model = ANFISRegressor(
-        partition="grid", agreement=0.0, alpha=0.0, solver=VariableProjection(stiffness=0.0)
-    ).fit(X, y)
-    linear = next(c for c in model.structures_ if c["structure"] == "grid [1, 1, 1]")
-    left_out = cross_val_predict(LinearRegression(), X, y, cv=LeaveOneOut())
-    error = np.sqrt(np.mean((y - left_out) ** 2)) / y.std()
-    assert_allclose(linear["expected_error"], error, rtol=1e-9)
-
-
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_expected_error_is_that_on_new_rows(rng):
     def surface(n):
@@ -99,81 +83,11 @@ def test_expected_error_is_that_on_new_rows(rng):
     X_new, y_new = surface(20_000)
     found = np.sqrt(np.mean((model.predict(X_new) - y_new) ** 2)) / y.std()
     # 500 rows tell a standard deviation to 3 %; twice that.
-    assert_allclose(model.structures_[0]["expected_error"], found, rtol=0.06)
+    (expected,) = (one["expected_error"] for one in model.structures_ if one["chosen"])
+    assert_allclose(expected, found, rtol=0.06)
 
 
-def test_what_is_given_is_not_searched_for(rng):
-    X = inputs(rng, 100)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
-    model = ANFISRegressor(partition="grid", alpha=3e-5).fit(X, y)
-    assert (model.alpha_, model.slope_alpha_) == (3e-5, 3e-5)
-    assert {c["alpha"] for c in model.structures_} == {3e-5}
-    assert len({c["stiffness"] for c in model.structures_}) > 1
-    assert len({c["agreement"] for c in model.structures_}) > 1
-    solver = VariableProjection(stiffness=0.01)
-    model = ANFISRegressor(partition="grid", agreement=0.3, alpha=3e-5, solver=solver).fit(X, y)
-    assert (model.agreement_, model.alpha_, model.stiffness_) == (0.3, 3e-5, 0.01)
-    assert {c["stiffness"] for c in model.structures_} == {0.01}
-    assert {c["agreement"] for c in model.structures_} == {0.3}
-
-
-def test_grid_tries_no_scattered_rules(rng):
-    X = inputs(rng, 100)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
-    tried = {
-        c["structure"].split()[0] for c in ANFISRegressor(partition="grid").fit(X, y).structures_
-    }
-    assert tried == {"grid"}
-    assert ANFISRegressor(n_mfs=2).fit(X, y).structures_ == []
-
-
-KEYS = {
-    "structure",
-    "n_mfs",
-    "expected_error",
-    "log_evidence",
-    "agreement",
-    "alpha",
-    "stiffness",
-}
-
-
-def test_log_evidence_is_that_of_a_linear_model_averaged_out(rng):
-    # With agreement and alpha given, the linear model has no prior but on its slopes, alpha: the
-    # data are normal with covariance sigma^2 (I + Z Z' / (n alpha)), sigma^2 at its best.
-    X = inputs(rng, 100)
-    y = X @ [1.0, -2.0, 0.5] + 0.3 * rng.standard_normal(100)
-    scores = []
-    z = (X - X.mean(axis=0)) / X.std(axis=0)
-    t = (y - y.mean()) / y.std()
-    for alpha in (1e-3, 1e-1):
-        model = ANFISRegressor(partition="grid", agreement=0.1, alpha=alpha).fit(X, y)
-        linear = next(c for c in model.structures_ if c["structure"] == "grid [1, 1, 1]")
-        covariance = np.eye(100) + z @ z.T / (100 * alpha)
-        sign, logarithm = np.linalg.slogdet(covariance)
-        # The constant takes one row's worth.
-        scores.append(
-            [
-                linear["log_evidence"],
-                -0.5 * (logarithm + 99 * np.log(t @ np.linalg.solve(covariance, t))),
-            ]
-        )
-        assert sign == 1.0
-    found, expected = np.transpose(scores)
-    assert_allclose(np.diff(found), np.diff(expected), rtol=1e-6)
-
-
-def test_candidates_are_listed_from_the_best(rng):
-    X = inputs(rng, 100)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
-    model = ANFISRegressor().fit(X, y)
-    errors = [c["expected_error"] for c in model.structures_]
-    assert errors == sorted(errors)
-    assert all(set(c) == KEYS for c in model.structures_)
-
-
-# The search over both goes through the one over grids.
-@pytest.mark.parametrize("partition", ["auto", "fcm"])
+@pytest.mark.parametrize("partition", ["auto", "scattered"])
 def test_more_noise_never_gives_more_rules(rng, partition):
     X = inputs(rng, 200, 2)
     truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(200)
@@ -198,64 +112,12 @@ def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
     assert_allclose(errors[0], errors[1], rtol=0.05)
 
 
-def test_of_many_inputs_those_that_matter_are_found(rng, monkeypatch):
+def test_of_many_inputs_those_that_matter_are_found(rng):
     X = inputs(rng, 300, 12)
     y = np.sin(3.0 * X[:, 7]) + np.abs(X[:, 2]) + 0.05 * rng.standard_normal(300)
-    rounds, promising = [], Trials.promising
-
-    def noting(self, candidates):
-        rounds.append(promising(self, candidates))
-        return rounds[-1]
-
-    monkeypatch.setattr(Trials, "promising", noting)
     model = ANFISRegressor(partition="grid").fit(X, y)
     counts = terms_per_input(model, 12)
     assert [j for j, count in enumerate(counts) if count > 1] == [2, 7]
-    # None is given up for what it promises in a round: beside others' terms it may do better.
-    for tried in rounds[:3]:
-        counts = np.array([candidate.counts for candidate in tried])
-        grown = np.argmax(counts - counts.min(axis=0), axis=1)
-        assert_array_equal(np.sort(grown), np.arange(12))
-
-
-def test_screening_is_by_correlations_of_weighted_rows(rng):
-    # The formula term by term, the share as that of two Gaussians that cross at the overlap.
-    X, every = inputs(rng, 150, 18), np.arange(18)
-    y = np.sin(3.0 * X[:, [0]]) + X[:, [5]] * X[:, [3]] + 0.3 * rng.standard_normal((150, 1))
-    # Weights that go with the inputs: the mean of a share is far from its plain mean.
-    rows = StandardisedData.of(X, y, np.ceil(np.exp(X.sum(axis=1))))
-    found = search.StructureSearch(rows, [Gaussian] * 18, 1, every, every, 0, {})
-    linear = Candidate((1,) * 18)
-    z, s = found.trials.sample.X, found.trials.sample.sample_weight
-    basis = np.column_stack([np.ones(len(z)), z])
-    coefficients = found.trials.tuned(linear).evaluation.coefficients
-    r = found.trials.sample.y[:, 0] - basis @ coefficients[:, 0]
-    statistic = []
-    for j in every:
-        centers = found.trials.spacing.centers(j, 2)
-        width = 0.5 * (centers[1] - centers[0]) / np.sqrt(-2.0 * np.log(0.6))
-        mu = np.exp(-0.5 * ((z[:, [j]] - centers) / width) ** 2)
-        w = mu[:, 1] / mu.sum(axis=1)
-        w -= np.average(w, weights=s)
-        parts = [(s * w * b) @ r / np.sqrt(s @ (w * b) ** 2) for b in basis.T]
-        statistic.append(np.sum(np.square(parts)))
-    centers = np.array([found.trials.spacing.centers(j, 2) for j in every])
-    asked = term_scores(found.trials.tuned(linear), every, centers)
-    assert_allclose(asked, statistic, rtol=1e-9)
-    found._screen(linear)
-    assert_array_equal(found.inputs, np.argsort(statistic)[::-1][: search._SCREENED])
-    assert_array_equal(found.trials.rule_bases.inputs, found.inputs)
-
-
-def test_no_more_terms_than_values(rng):
-    X = np.column_stack([rng.integers(0, 2, 200), rng.integers(0, 3, 200), rng.uniform(size=200)])
-    y = np.sin(9.0 * X[:, 2]) + 2.0 * X[:, 0] * X[:, 1] ** 2 + 0.05 * rng.standard_normal(200)
-    model = ANFISRegressor(partition="grid", order=0).fit(X, y)
-    tried = [
-        [int(c) for c in line["structure"].removeprefix("grid [").removesuffix("]").split(",")]
-        for line in model.structures_
-    ]
-    assert np.max(tried, axis=0)[:2].tolist() == [2, 3]
 
 
 DRAWS = {
@@ -328,27 +190,12 @@ def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
     errors = []
     for model in (alone, grouped):
         errors.append(np.sqrt(np.mean((model.predict(X_new) - y_new) ** 2)) / y.std())
-    assert_allclose(grouped.structures_[0]["held_out_error"], errors[1], rtol=0.5)
-    assert alone.structures_[0]["expected_error"] < 0.5 * errors[0]
-
-
-def test_score_of_groups_is_that_of_trainings_without_them():
-    X, y, run = runs(5)
-    model = ANFISRegressor(partition="grid", alpha=1e-9).fit(X, y, groups=run)
-    linear = next(s for s in model.structures_ if s["structure"] == "grid [1, 1]")
-    squares = []
-    for held in range(5):
-        kept = run != held
-        low, high = X[kept].min(axis=0), X[kept].max(axis=0)
-        inside = ~kept & ((low <= X) & (high >= X)).all(axis=1)
-        plane = LinearRegression().fit(X[kept], y[kept])
-        if inside.any():
-            squares.append((plane.predict(X[inside]) - y[inside]) ** 2)
-    expected = np.sqrt(np.mean(np.concatenate(squares))) / y.std()
-    assert_allclose(linear["held_out_error"], expected, rtol=1e-3)
-    # What decides is what is listed first, not the error that is expected of rows like these.
-    held_out = [s["held_out_error"] for s in model.structures_]
-    assert held_out == sorted(held_out)
+    expected = [
+        next(one["expected_error"] for one in model.structures_ if one["chosen"])
+        for model in (alone, grouped)
+    ]
+    assert_allclose(expected[1], errors[1], rtol=0.5)
+    assert expected[0] < 0.5 * errors[0]
 
 
 def test_a_single_group_says_nothing():
@@ -364,3 +211,166 @@ def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_star
     model = ANFISRegressor(partition="grid", max_iter=0).fit(X, y)
     assert model.n_rules_ > 1
     assert model.memberships_ == model.initial_memberships_
+
+
+def test_a_search_leaves_no_term_in_a_gap():
+    """A wave, and far from it a plateau."""
+    rng = np.random.default_rng(0)
+    gap = rng.uniform(2, 20)
+    x = np.r_[rng.uniform(0, 1, 60), 1 + gap + rng.uniform(0, 1, rng.integers(1, 20))]
+    y = np.sin(rng.uniform(2, 9) * x) * (x < 2) + rng.normal() * (x > 2)
+    y += 0.01 * rng.normal(size=x.size)
+    terms = ANFISRegressor().fit(x[:, None], y).memberships_
+    assert all(np.abs((x - t["center"]) / t["width"]).min() < np.sqrt(2 * np.log(2)) for t in terms)
+
+
+@pytest.mark.parametrize(
+    ("starts", "most"), [((0.0, 10.0, 50.0), 0.1), (np.linspace(0.0, 50.0, 30), 0.01)]
+)
+def test_between_runs_rules_by_time_and_temperature_are_not_wild(rng, starts, most):
+    """Instruments that warm up by 6 degrees, each from its own; three say next to nothing."""
+    time = np.tile(np.linspace(0.0, 1.0, 60), len(starts))
+    warmth = 6.0 * (1.0 - np.exp(-3.0 * time))
+    temperature = np.repeat(starts, 60) + warmth + 0.05 * rng.standard_normal(time.size)
+
+    def truth(X):
+        return 0.01 * (X[:, 1] - 20.0) ** 2 + np.exp(-4.0 * X[:, 0])
+
+    X = np.column_stack([time, temperature])
+    y = truth(X) + 1e-4 * rng.standard_normal(time.size)
+    fresh = rng.uniform(X.min(axis=0), X.max(axis=0), (2000, 2))
+    error = ANFISRegressor().fit(X, y).predict(fresh) - truth(fresh)
+    assert np.sqrt(np.mean(error**2)) < most * y.std()
+
+
+def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
+    # Half-way between two rows the product is not that of the factors: no new row lies there.
+    rng = np.random.default_rng(1)
+    X, fresh = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (2, 800, 3))
+    noise = 1e-3
+
+    def truth(X):
+        time, temperature, rate = X.T[:3]
+        bias = 0.05 * np.exp(-time / 600.0) + 2e-6 * (temperature - 20.0) ** 2
+        scale_factor = -4.1e-4 * (temperature - 20.0) - (0.2536 * np.deg2rad(rate)) ** 2 / 6.0
+        return bias + 1e-3 * np.sin(temperature / 15.0) + rate * scale_factor
+
+    X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
+    low, high = X.min(axis=0), X.max(axis=0)
+    fresh = fresh[((low <= fresh) & (fresh <= high)).all(axis=1)]
+    model = ANFISRegressor().fit(X, truth(X) + noise * rng.standard_normal(800))
+    errors = model.predict(fresh) - truth(fresh)
+    assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
+
+
+# ----------------------------------------------------------------------------- what is said of it
+
+
+def bumps(rng, n_rows=150):
+    X = inputs(rng, n_rows)
+    return X, np.sin(3.0 * X[:, 0]) + X[:, 1] * X[:, 2] + 0.1 * rng.standard_normal(n_rows)
+
+
+@pytest.mark.parametrize("n_groups", [None, 7])
+def test_expected_error_of_the_linear_model_is_that_of_its_folds(rng, n_groups):
+    """Of planes through the other folds, times what more rows are worth: (1 + k / n), k = 4."""
+    X, y = bumps(rng, 80)
+    groups = None if n_groups is None else rng.integers(0, n_groups, 80)
+    nothing = {"agreement": 0.0, "alpha": 0.0, "solver": VariableProjection(stiffness=0.0)}
+    model = ANFISRegressor(partition="grid", max_rules=1, **nothing).fit(X, y, groups=groups)
+    (told,) = model.structures_
+    rows = dealt_rows(StandardisedData.of(X, y[:, None], groups=groups))
+    Z, t, squares, weights = rows.X, rows.y[:, 0], [], []
+    for grow, rest in splits(rows):
+        plane = LinearRegression().fit(Z[grow], t[grow])
+        squares.append((plane.predict(Z[rest]) - t[rest]) ** 2)
+        weights.append(grow.size)
+    factor = (1.0 + 4.0 / 80.0) / (1.0 + 4.0 / weights[0])
+    error = np.sqrt(factor * np.mean(np.concatenate(squares)))
+    assert_allclose(told["expected_error"], error, rtol=1e-3)
+
+
+@pytest.mark.parametrize("partition", ["auto", "grid", "scattered"])
+def test_candidates_are_listed_from_the_best(rng, partition):
+    model = ANFISRegressor(partition=partition).fit(*bumps(rng))
+    found = model.structures_
+    assert [one["expected_error"] for one in found] == sorted(o["expected_error"] for o in found)
+    kinds = {"grid", "scattered"} if partition == "auto" else {partition}
+    assert {one["kind"] for one in found} == {"one rule", *kinds}
+    assert [one["rules"] for one in found if one["chosen"]] == [model.n_rules_]
+    for one in found:
+        n_terms = 0
+        if one["kind"] == "scattered":
+            assert one["n_mfs"] is None
+            assert one["structure"] == f"{one['rules']} scattered rules"
+        else:
+            assert np.prod(one["n_mfs"]) == one["rules"]
+            n_terms = sum(count > 1 for count in one["n_mfs"])
+            assert one["reading_cost"] == one["rules"] * (n_terms + 4)
+
+
+def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
+    X, y = bumps(rng, 400)
+    fitted = {s: ANFISRegressor(simplicity=s).fit(X, y) for s in (0.0, 0.02, 0.05, 0.2, 1.0)}
+    told = {s: next(o for o in m.structures_ if o["chosen"]) for s, m in fitted.items()}
+    costs = [one["reading_cost"] for one in told.values()]
+    assert costs == sorted(costs, reverse=True)
+    assert len(set(costs)) > 2
+    for s, one in told.items():
+        squares = one["expected_error"] ** 2
+        least = told[0.0]["expected_error"] ** 2
+        # The signal is clear: of the target's variance, about 1, more is explained than left.
+        most = least + ((1.0 + s) ** 2 - 1.0) * min(least, 1.0 - least)
+        assert squares <= most * (1.0 + 1e-9)
+        cheaper = [o for o in fitted[s].structures_ if o["reading_cost"] < one["reading_cost"]]
+        assert all(o["expected_error"] ** 2 > most for o in cheaper)
+
+
+@pytest.mark.parametrize("partition", ["auto", "grid", "scattered"])
+def test_no_candidate_has_more_rules_than_max_rules(rng, partition):
+    X, y = bumps(rng)
+    free = ANFISRegressor(partition=partition, simplicity=0.0).fit(X, y)
+    assert free.n_rules_ > 3
+    bound = ANFISRegressor(partition=partition, simplicity=0.0, max_rules=3).fit(X, y)
+    assert 2 <= max(one["rules"] for one in bound.structures_) <= 3
+    assert bound.n_rules_ <= 3
+
+
+# ------------------------------------------------------------------------------------ nothing else
+
+FORMS = {
+    "order of rows": lambda X, y: (X[::-1], y[::-1]),
+    "order of columns": lambda X, y: (X[:, [2, 0, 1]], y),
+    "units": lambda X, y: (X * [1e6, -1e-3, 1.0] + [0.0, 1.0, 0.0], 1e-3 * y + 4.0),
+    "a constant column": lambda X, y: (np.column_stack([X, np.full(len(X), 3.0)]), y),
+    "a column twice": lambda X, y: (X[:, [0, 1, 2, 0]], y),
+}
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
+@pytest.mark.parametrize("partition", ["grid", "scattered"])
+@pytest.mark.parametrize("form", FORMS)
+def test_the_same_model_whatever_form_the_rows_have(rng, partition, form):
+    X, y = bumps(rng)
+    X_other, y_other = FORMS[form](X, y)
+    model = ANFISRegressor(partition=partition)
+    plain, found = (clone(model).fit(*data) for data in ((X, y), (X_other, y_other)))
+    assert [o["rules"] for o in found.structures_] == [o["rules"] for o in plain.structures_]
+    scale = y_other.std() / y.std()
+    predicted = (found.predict(X_other) - y_other.mean()) / scale + y.mean()
+    if form == "order of rows":
+        predicted = predicted[::-1]
+    # What a column says may be said by two: the slopes share it.
+    assert_allclose(predicted, plain.predict(X), atol=(0.1 if "twice" in form else 1e-5) * y.std())
+
+
+@pytest.mark.parametrize("partition", ["grid", "scattered"])
+def test_a_weight_is_so_many_repeats(rng, partition):
+    X, y = bumps(rng, 100)
+    times = rng.integers(1, 4, 100)
+    model = ANFISRegressor(partition=partition)
+    weighted = clone(model).fit(X, y, times)
+    repeated = clone(model).fit(X.repeat(times, axis=0), y.repeat(times))
+    errors = [[o["expected_error"] for o in m.structures_] for m in (weighted, repeated)]
+    assert_allclose(errors[1], errors[0], rtol=1e-4)
+    assert_allclose(repeated.predict(X), weighted.predict(X), atol=1e-5 * y.std())

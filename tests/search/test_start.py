@@ -1,18 +1,26 @@
 """Where training starts: rules that are given, their weights, and when terms are unbounded."""
 
 import numpy as np
+import pytest
+from numpy.testing import assert_allclose
 
 from skanfis.learning.data import StandardisedData
+from skanfis.learning.evidence import FREE
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
 from skanfis.search import Spacing, grid_antecedent, start
+from skanfis.search.judging import dealt_rows
+from skanfis.search.trials import Plan, Trials
+from skanfis.search.tuning import FIRST_PENALTY
 
 
-def of_grid(count, truth, rng, noise=0.0, n_rows=300):
+def of_grid(count, truth, rng, noise=0.0, n_rows=300, weights=None, simplicity=0.0):
     x = rng.uniform(-1.0, 1.0, (n_rows, 1))
     rows = StandardisedData.of(x, truth(x) + noise * rng.normal(size=x.shape))
     antecedent = grid_antecedent([Gaussian], [count], Spacing(rows))
-    return rows, start.tuned_start(antecedent, rows, 1, np.arange(1), {}, premises_move=True)
+    return rows, start.tuned_start(
+        antecedent, rows, 1, np.arange(1), weights or {}, True, simplicity
+    )
 
 
 def test_terms_have_no_bounds_where_data_are_next_to_exact(rng):
@@ -27,6 +35,66 @@ def test_terms_have_no_bounds_where_data_are_next_to_exact(rng):
     assert (np.sign(difference[0] - difference[1]) == [1.0, -1.0]).all()
 
 
+def sine(x):
+    return np.sin(3.0 * x)
+
+
 def test_terms_have_bounds_where_there_is_noise(rng):
-    _, found = of_grid(3, lambda x: np.sin(3.0 * x), rng, 0.1)
+    _, found = of_grid(3, sine, rng, 0.1)
     assert not found.is_free
+
+
+def test_of_rules_that_are_given_simplicity_raises_the_agreement(rng):
+    """As far as the part of the error that is given up allows; one that is given stays."""
+    starts = [
+        of_grid(3, sine, np.random.default_rng(1), 0.3, simplicity=s)[1] for s in (0.0, 0.2, 0.5)
+    ]
+    least, *errors = (start.candidates[0]["expected_error"] for start in starts)
+    assert least < errors[0] <= 1.2 * least
+    assert errors[0] < errors[1] <= 1.5 * least
+    assert not starts[0].agreement_is_raised
+    assert all(start.agreement_is_raised for start in starts[1:])
+    agreements = [start.penalty.agreement for start in starts]
+    assert 2.0 * agreements[0] < agreements[1] < agreements[2]
+    _, given = of_grid(3, sine, rng, 0.3, weights={"agreement": 1e-3}, simplicity=0.5)
+    assert given.penalty.agreement == 1e-3
+    assert not given.agreement_is_raised
+
+
+def test_rules_that_are_given_are_reported_as_the_one_candidate(rng):
+    rows, found = of_grid(3, sine, rng, 0.1, weights={"agreement": 1e-3, "alpha": 1e-4})
+    (told,) = found.candidates
+    assert told | {"expected_error": 0.0} == {
+        "structure": "3 rules as given",
+        "kind": "grid",
+        "rules": 3,
+        "n_mfs": None,
+        "reading_cost": 3 * (1 + 2),
+        "expected_error": 0.0,
+        "chosen": True,
+    }
+    # In deviations of the target: the noise is a tenth, and the sine's is known.
+    assert_allclose(told["expected_error"] * rows.targets.scale, 0.1, rtol=0.1)
+
+
+@pytest.mark.parametrize("left", [1.0, 1.5])
+def test_a_candidate_begins_where_its_trial_ended(rng, left):
+    """With the weights of as many rows as there are; raised agreement holds for any number."""
+    X = rng.uniform(-1.0, 1.0, (200, 1))
+    rows = dealt_rows(StandardisedData.of(X, sine(X) + 0.3 * rng.normal(size=X.shape)))
+    slopes = np.arange(1)
+    plan = Plan([Gaussian], 1, slopes, slopes, 0, list(FREE), FIRST_PENALTY, 1000.0, None)
+    trials = Trials(rows, plan)
+    tuned = trials.tuned(trials.larger("grid", trials.one_rule))
+    found = start.begun(tuned, plan, left, ["told"])
+    assert found.candidates == ["told"]
+    assert found.antecedent is tuned.problem.antecedent
+    assert found.agreement_is_raised is (left > 1.0)
+    weights = [found.penalty.alpha, found.penalty.rho, found.penalty.stiffness]
+    own = [tuned.penalty.alpha, tuned.penalty.rho, tuned.penalty.stiffness]
+    assert_allclose(weights, np.multiply(own, 0.2), rtol=5e-3)
+    if left == 1.0:
+        assert_allclose(found.displacement, tuned.displacement, atol=1e-5)
+        assert_allclose(found.penalty.agreement, 0.2 * tuned.penalty.agreement, rtol=5e-3)
+    else:
+        assert found.penalty.agreement > 2.0 * tuned.penalty.agreement

@@ -1,171 +1,177 @@
-"""What candidates are worth: expected errors, rows beyond the range, places between rows, gaps."""
+"""Short trainings: what they leave of rows that were not trained on, and which come next."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.evidence import FREE
 from skanfis.learning.penalty import Penalty
-from skanfis.membership import Bell, Gaussian
-from skanfis.search import trials
+from skanfis.membership import Gaussian
 from skanfis.search.candidates import Candidate
-from skanfis.search.trials import Trials
+from skanfis.search.judging import dealt_rows, splits
+from skanfis.search.sample import unit_scale
+from skanfis.search.trials import _FEWEST_ROWS, _ROWS_EACH, Plan, Trials
+from skanfis.search.tuning import FIRST_PENALTY
 
 from .. import oracles
 
 pytestmark = pytest.mark.theory
 
 
-def inputs(rng, n_rows=400, n_inputs=3):
-    return rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
+def plan_of(n_inputs, n_all, free=FREE, first=FIRST_PENALTY, order=1, most_rules=None):
+    every = np.arange(n_inputs)
+    slopes = every if order else every[:0]
+    families = [Gaussian] * n_inputs
+    return Plan(families, order, every, slopes, 0, list(free), first, n_all, most_rules)
 
 
-def search_of(X, y, sample_weight=None):
-    used = np.arange(X.shape[1])
-    rows = StandardisedData.of(X, y.reshape(len(X), -1), sample_weight)
-    return Trials(rows, [Gaussian] * used.size, 1, used, used, 0, {})
+def trials_of(X, y, n_all=None, **settings):
+    rows = dealt_rows(StandardisedData.of(X, y.reshape(len(X), -1)))
+    return Trials(rows, plan_of(X.shape[1], n_all or float(len(X)), **settings))
 
 
-@pytest.mark.floors
-@pytest.mark.parametrize("clustering", ["k-means", "fcm"])
-def test_no_more_clusters_than_rows_are_tried(rng, clustering):
-    X = inputs(rng, 12, 1)
-    found = search_of(X, X[:, 0] + 0.1 * rng.standard_normal(12))
-    few, many, linear = (
-        Candidate(None, 2, clustering),
-        Candidate(None, 13, clustering),
-        Candidate((1,)),
+def surface(rng, n_rows=300, n_inputs=3):
+    X = rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
+    return X, np.sin(3.0 * X[:, 0]) + X[:, 0] * X[:, 1] + 0.1 * rng.normal(size=n_rows)
+
+
+NOTHING = Penalty()  # pays for nothing
+
+
+@pytest.mark.parametrize("n_groups", [None, 5])
+def test_squared_errors_of_one_rule_are_those_of_a_public_fit(rng, n_groups):
+    """Of least squares on what the fold grows on; on rows beyond its range as well."""
+    X, y = surface(rng, 90)
+    groups = (
+        None if n_groups is None else np.digitize(X[:, 2], np.linspace(-0.9, 0.9, n_groups - 1))
     )
-    assert set(found.promising([many, few, linear])) == {few, linear}
-    assert found.score(many) == np.inf
-    assert np.isfinite(found.score(linear))
+    rows, n_beyond = dealt_rows(StandardisedData.of(X, y[:, None], groups=groups)), 0
+    for grow, rest in splits(rows):
+        fold, left = rows.part(grow), rows.part(rest)
+        trials = Trials(fold, plan_of(3, 90.0, free=[], first=NOTHING))
+        found = trials.squared_errors(trials.tuned(trials.one_rule), left)
+        model = ANFISRegressor(n_mfs=1, agreement=0.0, alpha=0.0).fit(fold.X, fold.y[:, 0])
+        assert_allclose(found, (model.predict(left.X) - left.y[:, 0]) ** 2, rtol=1e-5, atol=1e-9)
+        n_beyond += np.count_nonzero(~model.in_bounds(left.X))
+    assert n_beyond > 5
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("kind", ["grid", "scattered"])
+def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order):
+    X, y = surface(rng, 200)
+    y = np.column_stack([y, X[:, 2] - y**2])
+    rows = dealt_rows(StandardisedData.of(X, y, rng.integers(1, 4, 200).astype(float)))
+    is_left = (np.arange(200) % 4 == 0) | (rows.X[:, 0] > 1.5)
+    fold, rest = rows.part(~is_left), rows.part(is_left)
+    trials = Trials(fold, plan_of(3, 200.0, order=order))
+    tuned = trials.tuned(trials.larger(kind, trials.larger(kind, trials.one_rule)))
+    # Premises have moved, and the last weights are those of the consequents.
+    assert np.abs(tuned.displacement).max() > 0.05
+    antecedent, penalty = tuned.evaluation.antecedent, tuned.penalty
+    within = replace(fold, inputs=unit_scale(fold.X), targets=unit_scale(fold.y))
+    start = tuned.problem.antecedent
+    dense = oracles.DenseProblem(within, start, order, penalty)
+    coefficients = dense.coefficients(antecedent.parameters)
+    # As predict answers: beyond the range along the tangent, and not far from the target's.
+    nearest = np.clip(rest.X, fold.X.min(axis=0), fold.X.max(axis=0))
+    way = np.clip(rest.X - nearest, -0.5, 0.5)
+
+    def answer(t):
+        design = oracles.dense_design(
+            antecedent, antecedent.parameters, (nearest + t * way).T, order
+        )
+        return design @ coefficients
+
+    answers = answer(0.0) + oracles.complex_step(lambda t: answer(t[0]), np.zeros(1))[..., 0]
+    answers = np.clip(answers, fold.y.min(axis=0) - 0.5, fold.y.max(axis=0) + 0.5)
+    expected = ((answers - rest.y) ** 2).sum(axis=1)
+    assert_allclose(trials.squared_errors(tuned, rest), expected, rtol=1e-4, atol=1e-6)
+    assert way.any()
 
 
 def test_what_parameters_cost_falls_as_the_rows_rise(rng):
-    # A plane through 8,000 rows of noise alone: the mean square on new rows is the noise's times
-    # 1 + k / n, and k is 3 for all but the pull on the slopes.
-    X = inputs(rng, 8000, 2)
-    y = X @ [3.0, 2.0] + rng.standard_normal(8000)
-    found, linear = search_of(X, y), Candidate((1, 1))
-    tuned, n = found.tuned(linear), found.n_sample
-    assert n < 2200.0
+    # A plane through noise alone: the mean square on new rows is the noise's times 1 + k / n, and
+    # k is 3 for all but the pull on the slopes. The fold has 600 rows, all of the fit 8,000.
+    X, y = rng.uniform(-1.0, 1.0, (600, 2)), rng.normal(size=600)
+    trials = trials_of(X, y + X @ [3.0, 2.0], n_all=8000.0)
+    tuned = trials.tuned(trials.one_rule)
     assert_allclose(tuned.posterior.n_effective, 3.0, atol=0.05)
-    noise = tuned.evaluation.mean_squared_error / (1.0 - 3.0 / n)
-    assert_allclose(tuned.expected_error, noise * (1.0 + 3.0 / n), rtol=1e-3)
-    on_all = tuned.expected_error * (1.0 + 3.0 / 8000.0) / (1.0 + 3.0 / n)
-    assert_allclose(found.error(linear) ** 2, on_all, rtol=1e-4)
+    noise = tuned.evaluation.mean_squared_error / (1.0 - 3.0 / 600.0)
+    assert_allclose(tuned.expected_error, noise * (1.0 + 3.0 / 600.0), rtol=3e-3)
+    assert_allclose(trials.expected(tuned), noise * (1.0 + 3.0 / 8000.0), rtol=3e-3)
+    factor = (1.0 + 3.0 / 8000.0) / (1.0 + 3.0 / 600.0)
+    assert_allclose(trials.with_more_rows(tuned), factor, rtol=1e-4)
 
 
-@pytest.mark.parametrize("weighted", [False, True])
-@pytest.mark.parametrize("consequent_inputs", [[0, 1], [1]])
-def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, consequent_inputs):
-    monkeypatch.setattr(trials, "BLOCK_ROWS", 7)
-    g = np.random.default_rng(4)
-    rows, used = oracles.bumpy_rows(g, 200, 2, 2, weighted), np.array(consequent_inputs)
-    antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])
-    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-3), consequent_inputs=used)
-    evaluation = problem.evaluate(antecedent.parameters)
-    # On either side of the box of every input, and in it.
-    low, high = rows.inputs.minimum, rows.inputs.maximum
-    X = low + (high - low) * g.uniform(-0.5, 1.5, (100, 2))
-    weight = g.uniform(0.5, 2.0, 100) if weighted else None
-    rest = StandardisedData(X, g.normal(size=(100, 2)), weight, rows.inputs, rows.targets)
-    at_edge = rest.inputs.apply(np.clip(X, low, high).T, np.empty((2, 100)))
-    design = oracles.dense_design(antecedent, antecedent.parameters, at_edge, 1, used)
-    target = (rest.y - rows.targets.offset) / rows.targets.scale
-    squares = ((target - design @ evaluation.coefficients) ** 2).sum(axis=1)
-    expected = np.average(squares, weights=weight)
-    assert_allclose(trials.held_out_loss(rest, used, evaluation), expected, rtol=1e-9)
+class TestSequences:
+    def test_a_grid_grows_where_rows_left_out_say_so(self, rng):
+        X, y = surface(rng, 400, 4)
+        trials = trials_of(X, y)
+        found, errors = [trials.one_rule], []
+        for _ in range(3):
+            found.append(trials.larger("grid", found[-1]))
+            others = [found[-2].with_one_more_term(j) for j in range(4)]
+            errors = {
+                one.counts: trials.expected(
+                    trials._train(one, trials.begun(found[-2]).penalty, 0, 1)
+                )
+                for one in others
+            }
+            assert found[-1].counts == min(errors, key=errors.get)
+        assert sum(found[-1].counts[2:]) == 2
+
+    def test_scattered_rules_look_at_inputs_that_the_line_asks_for(self, rng):
+        X, y = surface(rng, 400, 4)
+        trials = trials_of(X, y + X[:, 3])
+        assert_array_equal(trials.scattered_inputs, [0, 1])
+        larger = trials.larger("scattered", trials.larger("scattered", trials.one_rule))
+        assert larger == Candidate((1, 1, 1, 1), 3)
+        groups = trials.tuned(larger).problem.antecedent.groups
+        assert {int(j) for group in groups for j in group.inputs} == {0, 1}
+
+    @pytest.mark.parametrize("kind", ["grid", "scattered"])
+    @pytest.mark.parametrize("most", [None, 4])
+    def test_they_end_where_rows_or_the_bound_on_rules_do(self, rng, kind, most):
+        X, y = surface(rng, 40, 2)
+        trials = trials_of(X, y, most_rules=most)
+        sizes, one = [], trials.one_rule
+        while one is not None:
+            sizes.append(one.n_rules)
+            assert trials.n_parameters(one) <= 40
+            one = trials.larger(kind, one)
+        assert 3 <= max(sizes) <= (most or 40)
+        assert sizes == sorted(sizes)
+
+    def test_no_more_terms_than_values(self, rng):
+        X = np.column_stack([rng.integers(0, 2, 200), rng.integers(0, 3, 200)])
+        y = 2.0 * X[:, 0] * X[:, 1] ** 2 + 0.05 * rng.normal(size=200)
+        one = trials_of(X, y, order=0)
+        found = one.one_rule
+        while (larger := one.larger("grid", found)) is not None:
+            found = larger
+        assert max(found.counts) <= 3
+        assert found.counts[0] <= 2
 
 
-def test_a_search_leaves_no_term_in_a_gap():
-    """A wave, and far from it a plateau."""
-    rng = np.random.default_rng(0)
-    gap = rng.uniform(2, 20)
-    x = np.r_[rng.uniform(0, 1, 60), 1 + gap + rng.uniform(0, 1, rng.integers(1, 20))]
-    y = np.sin(rng.uniform(2, 9) * x) * (x < 2) + rng.normal() * (x > 2)
-    y += 0.01 * rng.normal(size=x.size)
-    terms = ANFISRegressor().fit(x[:, None], y).memberships_
-    assert all(np.abs((x - t["center"]) / t["width"]).min() < np.sqrt(2 * np.log(2)) for t in terms)
-
-
-THREE = (0.0, 10.0, 50.0)
-
-
-def rows_of(X, y, sample_weight=None):
-    return StandardisedData.of(X, y[:, None], sample_weight)
-
-
-def three_runs(rng, temperatures):
-    """Time, temperature and target of instruments that warm up by 6 degrees, each from its own."""
-    time = np.tile(np.linspace(0.0, 1.0, 60), len(temperatures))
-    start = np.repeat(temperatures, 60)
-    temperature = start + 6.0 * (1.0 - np.exp(-3.0 * time)) + 0.05 * rng.standard_normal(time.size)
-    truth = 0.01 * (temperature - 20.0) ** 2 + np.exp(-4.0 * time)
-    return np.column_stack([time, temperature]), truth + 1e-4 * rng.standard_normal(time.size)
-
-
-def test_leverage_is_that_of_the_dense_design(rng):
-    X, y = three_runs(rng, THREE)
-    found = search_of(X, y)
-    tuned, places = found.tuned(Candidate((3, 3))), found.places
-
-    def design(Z):
-        strengths = tuned.evaluation.antecedent.strengths(Z)
-        local = tuned.problem.local
-        own = (Z[None] - local.center[:, :, None]) / local.spread[:, :, None]
-        basis = np.concatenate([np.ones((9, 1, Z.shape[1])), own], axis=1)
-        return (strengths[:, None] * basis).reshape(27, -1)
-
-    phi, penalty = (
-        design(np.ascontiguousarray(found.sample.X.T)),
-        tuned.problem.penalty_matrix(tuned.evaluation.normal.disagreement),
-    )
-    at = design(places)
-    expected = np.sum(at * np.linalg.solve(phi @ phi.T + 180 * penalty, at), axis=0)
-    problem = tuned.problem
-    leverage = problem.leverage_at(problem.solved_again(tuned.evaluation), places, 180)
-    assert_allclose(leverage, expected, rtol=1e-4)
-    noise = tuned.posterior.noise_variance
-    assert found._undetermined_share(tuned) == np.mean(expected > 1.0) > 0.075
-    # A place is known well enough if the smaller model is expected to err by more there.
-    found._error_to_match = noise * np.where(
-        np.arange(places.shape[1]) % 2, 1.0 + 2.0 * expected, 1.0
-    )
-    part = np.mean((expected > 1.0)[::2]) / 2
-    assert 0.0 < part < np.mean(expected > 1.0)
-    assert found._undetermined_share(tuned) == part
-
-
-@pytest.mark.parametrize(
-    ("temperatures", "is_known"), [(THREE, False), (np.linspace(0.0, 50.0, 30), True)]
-)
-def test_rules_by_time_and_temperature_take_more_than_three_runs(rng, temperatures, is_known):
-    X, y = three_runs(rng, temperatures)
-    found = search_of(X, y)
-    assert np.isfinite(found.score(Candidate((1, 1))))
-    assert bool(np.isfinite(found.score(Candidate((4, 3))))) is is_known
-
-
-def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
-    # Half-way between two rows the product is not that of the factors: no new row lies there.
-    rng = np.random.default_rng(1)
-    X, fresh = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (2, 800, 3))
-    noise = 1e-3
-
-    def truth(X):
-        time, temperature, rate = X.T[:3]
-        bias = 0.05 * np.exp(-time / 600.0) + 2e-6 * (temperature - 20.0) ** 2
-        scale_factor = -4.1e-4 * (temperature - 20.0) - (0.2536 * np.deg2rad(rate)) ** 2 / 6.0
-        return bias + 1e-3 * np.sin(temperature / 15.0) + rate * scale_factor
-
-    X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
-    low, high = X.min(axis=0), X.max(axis=0)
-    fresh = fresh[((low <= fresh) & (fresh <= high)).all(axis=1)]
-    model = ANFISRegressor().fit(X, truth(X) + noise * rng.standard_normal(800))
-    errors = model.predict(fresh) - truth(fresh)
-    # 4 times the noise where the smaller model is not asked what it knows, and where three
-    # candidates of a round are trained.
-    assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
+def test_a_candidate_sees_as_many_rows_as_its_parameters_need(rng):
+    X, y = surface(rng, 9000, 2)
+    trials = trials_of(X, y)
+    for n_clusters, n_rows in (
+        (0, _FEWEST_ROWS),
+        (3, _FEWEST_ROWS),
+        (12, 4000),
+        (20, 8000),
+        (90, 9000),
+    ):
+        candidate = Candidate((1, 1), n_clusters)
+        assert trials.n_parameters(candidate) == max(n_clusters, 1) * 3 + 4 * n_clusters
+        rows = trials.rows_for(candidate)
+        assert rows.n_rows == n_rows
+        assert n_rows == 9000 or n_rows >= _ROWS_EACH * trials.n_parameters(candidate)
+        assert_array_equal(rows.X, trials.rows.X[:n_rows])
+        assert_array_equal(rows.inputs.box, [rows.X.min(axis=0), rows.X.max(axis=0)])

@@ -51,24 +51,42 @@ def test_turns_go_on_from_where_they_were_left(two_rules):
     assert_allclose(more.displacement, whole.displacement, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("limit", "worth", "agreement_is_raised"), [(0.8, 1.2, True), (0.01, 1.2, False)]
-)
-def test_agreement_rises_until_rules_hold_or_the_price_is_too_high(
-    limit, worth, agreement_is_raised, monkeypatch, two_rules
-):
-    apart = tuning.tune(*two_rules, FREE, 100.0)
-    limit *= apart.problem.strongest_alone(apart.evaluation)
-    monkeypatch.setattr(tuning, "_HOLDS", limit)
-    monkeypatch.setattr(tuning, "_HOLDS_WELL", np.inf)
-    found = tuning.with_rules_that_hold(apart, two_rules[1], FREE, 100.0, 100.0)
-    assert found.agreement_is_raised is agreement_is_raised
-    if not agreement_is_raised:
-        assert found.problem.strongest_alone(found.evaluation) > limit
-        return
-    assert found.problem.strongest_alone(found.evaluation) <= limit
-    assert apart.expected_error < found.expected_error <= worth * apart.expected_error
-    # The other weights are those that the evidence found.
-    assert found.penalty == replace(apart.penalty, agreement=found.penalty.agreement)
-    # What is given is not changed.
-    assert tuning.with_rules_that_hold(apart, two_rules[1], FREE[1:], 100.0, 100.0) is apart
+def with_agreement(tuned, agreement):
+    """The same with consequents alone of another agreement."""
+    penalty = replace(tuned.penalty, agreement=agreement)
+    return tuning._with_penalty(tuned, penalty)
+
+
+class TestAgreement:
+    @pytest.mark.parametrize("left", [1.05, 1.2, 2.0])
+    def test_it_is_raised_as_far_as_the_error_allows(self, left, rng):
+        x = rng.uniform(-1.0, 1.0, (100, 1))
+        rows = StandardisedData.of(x, np.sin(3.0 * x) + 0.3 * rng.normal(size=(100, 1)))
+        antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
+        problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+        premise = Premise.of(antecedent, *rows.inputs.box)
+        apart = tuning.tune(problem, premise, FREE, 100.0)
+        found = tuning.with_most_agreement(apart, premise, FREE, 100.0, left)
+        assert found.agreement_is_raised
+        assert apart.expected_error < found.expected_error <= left * apart.expected_error
+        # As far as consequents alone allow, or further.
+        agreement = found.penalty.agreement
+        assert agreement >= tuning._most_agreement(apart, left * apart.expected_error)
+        assert problem.strongest_alone(found.evaluation) < problem.strongest_alone(apart.evaluation)
+        # The other weights are those that the evidence found.
+        assert found.penalty == replace(apart.penalty, agreement=agreement)
+
+    def test_consequents_alone_are_followed_to_the_limit(self, two_rules):
+        apart = tuning.tune(*two_rules, FREE, 100.0)
+        most = 1.1 * apart.expected_error
+        agreement = tuning._most_agreement(apart, most)
+        assert apart.penalty.agreement < agreement < 1.0
+        assert with_agreement(apart, agreement).expected_error <= most
+        assert with_agreement(apart, 1.1 * agreement).expected_error > most
+        assert_allclose(tuning._most_agreement(apart, np.inf), 1.0, rtol=0.05)
+
+    def test_what_is_given_or_leaves_nothing_is_not_changed(self, two_rules):
+        problem, premise = two_rules
+        apart = tuning.tune(problem, premise, FREE, 100.0)
+        assert tuning.with_most_agreement(apart, premise, FREE[1:], 100.0, 2.0) is apart
+        assert tuning.with_most_agreement(apart, premise, FREE, 100.0, 1.0) is apart

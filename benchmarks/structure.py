@@ -1,0 +1,303 @@
+"""The structure that is chosen, with simplicity=0 and by default: its error, cost and expectation.
+
+All cases were chosen before any was fitted. Real sets and tables are judged in folds, beside the
+best of quadratic ridge, SVR and a Gaussian process; smooth functions of inputs that all act
+together by their error to the truth, beside the best of SVR, a neural network and a Gaussian
+process. Errors below a fiftieth of the target's deviation count as that.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from sklearn.base import clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.model_selection import KFold
+from sklearn.preprocessing import StandardScaler
+
+from . import real_sets
+from .cases import evaluate, fitted, geometric_mean, remembered
+from .every_table import part
+from .readable import readability
+from .report import Measure, Results, Row, Table
+from .rivals import BEST_OF, fitted_rival
+
+__all__ = ["cases", "run"]
+
+SIMPLICITIES = (0.0, 0.05)
+_EXACT, _N_TEST, _TUNED_ON = 0.02, 2000, 4000
+_SMOOTH_RIVALS = ("SVR", "neural network", "Gaussian process")
+# One row decides.
+_APART = "carData Davis"
+
+
+@dataclass(frozen=True)
+class Case:
+    """What kind it is of, and what it is made from."""
+
+    kind: str
+    name: str
+    n_rows: int = 0
+    noise: float = 0.0
+
+    def __str__(self):
+        figures = f", {self.n_rows} rows, noise {self.noise:.0%}" if self.n_rows else ""
+        return f"{self.kind}: {self.name}{figures}"
+
+
+# Functions of inputs between -1 and 1 ------------------------------------------------------------
+
+
+def robot_arm(Z):
+    angles, lengths = np.cumsum(0.5 * np.pi * Z[:, :4], axis=1), 0.75 + 0.25 * Z[:, 4:8]
+    return np.hypot(np.sum(lengths * np.cos(angles), 1), np.sum(lengths * np.sin(angles), 1))
+
+
+def linkage(Z):
+    return np.sum((0.6 + 0.4 * Z[:, 3:6]) * np.cos(np.cumsum(1.2 * Z[:, :3], axis=1)), axis=1)
+
+
+def product(Z):
+    return np.prod(1.0 + 0.5 * Z, axis=1)
+
+
+def borehole(Z):
+    """Flow of water through a borehole (Morris, Mitchell and Ylvisaker 1993)."""
+    low = np.array([0.05, 100.0, 63070.0, 990.0, 63.1, 700.0, 1120.0, 9855.0])
+    high = np.array([0.15, 50000.0, 115600.0, 1110.0, 116.0, 820.0, 1680.0, 12045.0])
+    rw, r, Tu, Hu, Tl, Hl, L, Kw = (low + (high - low) * (Z + 1.0) / 2.0).T
+    log = np.log(r / rw)
+    return (
+        2.0 * np.pi * Tu * (Hu - Hl) / (log * (1.0 + 2.0 * L * Tu / (log * rw**2 * Kw)) + Tu / Tl)
+    )
+
+
+def network(seed, n_inputs):
+    rng = np.random.default_rng(seed)
+    inner = 1.5 / np.sqrt(n_inputs) * rng.standard_normal((n_inputs, 12))
+    shift, outer = rng.standard_normal((2, 12))
+    return lambda Z: np.tanh(Z @ inner + shift) @ outer
+
+
+def friedman(Z):
+    """Friedman's function (1991) of the first five of fifty inputs."""
+    U = 0.5 * (Z + 1.0)
+    peaks = 10.0 * np.sin(np.pi * U[:, 0] * U[:, 1]) + 20.0 * (U[:, 2] - 0.5) ** 2
+    return peaks + 10.0 * U[:, 3] + 5.0 * U[:, 4]
+
+
+def wave(Z):
+    return np.sin(3.0 * Z[:, 0]) + Z[:, 1] * Z[:, 2]
+
+
+FUNCTIONS = {
+    "robot arm": (robot_arm, 8),
+    "linkage": (linkage, 6),
+    "product": (product, 7),
+    "borehole": (borehole, 8),
+    "network of 6": (network(1, 6), 6),
+    "network of 10": (network(2, 10), 10),
+    "Friedman": (friedman, 50),
+    "wave": (wave, 4),
+    "nothing, 10": (lambda Z: 0.0 * Z[:, 0], 10),
+    "nothing, 50": (lambda Z: 0.0 * Z[:, 0], 50),
+}
+
+
+def drawn(case, seed=0):
+    """Rows to train on and fresh ones with the truth; noise over the truth's deviation."""
+    function, n_inputs = FUNCTIONS[case.name]
+    rng = np.random.default_rng([seed, case.n_rows, round(1000 * case.noise), n_inputs])
+    Z = rng.uniform(-1.0, 1.0, (case.n_rows + _N_TEST, n_inputs))
+    truth = function(Z)
+    noise = case.noise * (truth[case.n_rows :].std() or 1.0)
+    y = truth + noise * rng.standard_normal(len(truth))
+    train, test = slice(case.n_rows), slice(case.n_rows, None)
+    return Z[train], y[train], Z[test], truth[test], noise
+
+
+# What is measured --------------------------------------------------------------------------------
+
+
+def of_functions(case, options, n_seeds=1):
+    """Error to the truth in its deviations; what was expected of a new row over what it has."""
+    found = {}
+    for simplicity in SIMPLICITIES:
+        parts = []
+        for seed in range(n_seeds):
+            X, y, fresh, truth, noise = drawn(case, seed)
+            model, seconds = fitted(X, y, options, simplicity=simplicity)
+            left = np.sqrt(np.mean((model.predict(fresh) - truth) ** 2))
+            new = math.hypot(left, noise)
+            parts.append(
+                figures_of(model, y.std() / new) | {"error": left / (truth.std() or noise)}
+            )
+            parts[-1]["seconds"] = seconds
+        found[simplicity] = parts
+    return found
+
+
+def figures_of(model, unit):
+    """Reading cost; expected over true error, of the chosen and of the best of several rules."""
+    chosen = next(each for each in model.structures_ if each["chosen"])
+    several = [each for each in model.structures_ if each["rules"] > 1]
+    return {
+        "rules": model.n_rules_,
+        "cost": chosen["reading_cost"],
+        "true": chosen["expected_error"] * unit,
+        "several": several[0]["expected_error"] * unit if several else None,
+    }
+
+
+def of_folds(X, y, n_folds, options):
+    """Error in the target's deviations, by simplicity, and the medians of what else there is."""
+    found = {}
+    for simplicity in SIMPLICITIES:
+        parts, squares = [], []
+        for train, test in KFold(n_folds, shuffle=True, random_state=0).split(X):
+            model, seconds = fitted(X[train], y[train], options, simplicity=simplicity)
+            squares.append((model.predict(X[test]) - y[test]) ** 2)
+            parts.append(figures_of(model, y[train].std() / y.std()) | {"seconds": seconds})
+            parts[-1]["strongest"] = readability(model, X[train], y[train])["strongest"]
+        error = max(real_sets.in_deviations(squares, y), _EXACT)
+        found[simplicity] = [each | {"error": error} for each in parts]
+        for each in found[simplicity]:
+            each["true"] /= error
+    return found
+
+
+def rival_errors(case, X, y, n_folds):
+    def of_folds_by(name):
+        squares = []
+        for train, test in KFold(n_folds, shuffle=True, random_state=0).split(X):
+            rival, _ = fitted_rival(name, X[train], y[train])
+            squares.append((rival.predict(X[test]) - y[test]) ** 2)
+        return max(real_sets.in_deviations(squares, y), _EXACT)
+
+    return {name: of_folds_by(name) for name in BEST_OF}
+
+
+def smooth_rivals(case):
+    X, y, fresh, truth, _ = drawn(case)
+    found = {}
+    for name in _SMOOTH_RIVALS:
+        rival, _ = fitted_rival(name, X[:_TUNED_ON], y[:_TUNED_ON])
+        if case.n_rows > _TUNED_ON and name != "Gaussian process":
+            best = clone(rival.regressor_.best_estimator_)
+            rival = TransformedTargetRegressor(best, transformer=StandardScaler()).fit(X, y)
+        found[name] = float(np.sqrt(np.mean((rival.predict(fresh) - truth) ** 2)) / truth.std())
+    return found
+
+
+def measure(case, options):
+    """Everything of one case."""
+    rivals = {}
+    key = f"structure/{case}".replace(" ", "_").replace("/", "-")
+    if case.kind in ("real set", "table"):
+        n_folds = 5 if case.kind == "real set" else 3
+        X, y = _loaded(case)
+        found = of_folds(X, y, n_folds, options)
+        if not options.quick:
+            rivals = remembered(key, lambda X, y: rival_errors(case, X, y, n_folds), X, y)
+    else:
+        found = of_functions(case, options, 1 if case.kind == "smooth" else 5)
+        if case.kind == "smooth" and not options.quick:
+            rivals = remembered(key, lambda *_: smooth_rivals(case), *drawn(case)[:2])
+    best = min(rivals.values(), default=np.nan)
+    figures = {"case": str(case), "kind": case.kind, "rivals": rivals}
+    for simplicity, parts in found.items():
+        middle = {
+            name: float(np.median([p[name] for p in parts]))
+            for name in parts[0]
+            if name != "several"
+        }
+        figures[f"{simplicity:g}"] = middle | {
+            "over the rivals": middle["error"] / best,
+            "parts": parts,
+        }
+    return figures
+
+
+def _loaded(case):
+    if case.kind == "real set":
+        return real_sets.load(next(one for one in real_sets.SETS if one.name == case.name))
+    return next((X, y) for name, X, y in part(0) if name == case.name)
+
+
+def cases():
+    """All of them, quick ones first."""
+    yield from (
+        Case("noise", f"nothing, {d}", n, 1.0) for d in (10, 50) for n in (100, 300, 1000, 2000)
+    )
+    yield from (Case("weak", "wave", 5000, noise) for noise in (3.0, 4.4, 7.0))
+    yield from (Case("Friedman", "Friedman", n, 0.2) for n in (500, 1000))
+    yield from (Case("real set", one.name) for one in real_sets.SETS)
+    yield from (Case("table", name) for name, _, _ in part(0))
+    yield from (
+        Case("smooth", name, n, noise)
+        for n in (250, 1000, 4000, 16000)
+        for noise in (0.05, 0.2)
+        for name in list(FUNCTIONS)[:6]
+    )
+
+
+def run(options):
+    found, failed = evaluate("structure", measure, cases(), options)
+    rows = [Row("structure: all cases", [failed])]
+    for kind in dict.fromkeys(one["kind"] for one in found):
+        some = [one for one in found if one["kind"] == kind and _APART not in one["case"]]
+        if kind == "smooth":
+            rows += [_smooth(some, n) for n in (250, 1000, 4000, 16000)]
+        else:
+            rows.append(_row(kind, some))
+    head = ["case", "best rival", *(f"{name}, {s:g}" for s in SIMPLICITIES for name in _TOLD)]
+    lines = [
+        [one["case"], min(one["rivals"].values(), default=None)]
+        + [one[f"{s:g}"][name] for s in SIMPLICITIES for name in _TOLD]
+        for one in found
+    ]
+    return Results(rows, [Table("Structure, medians; simplicity behind the comma", head, lines)])
+
+
+_TOLD = ("error", "rules", "cost", "true", "seconds")
+
+
+def _row(kind, some):
+    zero, default = ([one[f"{s:g}"] for one in some] for s in SIMPLICITIES)
+    parts = [each for one in zero for each in one["parts"]]
+    measures = []
+    if kind in ("real set", "table"):
+        for name, own in (("simplicity=0", zero), ("default", default)):
+            ratios = [each["over the rivals"] for each in own]
+            measures.append(Measure(name, geometric_mean(ratios)))
+        costs = [b["cost"] / a["cost"] for a, b in zip(zero, default, strict=True)]
+        measures.append(Measure("reading cost, default over 0, median", float(np.median(costs))))
+    elif kind == "noise":
+        alone = np.mean([each["rules"] == 1 for each in parts])
+        near = np.mean([abs(np.log(each["true"])) < np.log(1.15) for each in parts])
+        several = [each["several"] for each in parts if each["several"] is not None]
+        measures += [Measure("one rule", float(alone)), Measure("within 15 %", float(near))]
+        measures.append(Measure("expected over true, several rules", float(np.median(several))))
+    elif kind == "weak":
+        kept = [
+            np.mean([1.0 - each["error"] ** 2 for each in b["parts"]])
+            / np.mean([1.0 - each["error"] ** 2 for each in a["parts"]])
+            for a, b in zip(zero, default, strict=True)
+        ]
+        measures.append(Measure("explained, default over 0", float(np.mean(kept))))
+    else:
+        noisy = [(1.0 - each["error"] ** 2) / (1.0 + 0.2**2) for each in parts]
+        measures.append(Measure("R2 on new rows", float(np.mean(noisy))))
+    true = [each["true"] for each in parts]
+    measures.append(Measure("expected over true, median", float(np.median(true))))
+    return Row(f"structure: {len(some)} x {kind}", measures)
+
+
+def _smooth(some, n_rows):
+    own = [one for one in some if f", {n_rows} rows" in one["case"]]
+    measures = [
+        Measure(name, geometric_mean([one[key]["over the rivals"] for one in own]))
+        for name, key in (("simplicity=0", "0"), ("default", "0.05"))
+        if own
+    ]
+    return Row(f"structure: smooth functions, {n_rows:,} rows, over the best rival", measures)

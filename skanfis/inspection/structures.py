@@ -1,0 +1,121 @@
+"""A picture of what a search compared: error of every candidate against what it costs to read."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from ..export.folding import last_step
+from ..model import TSKModel
+from ..search.choice import tolerated
+from .displays import _pyplot
+
+# Colours that the colour-blind can tell apart, and a marker for each kind.
+_KINDS = {"one rule": ("0.3", "s"), "grid": ("#0072b2", "o"), "scattered": ("#d55e00", "^")}
+# Errors that differ by more than this factor are drawn on a logarithmic scale.
+_FAR_APART = 5.0
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class StructureDisplay:
+    """Error expected of new rows against reading cost, of every structure that was compared.
+
+    The one that was chosen is ringed. The dashed line is the largest error that is surely within
+    the tolerance of ``simplicity``: what stands below it and further to the left would have been
+    chosen. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
+
+    Parameters
+    ----------
+    structures : list of dict
+        As ``structures_`` of an estimator: of each its "kind", "rules", "reading_cost",
+        "expected_error" and whether it was "chosen".
+    tolerance : float
+        Error, in standard deviations of the target, up to which a candidate is near enough to the
+        best. The search takes for the best what is better by more than chance, and may tolerate a
+        little more.
+    simplicity : float
+        Of the estimator.
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.inspection import StructureDisplay
+    >>> model = ANFISRegressor(max_rules=6).fit(*make_jang_sinc())
+    >>> display = StructureDisplay.from_estimator(model)
+    >>> display.ax_.get_xlabel()
+    'reading cost, numerals in the rules'
+    """
+
+    structures: Sequence[Mapping[str, Any]]
+    tolerance: float
+    simplicity: float
+
+    @classmethod
+    def from_estimator(cls, estimator: Any, *, ax: Any = None) -> Self:
+        """Draw what the search of a fitted estimator has compared.
+
+        Parameters
+        ----------
+        estimator : fitted estimator
+            An ANFISRegressor; or a Pipeline, a TransformedTargetRegressor or a search such as
+            GridSearchCV that ends in one.
+        ax : matplotlib Axes, default=None
+            None makes a figure.
+        """
+        last: Any = estimator if isinstance(estimator, TSKModel) else last_step(estimator)
+        every = getattr(last, "structures_", [])
+        structures = [one for one in every if np.isfinite(one["expected_error"])]
+        if not structures:
+            raise ValueError(
+                "The estimator knows no structure with an error to be expected: nothing to draw. "
+                "Fit one with n_mfs='auto' and partition='auto'."
+            )
+        simplicity, n_outputs = last.simplicity, last.model_.n_outputs
+        least = min(one["expected_error"] for one in structures) ** 2
+        taken = next(one["expected_error"] for one in structures if one["chosen"]) ** 2
+        # The mean's squared error is one of each output, which are standardised.
+        most = max(tolerated(least, float(n_outputs), simplicity), taken)
+        tolerance = float(np.sqrt(most))
+        display = cls(structures=structures, tolerance=tolerance, simplicity=simplicity)
+        return display.plot(ax=ax)
+
+    def plot(self, *, ax: Any = None) -> Self:
+        """Draw the candidates on ``ax``, as of :meth:`from_estimator`."""
+        if ax is None:
+            ax = _pyplot().subplots(figsize=(5.6, 4.2), layout="constrained")[1]
+        self.ax_, self.figure_ = ax, ax.figure
+        structures = sorted(self.structures, key=lambda one: one["rules"])
+        for kind in dict.fromkeys(one["kind"] for one in structures):
+            own = _places([one for one in structures if one["kind"] == kind])
+            color, marker = _KINDS[kind]
+            ax.plot(*own, "-", marker=marker, color=color, linewidth=0.8, label=kind)
+        (chosen,) = [one for one in self.structures if one["chosen"]]
+        rules = "one rule" if chosen["rules"] == 1 else f"{chosen['rules']} rules"
+        ring = {"markersize": 13, "markerfacecolor": "none", "markeredgecolor": "black"}
+        ax.plot(*_places([chosen]), "o", **ring, label=f"chosen: {rules}")
+        dashed = {"linestyle": "--", "color": "0.5", "linewidth": 1}
+        label = f"tolerated, simplicity={self.simplicity:g}"
+        ax.axhline(self.tolerance, **dashed, label=label)
+        errors = [one["expected_error"] for one in structures]
+        ax.set_xlabel("reading cost, numerals in the rules")
+        ax.set_ylabel("error expected of new rows, sd of the target")
+        _on_logarithms(ax.set_xscale, ax.xaxis)
+        if 0.0 < _FAR_APART * min(errors) < max(errors):
+            _on_logarithms(ax.set_yscale, ax.yaxis)
+        ax.legend(fontsize="small", frameon=False)
+        return self
+
+
+def _places(structures):
+    """Reading costs and errors."""
+    return [[one[key] for one in structures] for key in ("reading_cost", "expected_error")]
+
+
+def _on_logarithms(set_scale, axis):
+    """A logarithmic scale with plain numbers."""
+    set_scale("log")
+    axis.set_major_locator(_pyplot().LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_formatter(_pyplot().NullFormatter())

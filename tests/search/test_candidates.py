@@ -1,0 +1,150 @@
+"""Kinds of rule bases as sequences, and which input the residual of a model asks terms for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.premise import Premise
+from skanfis.membership import Gaussian
+from skanfis.search import Spacing, grid_antecedent, tuning
+from skanfis.search.candidates import Candidate, RuleBases, term_scores
+from skanfis.search.sample import search_sample
+
+pytestmark = pytest.mark.theory
+
+
+def sample_of(X, y, weight=None):
+    return search_sample(StandardisedData.of(X, y.reshape(len(X), -1), weight), 20_000)
+
+
+def line_through(rows, counts=None):
+    """A model of one rule, or of a grid, before its premises move."""
+    n_inputs = rows.X.shape[1]
+    antecedent = grid_antecedent([Gaussian] * n_inputs, counts or [1] * n_inputs, Spacing(rows))
+    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    premise = Premise.of(antecedent, *rows.inputs.box)
+    return tuning.tune(problem, premise, ["slope"], rows.sample_weight.sum(), turns=0)
+
+
+def scores_of(rows, count=2, counts=None):
+    every = np.arange(rows.X.shape[1])
+    return term_scores(line_through(rows, counts), every, [count] * every.size, Spacing(rows))
+
+
+class TestCandidate:
+    def test_kinds_are_told_in_words(self):
+        one = Candidate((1, 1, 1))
+        grid = one.with_one_more_term(2).with_one_more_term(0).with_one_more_term(2)
+        scattered = one.with_more_clusters()
+        assert [c.kind for c in (one, grid, scattered)] == ["one rule", "grid", "scattered"]
+        assert [c.n_rules for c in (one, grid, scattered)] == [1, 6, 2]
+        assert [c.n_terms(np.array([0, 2])) for c in (one, grid, scattered)] == [0, 5, 4]
+        assert [c.describe() for c in (one, grid, scattered)] == [
+            "one rule",
+            "grid [2, 1, 3]",
+            "2 scattered rules",
+        ]
+
+    def test_scattered_rules_are_half_as_many_again(self):
+        found = [Candidate((1,))]
+        for _ in range(6):
+            found.append(found[-1].with_more_clusters())
+        assert [c.n_rules for c in found] == [1, 2, 3, 5, 8, 12, 18]
+
+
+def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
+    """Of two inputs and the target; whatever the order of the columns."""
+    clump = np.repeat([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]], 30, axis=0)
+    asked = clump + rng.normal(size=(90, 2))
+    X = np.column_stack([asked[:, 0], 9.0 * rng.normal(size=90), asked[:, 1]])
+    rows = sample_of(X, clump.sum(axis=1), rng.uniform(0.5, 2.0, 90))
+    turned = replace(rows, X=rows.X[:, ::-1])
+    found = [
+        RuleBases([Gaussian] * 3, np.array([0, 2]), Spacing(own), 7).of(
+            Candidate((1, 1, 1), 3), own
+        )
+        for own in (rows, turned)
+    ]
+    labels = rows.X[:, [0, 2]] > 0.5
+    centers = []
+    for antecedent, inputs in zip(found, ([0, 2], [2, 0]), strict=True):
+        (group,) = antecedent.groups
+        own = [group.theta[0, group.inputs == j] for j in inputs]
+        centers.append(np.column_stack(own))
+    assert_allclose(centers[0], centers[1])
+    expected = [
+        np.average(
+            rows.X[:, [0, 2]], axis=0, weights=rows.sample_weight * (labels == one).all(axis=1)
+        )
+        for one in ([False, False], [True, False], [False, True])
+    ]
+    order = np.lexsort(centers[0].T), np.lexsort(np.transpose(expected))
+    assert_allclose(centers[0][order[0]], np.array(expected)[order[1]])
+
+
+class TestTermScores:
+    @pytest.mark.parametrize("count", [2, 3])
+    @pytest.mark.parametrize("n_outputs", [1, 2])
+    def test_they_are_the_formula_term_by_term(self, rng, count, n_outputs):
+        X = rng.uniform(-1.0, 1.0, (150, 4))
+        y = (
+            np.sin(3.0 * X[:, [0]])
+            + X[:, [2]] * X[:, [3]]
+            + 0.3 * rng.normal(size=(150, n_outputs))
+        )
+        # Weights that go with the inputs: the mean of a share is far from its plain mean.
+        rows = sample_of(X, y, np.ceil(np.exp(X.sum(axis=1))))
+        tuned, spacing = line_through(rows), Spacing(rows)
+        s, basis = rows.sample_weight, np.column_stack([np.ones(len(rows.X)), rows.X])
+        residual = rows.y - basis @ tuned.evaluation.coefficients
+        expected = []
+        for j in range(4):
+            centers = spacing.centers(j, count)
+            # Of neighbours that cross at 0.6 where they are equally far apart.
+            width = 0.5 * np.mean(np.diff(centers)) / np.sqrt(-2.0 * np.log(0.6))
+            mu = np.exp(-0.5 * ((rows.X[:, [j]] - centers) / width) ** 2)
+            share = mu / mu.sum(axis=1, keepdims=True)
+            share -= np.average(share, axis=0, weights=s)
+            total = 0.0
+            for k, b, o in np.ndindex(count, 5, n_outputs):
+                r = residual[:, o] - np.average(residual[:, o], weights=s)
+                function = share[:, k] * basis[:, b]
+                square = (s @ (function * r)) ** 2 / (s @ function**2)
+                total += square / np.average(r**2, weights=s)
+            n_free = (count - 1) * 5 * n_outputs
+            expected.append((total * (count - 1) / count - n_free) / np.sqrt(2 * n_free))
+        every = np.arange(4)
+        assert_allclose(term_scores(tuned, every, [count] * 4, spacing), expected, rtol=1e-6)
+
+    @pytest.mark.parametrize("count", [2, 3])
+    def test_of_noise_they_are_of_mean_zero_and_deviation_one(self, rng, count):
+        found = []
+        for _ in range(12):
+            X, y = rng.normal(size=(600, 40)), rng.normal(size=600)
+            found.append(scores_of(sample_of(X, y), count))
+        # A little less: what of the terms is next to a line has left no residual.
+        assert -0.3 < np.mean(found) < 0.1
+        # 480 of them tell a deviation to 3 %.
+        assert_allclose(np.std(found), 1.0, atol=0.1)
+
+    @pytest.mark.parametrize(
+        ("function", "count", "counts", "asked"),
+        [
+            (lambda X: np.tanh(3.0 * X[:, 3]), 3, None, [3]),
+            (lambda X: X[:, 1] ** 2 + np.abs(X[:, 4]), 2, None, [1, 4]),
+            (lambda X: X[:, 0] * X[:, 2], 2, None, [0, 2]),
+            (lambda X: X[:, 0] * X[:, 2], 2, [2, 1, 1, 1, 1, 1], [2]),
+        ],
+        ids=["saturation", "squares", "product", "product, one factor has terms"],
+    )
+    def test_inputs_that_bend_the_surface_are_asked_for(self, rng, function, count, counts, asked):
+        X = rng.uniform(-1.0, 1.0, (800, 6))
+        y = function(X) + X @ rng.normal(size=6) + 0.1 * rng.normal(size=800)
+        scores = scores_of(sample_of(X, y), count, counts)
+        assert scores[asked].min() > 10.0
+        others = np.delete(scores, asked if counts is None else [0, 2])
+        assert others.max() < 4.0

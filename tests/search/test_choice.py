@@ -1,0 +1,94 @@
+"""The rule of choice, on errors that are planted."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.stats import sem
+
+from skanfis.learning.data import StandardisedData
+from skanfis.search.candidates import Candidate
+from skanfis.search.choice import Judged, Judges, best_of, chosen, tolerated
+
+
+def judged(squares, cost=1, n_rules=1):
+    squares = np.asarray(squares, dtype=float)
+    return Judged(Candidate((n_rules,)), squares, squares.mean(), cost)
+
+
+def alike(n_rows, group=None):
+    return Judges(np.ones(n_rows), np.arange(n_rows) if group is None else group)
+
+
+class TestPrefer:
+    @pytest.mark.parametrize("in_groups", [False, True])
+    def test_a_gain_counts_from_one_standard_error_on(self, rng, in_groups):
+        """Of rows the textbook's; of groups of equal size that of the groups' means."""
+        before, gain = rng.uniform(2.0, 3.0, 120), rng.normal(size=120)
+        group = np.arange(120) % 8
+        if in_groups:
+            gain += rng.normal(size=8)[group]
+        gain -= gain.mean()
+        means = np.bincount(group, gain) / 15.0 if in_groups else gain
+        judges = alike(120, group if in_groups else None)
+        for factor, is_preferred in ((1.01, True), (0.99, False)):
+            after = before - gain - factor * sem(means, ddof=0)
+            assert judges.prefer(judged(after), judged(before)) is is_preferred
+
+    def test_a_weight_is_so_many_repeats_in_one_group(self, rng):
+        gain, times = rng.normal(size=40), rng.integers(1, 5, 40)
+        gain -= np.average(gain, weights=times)
+        repeated, weighted = (
+            alike(times.sum(), np.repeat(np.arange(40), times)),
+            Judges(times.astype(float), np.arange(40)),
+        )
+        for excess in np.linspace(0.0, 0.6, 25):
+            found = [
+                judges.prefer(judged(-of - excess), judged(np.zeros(of.size)))
+                for judges, of in ((repeated, gain.repeat(times)), (weighted, gain))
+            ]
+            assert found[0] is found[1]
+
+    def test_what_is_equal_is_not_preferred(self):
+        assert not alike(5).prefer(judged(np.ones(5)), judged(np.ones(5)))
+
+    def test_rows_of_one_group_are_alike_in_whatever_fold(self):
+        X, y, group = np.zeros((3, 1)), np.zeros((3, 1)), np.array([7, 3, 7])
+        weight = np.arange(1.0, 4.0)
+        rows = StandardisedData(X, y, weight, None, None, group)
+        found = Judges.of([rows.part([0, 1]), rows.part([2])])
+        assert_array_equal(found.group, [1, 0, 1])
+        assert found.mean(np.array([1.0, 0.0, 5.0])) == 16.0 / 6.0
+        alone = Judges.of([StandardisedData(X, y, weight, None, None)])
+        assert_array_equal(alone.group, [0, 1, 2])
+
+
+def test_the_best_costs_more_to_read_only_where_that_is_no_chance():
+    # 4 before 2 before 1 before 3: by its cost, each against the best so far.
+    level = np.ones(100)
+    luck = 1.0 + np.where(np.arange(100) % 2, 0.5, -0.52)
+    candidates = [judged(0.5 * luck, 9), judged(level, 3), judged(0.5 * level, 7), judged(luck, 4)]
+    assert best_of(candidates, alike(100)) is candidates[2]
+    assert best_of(candidates[1::2], alike(100)) is candidates[1]
+
+
+@pytest.mark.parametrize(
+    ("least", "expected"),
+    [
+        (0.04, 0.04 * 1.05**2),  # a clear signal: a twentieth of the error
+        (0.98, 0.98 + 0.1025 * 0.02),  # a weak one: a tenth of what it explains
+        (0.5, 0.5 * 1.05**2),  # as much of either
+        (1.02, 1.02),  # worse than the mean: nothing
+    ],
+)
+def test_what_is_given_up_is_part_of_the_error_or_of_what_is_explained(least, expected):
+    assert_allclose(tolerated(least, 1.0, 0.05), expected, rtol=1e-12)
+    assert tolerated(least, 1.0, 0.0) == least
+
+
+def test_of_what_is_tolerated_the_one_read_soonest_is_chosen():
+    costs, errors = (3, 9, 9, 27, 81), (0.60, 0.47, 0.44, 0.42, 0.40)
+    candidates = [judged([error], cost) for cost, error in zip(costs, errors, strict=True)]
+    for simplicity, expected in ((0.0, 4), (0.03, 3), (0.05, 2), (0.2, 2), (0.3, 0)):
+        most = tolerated(0.40, 1.0, simplicity)
+        assert most == pytest.approx(0.40 * (1.0 + simplicity) ** 2)
+        assert chosen(candidates, most) is candidates[expected]

@@ -1,0 +1,93 @@
+"""Which rows judge, and that nothing but what they say decides on it."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis.learning.data import StandardisedData
+from skanfis.search.judging import dealt_rows, splits
+
+
+def measured(rng, n_rows=60):
+    X = rng.normal(size=(n_rows, 3))
+    return X, np.sin(X[:, :1]) + 0.1 * rng.normal(size=(n_rows, 1))
+
+
+def dealt(X, y, weight=None, groups=None):
+    return dealt_rows(StandardisedData.of(X, y, weight, groups))
+
+
+FORMS = {
+    "order of rows": lambda X, y: (X[::-1], y[::-1], [0, 1, 2]),
+    "order of columns": lambda X, y: (X[:, [2, 0, 1]], y, [1, 2, 0]),
+    "units": lambda X, y: (1e3 * X + 7.0, 1e-6 * y - 5.0, [0, 1, 2]),
+    "a constant column": lambda X, y: (np.hstack([0.0 * X[:, :1] + 4.0, X]), y, [1, 2, 3]),
+}
+
+
+class TestDealtRows:
+    @pytest.mark.parametrize("form", FORMS)
+    def test_their_order_is_of_what_the_rows_say(self, rng, form):
+        X, y = measured(rng)
+        plain = dealt(X, y)
+        *other, back = FORMS[form](X, y)
+        found = dealt(*other)
+        assert_allclose(found.X[:, back], plain.X, atol=1e-9)
+        assert_allclose(found.y, plain.y, atol=1e-9)
+
+    def test_weights_are_repeats(self, rng):
+        X, y = measured(rng)
+        times = rng.integers(1, 4, len(y))
+        weighted, repeated = (
+            dealt(X, y, times.astype(float)),
+            dealt(X.repeat(times, 0), y.repeat(times, 0)),
+        )
+        assert_allclose(repeated.X, weighted.X, atol=1e-9)
+        assert_array_equal(repeated.sample_weight, weighted.sample_weight)
+
+    def test_none_is_lost_and_every_part_of_them_is_random(self, rng):
+        X, y = measured(rng, 400)
+        found = dealt(X, y)
+        standard = (y[:, 0] - y.mean()) / y.std()
+        assert_allclose(np.sort(found.y[:, 0]), np.sort(standard), atol=1e-9)
+        # The mean of a half is off by 1 / sqrt(400) of a deviation; the rows came sorted.
+        assert abs(found.y[:200].mean()) < 0.15
+        assert abs(np.corrcoef(found.y[1:, 0], found.y[:-1, 0])[0, 1]) < 0.15
+
+
+class TestSplits:
+    @pytest.mark.parametrize("n_rows", [2, 4, 37, 150])
+    def test_of_few_rows_each_is_left_out_once(self, rng, n_rows):
+        folds = splits(dealt(*measured(rng, n_rows)))
+        assert len(folds) == min(n_rows, 5)
+        assert_array_equal(np.sort(np.concatenate([rest for _, rest in folds])), np.arange(n_rows))
+        sizes = [rest.size for _, rest in folds]
+        assert max(sizes) - min(sizes) <= 1
+        for grow, rest in folds:
+            assert_array_equal(np.sort(np.append(grow, rest)), np.arange(n_rows))
+
+    @pytest.mark.parametrize("n_rows", [400, 999, 1000, 3001])
+    def test_of_more_rows_at_least_two_hundred_judge(self, rng, n_rows):
+        folds = splits(dealt(*measured(rng, n_rows)))
+        rest = np.concatenate([rest for _, rest in folds])
+        assert 200 <= np.unique(rest).size == rest.size
+        for grow, own in folds:
+            assert_array_equal(np.sort(np.append(grow, own)), np.arange(n_rows))
+
+    @pytest.mark.parametrize(("n_groups", "n_folds"), [(2, 2), (4, 4), (23, 5)])
+    def test_groups_are_left_out_whole(self, rng, n_groups, n_folds):
+        X, y = measured(rng, 3000)
+        rows = dealt(X, y, groups=rng.integers(0, n_groups, 3000))
+        folds = splits(rows)
+        assert len(folds) == n_folds
+        assert_array_equal(np.sort(np.concatenate([rest for _, rest in folds])), np.arange(3000))
+        for grow, rest in folds:
+            assert not np.intersect1d(rows.groups[grow], rows.groups[rest]).size
+
+    def test_one_group_is_none_and_one_row_judges_itself(self, rng):
+        X, y = measured(rng)
+        one, none = splits(dealt(X, y, groups=np.zeros(60))), splits(dealt(X, y))
+        for fold, other in zip(one, none, strict=True):
+            assert_array_equal(np.concatenate(fold), np.concatenate(other))
+        (fold,) = splits(dealt(X, y).part([0]))
+        assert_array_equal(fold, [[0], [0]])
