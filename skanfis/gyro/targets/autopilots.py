@@ -8,7 +8,6 @@ rad/s and single precision; NOTES tell the rest.
 import textwrap
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from scipy.optimize import linprog
 
 from .piecewise import Piecewise
@@ -23,7 +22,7 @@ NOTES = {
     "a cubic P about 35 degC. The temperature is that of the IMU's own sensor; both are held "
     "between TMIN and TMAX. The offset and T_cal (INS_GYRn_CALTEMP) are measured at boot.",
 }
-_N_POINTS = 400
+_N_POINTS = 400  # dense next to the ends
 # Roundings of an evaluation in single precision, in units of the last place of all terms.
 _SLACK = 16.0 * np.finfo(np.float32).eps
 
@@ -44,12 +43,10 @@ class Cubic:
         middle, half = 0.5 * (low + high), 0.5 * (high - low)
         is_px4 = autopilot == "px4"
         self.reference = np.float32(np.round(middle, 2) if is_px4 else _ARDUPILOT_REFERENCE)
-        nearest = _nearest_cubic(lambda s: error((middle + half * s)[:, None]))
+        T = middle + half * np.cos(np.pi * np.arange(_N_POINTS + 1) / _N_POINTS)
         # In powers of the distance from the reference [deg/s].
-        s = Polynomial([(float(self.reference) - middle) / half, 1.0 / half])
-        found = np.zeros(4)
-        shifted = Polynomial(nearest)(s).coef
-        found[: shifted.size] = shifted
+        found = _nearest_cubic((T - float(self.reference)) / half, error(T[:, None]))
+        found /= half ** np.arange(4)
         scale = 1.0 if is_px4 else _ARDUPILOT_SCALE
         self.coefficients = (np.deg2rad(found) * scale).astype(np.float32)
         values = np.rad2deg(self.coefficients.astype(float) / scale)
@@ -92,18 +89,12 @@ def _text(value):
     return np.format_float_positional(np.float32(value), trim="-")
 
 
-def _nearest_cubic(function):
-    """Coefficients of the cubic in s with the least largest difference on [-1, 1].
-
-    By a linear programme at points that are dense next to the ends.
-    """
-    s = np.cos(np.pi * np.arange(_N_POINTS + 1) / _N_POINTS)
-    values = function(s)
+def _nearest_cubic(s, values):
+    """Coefficients of the cubic in s with the least largest difference, by a linear programme."""
     offset, scale = values.mean(), np.ptp(values) or 1.0
     design, one = np.vander(s, 4, increasing=True), np.ones((s.size, 1))
     above = np.block([[design, -one], [-design, -one]])
     target = (values - offset) / scale
-    found = linprog(
-        [0.0] * 4 + [1.0], above, np.concatenate([target, -target]), bounds=(None, None)
-    )
+    limits = np.concatenate([target, -target])
+    found = linprog([0.0] * 4 + [1.0], above, limits, bounds=(None, None))
     return scale * found.x[:4] + [offset, 0.0, 0.0, 0.0]

@@ -46,14 +46,11 @@ fixed |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
       |            status = $NAME_OUT_OF_RANGE;
       |        }
       |        value -= $name_low[i];
-real  |        value *= $name_per_unit[i];
-real  |        at[i] = (int)value;
-fixed |        at[i] = (int)(value / $name_step[i]);
+      |        at[i] = (int)(value / $name_step[i]);
       |        if (at[i] > $name_last[i]) {
       |            at[i] = $name_last[i];
       |        }
-real  |        part[i] = value - ($real)at[i];
-fixed |        part[i] = (value - at[i] * $name_step[i]) * $one / $name_step[i];
+      |        part[i] = (value - ($wide)at[i] * $name_step[i])$times_one / $name_step[i];
       |    }
 line  |    i = at[0];
 line  |    value = $name_between($name_values[i], $name_values[i + 1], part[0]);
@@ -107,9 +104,9 @@ class Table:
             self.step = -((self.low - self.high) // n_cells)
             self.counts = -((self.low - self.high) // self.step)
             return
-        self.low, self.high = (end.astype(self.dialect.dtype).astype(float) for end in (low, high))
-        per_unit = (n_cells / (self.high - self.low)).astype(self.dialect.dtype)
-        self.step, self.counts = 1.0 / per_unit.astype(float), np.full(low.size, n_cells)
+        ends = np.array([low, high, (high - low) / n_cells]).astype(self.dialect.dtype)
+        self.low, self.high, self.step = ends.astype(float)
+        self.counts = np.full(low.size, n_cells)
 
     def _piecewise(self, values):
         powers = np.array(list(product((0, 1), repeat=values.ndim)))
@@ -137,18 +134,18 @@ class Table:
     def code(self, notes, units):
         """The C files; ``notes`` and ``units`` are as of :func:`skanfis.export.export_c`."""
         dialect, bits, one = self.dialect, self.bits, 2 ** (self.bits - 1)
-        tables = {"low": self.low, "high": self.high, "values": self.values}
-        head, kinds = f'#include "{dialect.name}.h"\n', {"last": "int", "step": self.wide}
+        tables = {"low": self.low, "high": self.high, "step": self.step, "values": self.values}
+        head, kinds = f'#include "{dialect.name}.h"\n', {"last": "int"}
         if not bits:
-            tables["per_unit"] = 1.0 / self.step
             head += f"\n#include <float.h>\n\n{dialect.write(rejection('raise', 'c99')).lstrip()}"
         n_bytes = sum(each.size for each in tables.values()) * dialect.dtype.itemsize
         tables = {name: each.astype(dialect.dtype) for name, each in tables.items()}
-        tables |= {"last": self.counts - 1} | ({"step": self.step} if bits else {})
+        tables["last"] = self.counts - 1
         d = self.low.size
         facts = {"plane" if d > 1 else "line", "fixed" if bits else "real"}
         code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
-        words = {"wide": self.wide, "one": one, "per_one": f" / {one}" if bits else ""}
+        words = {"wide": self.wide, "per_one": f" / {one}" if bits else ""}
+        words["times_one"] = f" * {one}" if bits else ""
         source = [
             head,
             *(dialect.table(name, each, kinds.get(name)) for name, each in tables.items()),
@@ -159,8 +156,8 @@ class Table:
         lines = [
             *map(remark, notes),
             f"{' x '.join(map(str, self.counts))} cells; C99, {dialect.real}.",
-            f"Whatever the inputs: at most {n_products + (2 * d if bits else d)} multiplications, "
-            f"{n_products + 2 * d if bits else 0} divisions. Memory: {n_bytes} bytes of tables.",
+            f"Whatever the inputs: {n_products + (2 * d if bits else d)} multiplications, "
+            f"{(n_products if bits else 0) + 2 * d} divisions. Memory: {n_bytes} bytes of tables.",
             "",
             *input_lines(self.names, self.low * self.scale, self.high * self.scale, units),
             "Outputs y:",
