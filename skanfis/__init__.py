@@ -5,9 +5,7 @@ import signal
 import sys
 
 # Ctrl-C while the command is still importing ends it, without a traceback; then it takes over.
-if ("-m", "skanfis.gyro") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False) or any(
-    os.path.basename(word).removesuffix(".exe") == "skanfis-gyro" for word in sys.orig_argv[:2]
-):
+if {"skanfis.gyro", "skanfis-gyro", "skanfis-gyro.exe"} & set(map(os.path.basename, sys.orig_argv)):
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 from .regressor import ANFISRegressor

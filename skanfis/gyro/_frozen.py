@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from .. import ANFISRegressor
 from ..policies import SILENT
@@ -24,13 +24,12 @@ def single_rule(X, policy):
     return _giving(found, 0.0)
 
 
-def frozen(model, X, policy, rule=None):
-    """A fitted simple compensation of the rows X as an estimator that flags rows.
+def frozen(model, rule):
+    """A fitted simple compensation as an estimator that flags rows as the single rule does.
 
     ``model`` is a number; a Pipeline of a scaler, PolynomialFeatures and a line; the arcsine law;
     or a ResidualRegressor of that and such a Pipeline.
     """
-    rule = single_rule(X, policy) if rule is None else rule
     if isinstance(model, float):
         return _giving(rule, model)
     if hasattr(model, "residual_"):
@@ -41,11 +40,11 @@ def frozen(model, X, policy, rule=None):
     if features.degree == 1:
         return _line(model, rule)
     # Beyond the box it is held: there the tangent of a cubic leads far away soon.
+    policy = rule.model.out_of_bounds
     held = rule.model.with_out_of_bounds("clip" if policy == "linear" else policy)
-    powers = np.vstack([np.zeros_like(features.powers_[:1]), features.powers_])
     coefficients = np.append(line.intercept_, line.coef_)
     return FrozenPolynomial(
-        replace(rule, model=held), scaler.mean_, scaler.scale_, powers, coefficients
+        replace(rule, model=held), scaler.mean_, scaler.scale_, coefficients, features.degree
     )
 
 
@@ -64,17 +63,22 @@ def _giving(rule, constant, slopes=()):
 
 @dataclass(frozen=True, eq=False)
 class FrozenPolynomial:
-    """The sum of coefficients times products of powers of z = (x - center) / scale.
+    """A polynomial in z = (x - center) / scale, with coefficients in the order of scikit-learn.
 
-    ``powers`` (n_terms, n_inputs). Beyond the box of the single ``rule``, which gives zero, the
+    Beyond the box of the single ``rule``, which gives zero, the
     value at the edge is held, or there is none. All columns of X are inputs.
     """
 
     rule: FrozenRules
     center: np.ndarray
     scale: np.ndarray
-    powers: np.ndarray
     coefficients: np.ndarray
+    degree: int = 3
+
+    @property
+    def powers(self):
+        """Of every term, by input."""
+        return PolynomialFeatures(self.degree).fit(self.center[None]).powers_
 
     def predict(self, X):
         """What the polynomial gives."""

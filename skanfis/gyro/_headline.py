@@ -25,19 +25,13 @@ from ..bounds import bounds, gradient_bounds
 from ..inspection import readability
 from ._columns import RATE_UNITS, evenly_chosen
 from ._frozen import FrozenPolynomial
-from ._simpler import LAW_AND_LINE, NOTHING
+from ._simpler import NAMES, NOTHING
 from .compose import FrozenRules
 from .displays import figures
 from .metrics import rms
 
-ARTICLES = {
-    NOTHING: "no compensation",
-    "constant": "a constant",
-    "straight line": "a straight line",
-    "arcsine law": "the arcsine law",
-    LAW_AND_LINE: "the arcsine law and a line",
-    "cubic polynomial": "a cubic polynomial",
-}
+ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
+ARTICLES[NOTHING] = NOTHING
 _MOST_ROWS = 100_000  # evenly chosen, for the rules, the noise and the model
 _CONFIDENCE = 0.95  # of every interval in the report
 _MANY_FLAGGED = 0.2  # of the rows
@@ -102,17 +96,10 @@ def held_out_groups(calibration):
 
 
 def flagged_text(calibration):
-    """How many held-out rows were flagged, for which inputs, and what that means."""
+    """How many held-out rows were flagged, and what that means."""
     n_rows, n_flagged = calibration.inside.size, np.count_nonzero(~calibration.inside)
     if not n_flagged:
         return f"None of the {n_rows:,} held-out rows was flagged."
-    X, beyond = calibration.X.to_numpy(), np.zeros(calibration.X.shape[1])
-    for train, test in calibration.split.folds:
-        low, high = X[train].min(axis=0), X[train].max(axis=0)
-        beyond += np.count_nonzero((X[test] < low) | (X[test] > high), axis=0)
-    most = pd.Series(beyond, calibration.X.columns).sort_values(ascending=False, kind="stable")
-    counts = ", ".join(f"{name} in {int(n):,}" for name, n in most.items() if n)
-    why = f" (beyond the other groups' range: {counts})" if counts else ""
     share = n_flagged / n_rows
     advice = "They are the ends of the range, which no other group reaches."
     if share > _MANY_FLAGGED:
@@ -120,7 +107,7 @@ def flagged_text(calibration):
             "That is much: the figures say nothing of these rows. Log groups that overlap more, "
             "above all at both ends of the range."
         )
-    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged{why}. {advice}"
+    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged. {advice}"
 
 
 def errors_and_verdict(calibration):

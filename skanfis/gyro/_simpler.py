@@ -60,7 +60,7 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
             try:
                 for (train, test), rule in zip(fits, rules, strict=True):
                     model = fit(X.iloc[train], target[train])
-                    estimator = frozen(model, X, policy, rule)
+                    estimator = frozen(model, rule)
                     made.append(estimator)
                     if test is not None:
                         predicted[test] = estimator.predict(X.iloc[test])

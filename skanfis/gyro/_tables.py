@@ -1,5 +1,8 @@
 """Tables in MATLAB's and Excel's files, in the form of a source of a log."""
 
+from collections.abc import Mapping
+from contextlib import nullcontext
+
 import numpy as np
 import pandas as pd
 
@@ -11,17 +14,16 @@ _HEAD_ROWS = 60
 
 
 class TableSource:
-    """As a text file, of a table that is held whole; ``what`` and ``first`` name its rows."""
+    """As a text file, of a table that is held whole; ``first`` is the number of its first row."""
 
     decimal = "."
 
-    def __init__(self, path, table, notes, what="row", first=0):
+    def __init__(self, path, table, notes, first=0):
         self.path, self.notes, self.header = path, notes, list(map(str, table.columns))
-        self._table = table.set_axis(range(table.shape[1]), axis=1)
-        self._what, self._first = what, first
+        self._table, self._first = table.set_axis(range(table.shape[1]), axis=1), first
 
     def place_of(self, row):
-        return f"{self._what} {row + self._first}"
+        return f"row {row + self._first}"
 
     def pieces(self, places, n_rows, labels=()):
         for begin in range(0, len(self._table), n_rows):
@@ -34,7 +36,8 @@ def matlab_source(path):
     with open(path, "rb") as file:
         is_hdf5 = _HDF5 in (file.read(4), file.seek(512) and file.read(4))
     try:
-        found = dict(_hdf5_vectors(path) if is_hdf5 else _mat_vectors(path))
+        with (_hdf5 if is_hdf5 else _mat)(path) as tree:
+            found = dict(_vectors(tree))
     except (ValueError, TypeError, NotImplementedError, OSError, KeyError) as error:
         raise LogError(f"{path}: is no MATLAB file that can be read: {error}") from error
     lengths = [len(values) for values in found.values() if len(values) > 1]
@@ -47,37 +50,30 @@ def matlab_source(path):
     return TableSource(path, pd.DataFrame(columns), notes)
 
 
-def _mat_vectors(path):
+def _mat(path):
     from scipy.io import loadmat
 
-    def vectors(prefix, value):
-        if value.dtype.names:
-            for name in value.dtype.names if value.size == 1 else ():
-                yield from vectors(name, np.asarray(value.reshape(-1)[0][name]))
-        elif value.dtype.kind in "iufU":
-            yield prefix, np.atleast_1d(np.squeeze(value))
-
-    for name, value in loadmat(path).items():
-        if not name.startswith("__"):
-            yield from ((key, x) for key, x in vectors(name, value) if x.ndim == 1)
+    return nullcontext(loadmat(path, simplify_cells=True))
 
 
-def _hdf5_vectors(path):
+def _hdf5(path):
     try:
         import h5py
     except ImportError as error:
         raise ImportError(
             f"{path}: MATLAB 7.3 needs h5py: pip install 'skanfis[logs]'; or save it with -v7"
         ) from error
-    found = {}
+    return h5py.File(path)
 
-    def add(name, item):
-        if isinstance(item, h5py.Dataset) and item.dtype.kind in "iuf" and "#" not in name:
-            found[name.rpartition("/")[2]] = np.atleast_1d(np.squeeze(item[()]))
 
-    with h5py.File(path) as file:
-        file.visititems(add)
-    return {name: values for name, values in found.items() if values.ndim == 1}
+def _vectors(tree):
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _vectors(value)
+        elif not name.startswith(("__", "#")) and np.asarray(value).dtype.kind in "iufU":
+            vector = np.atleast_1d(np.squeeze(value))
+            if vector.ndim == 1:
+                yield name, vector
 
 
 def excel_source(path, header_place):
@@ -97,14 +93,12 @@ def excel_source(path, header_place):
     if sheet is None:
         raise LogError(f"{path}: is empty.")
     notes = [f"of {len(sheets)} sheets {name!r} is read"] if len(sheets) > 1 else []
-    rows = [["" if pd.isna(cell) else str(cell) for cell in row]
-            for row in sheet.head(_HEAD_ROWS).to_numpy(dtype=object)]  # fmt: skip
+    head = sheet.head(_HEAD_ROWS).astype(object)
     try:
-        place, first, header = header_place(rows)
+        place, first, header = header_place(head.where(head.notna(), "").astype(str).to_numpy())
     except LogError as error:
         raise LogError(f"{path}: {error}") from error
-    table = sheet.iloc[first:].reset_index(drop=True).infer_objects()
-    table.columns = header
     if place:
         notes.append(f"{place} rows above the header are passed over")
-    return TableSource(path, table, notes, "row", first + 1)
+    table = sheet.iloc[first:].reset_index(drop=True).infer_objects()
+    return TableSource(path, table.set_axis(header, axis=1), notes, first + 1)

@@ -131,15 +131,9 @@ def _of_time(values, units):
     ways = ["s"] if is_plausible("s", _HEATING) else []
     if heating >= _LEAST_HEATING:
         is_fast = 60.0 * heating > _FAST * duration
-        # 0.1666... is no step of a clock in s, but 10 s in min.
-        is_odd = _is_multiple(60.0 * step, 0.1) and not _is_multiple(step, 1e-3)
-        others = ["ms", "us", "ns"] + ["min", "h"] * int(is_fast or is_odd)
+        others = ["ms", "us", "ns"] + ["min", "h"] * int(is_fast)
         ways += [unit for unit in others if is_plausible(unit, _CHAMBER)]
     return [{"time": unit} for unit in ways or ["s"]]
-
-
-def _is_multiple(value, of):
-    return abs(value / of - round(value / of)) < 1e-4 * value / of
 
 
 def _of_rates(values, units):

@@ -3,6 +3,7 @@
 import json
 import warnings
 from dataclasses import dataclass, field
+from math import comb
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -33,7 +34,7 @@ _KEYS = (
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
 _NUMBERS = ("offset", "thermometer_lag", "reference_temperature")
 _RANGE = ("minimum", "maximum")
-_OF_POLYNOMIAL, _MOST_TERMS = ("center", "scale", "powers", "coefficients"), 256
+_OF_POLYNOMIAL = ("center", "scale", "coefficients")
 _PARAMETERS = ("max_phase", "out_of_bounds")
 # As of a model alone: see skanfis.export.model_json.
 _MOST_BYTES = 2**24
@@ -363,23 +364,15 @@ def _read_polynomial(document, rule):
         raise ValueError(f"its polynomial must be an object of {', '.join(_OF_POLYNOMIAL)}")
     if not isinstance(rule, FrozenRules) or rule.model.n_rules != 1 or rule.model.order:
         raise ValueError("a polynomial goes with a single rule of order 0, and no law")
-    n, lists = rule.model.n_inputs, dict(document)
-    for key in ("center", "scale", "coefficients"):
-        size = n if key != "coefficients" else len(document["powers"])
-        lists[key] = _list_of_numbers(document[key], key, size, size, "polynomial")
+    n = rule.model.n_inputs
+    sizes = {"center": n, "scale": n, "coefficients": comb(n + 3, 3)}
+    lists = {
+        key: _list_of_numbers(document[key], key, size, size, "polynomial")
+        for key, size in sizes.items()
+    }
     for j, value in enumerate(document["scale"]):
         _divisor(value, f"polynomial.scale[{j}]")
-    powers = document["powers"]
-    if not (
-        1 <= len(powers) <= _MOST_TERMS
-        and all(isinstance(row, list) and len(row) == n for row in powers)
-        and all(type(k) is int and 0 <= k <= HIGHEST_DEGREE for row in powers for k in row)
-    ):
-        raise ValueError(
-            f"polynomial.powers must be 1 to {_MOST_TERMS} lists of {n} numbers, 0 to "
-            f"{HIGHEST_DEGREE}"
-        )
-    return FrozenPolynomial(rule, **lists | {"powers": np.array(powers)})
+    return FrozenPolynomial(rule, **lists)
 
 
 def _divisor(value, where):

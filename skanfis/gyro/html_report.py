@@ -109,31 +109,21 @@ def report_page(calibration, title, options=None):
 
 def write_pdf(page, path):
     """The page on paper."""
-    _weasyprint().HTML(string=page).write_pdf(path)
+    import weasyprint
 
-
-def _weasyprint():
-    try:
-        import weasyprint
-    except (ImportError, OSError) as error:
-        # OSError: of Pango, which draws its text.
-        reason = printable(str(error)).partition("\n")[0]
-        raise ImportError(
-            f"--pdf needs weasyprint: pip install 'skanfis[pdf]' ({reason}); or print report.html "
-            "from a browser"
-        ) from error
-    return weasyprint
+    weasyprint.HTML(string=page).write_pdf(path)
 
 
 def check_installed(pdf=False):
     """ImportError where the report could not be made: at the end that would be found out late."""
-    if pdf:
-        _weasyprint()
-    for name in ("matplotlib", "jinja2"):
+    for name in ("matplotlib", "jinja2", *(["weasyprint"] if pdf else [])):
         try:
             __import__(name)
-        except ImportError as error:
-            raise ImportError(f"the report needs {name}: pip install {name}") from error
+        except (ImportError, OSError) as error:
+            # OSError: of Pango, which draws the text of a PDF.
+            reason = printable(str(error)).partition("\n")[0]
+            told = f"the report needs {name}: pip install {name} ({reason})"
+            raise ImportError(told + pdf * "; or print report.html from a browser") from error
         except ValueError as error:
             # Of matplotlib's settings; MPLBACKEND is one.
             reason = printable(str(error).partition(";")[0])
@@ -222,7 +212,6 @@ def _check(results):
         f"{calibration.split.sentence}. A row outside the range of that model's training data is "
         "flagged, as it would be on board. All figures and pictures are of the rows in range."
     ]
-    texts.append(flagged_text(calibration))
     beyond = ~calibration.inside & np.isfinite(calibration.after)
     if beyond.any():
         error = results.shown(rms((calibration.after - results.rate)[beyond]))

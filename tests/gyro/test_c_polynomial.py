@@ -6,7 +6,7 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
-from skanfis.gyro._frozen import frozen
+from skanfis.gyro._frozen import frozen, single_rule
 from skanfis.gyro._models import make_polynomial
 from skanfis.gyro.c_polynomial import export_c_polynomial
 
@@ -29,7 +29,7 @@ def test_answers_as_python(tmp_path, policy, dtype, std, tolerance):
     log = make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=0)
     X = log[list(INPUTS)]
     model = make_polynomial(3).fit(X, log["output"] - log["rate"])
-    estimator = frozen(model, X, policy)
+    estimator = frozen(model, single_rule(X, policy))
     low, high = X.min().to_numpy(), X.max().to_numpy()
     rng = np.random.default_rng(0)
     reach = rng.choice([1.0, 1.5], 3000)[:, None]
@@ -58,7 +58,9 @@ def test_answers_as_python(tmp_path, policy, dtype, std, tolerance):
 def test_it_is_held_and_rows_that_are_not_finite_get_no_output(tmp_path):
     log = make_ofog(n_devices=1, n_runs=3, duration=600.0, random_state=0)
     X = log[["temperature", "output"]]
-    estimator = frozen(make_polynomial(3).fit(X, log["output"] - log["rate"]), X, "clip")
+    estimator = frozen(
+        make_polynomial(3).fit(X, log["output"] - log["rate"]), single_rule(X, "clip")
+    )
     said = {"units": {"temperature": "degC"}, "notes": ["Subtract y[0]."]}
     code = export_c_polynomial(
         estimator, tmp_path / "gyro", std="c99", saturate=[-0.01, 0.02], **said

@@ -266,5 +266,5 @@ def test_a_pdf_of_one_run_has_five_pages_at_most(tmp_path):
 
 def test_a_pdf_without_its_library_is_a_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "weasyprint", None)
-    with pytest.raises(ImportError, match=r"--pdf needs weasyprint: pip install 'skanfis\[pdf\]'"):
+    with pytest.raises(ImportError, match="the report needs weasyprint: pip install weasyprint"):
         check_installed(pdf=True)

@@ -16,7 +16,7 @@ pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, LogError, read_log
-from skanfis.gyro._frozen import frozen
+from skanfis.gyro._frozen import frozen, single_rule
 from skanfis.gyro.command import _staged, main
 
 
@@ -27,7 +27,9 @@ def files(tmp_path, monkeypatch):
     log = make_ofog(n_devices=1, n_runs=3, duration=300.0, random_state=0)
     named = log.rename(columns={"temperature": "temp_c", "output": "gyro_dps"})
     named[["time", "temp_c", "gyro_dps"]].to_csv("log.csv", index=False)
-    compensator = GyroCompensator(frozen(0.5, log[["temperature"]], "clip"), ("temperature",))
+    compensator = GyroCompensator(
+        frozen(0.5, single_rule(log[["temperature"]], "clip")), ("temperature",)
+    )
     compensator.write_json("model.json")
     joblib.dump(compensator, "model.joblib")
     return log

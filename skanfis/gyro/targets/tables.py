@@ -110,17 +110,16 @@ class Table:
 
     def _piecewise(self, values):
         powers = np.array(list(product((0, 1), repeat=values.ndim)))
-        coefficients = []
-        for power in powers:
-            found = values
-            for axis, k in enumerate(power):
-                found = np.diff(found, axis=axis) if k else np.delete(found, -1, axis)
-            coefficients.append(found)
+        parts = [values] * len(powers)
+        for axis in range(values.ndim):
+            for k, part in enumerate(parts):
+                is_slope = powers[k, axis]
+                parts[k] = np.diff(part, axis=axis) if is_slope else np.delete(part, -1, axis)
         origins, width = [], self.step * self.scale
         for low, each, n in zip(self.low * self.scale, width, self.counts, strict=True):
             origins.append(low + each * np.arange(n))
         edges = [np.append(*ends) for ends in zip(origins, self.high * self.scale, strict=True)]
-        coefficients = np.array(coefficients)
+        coefficients = np.array(parts)
         sizes = np.abs(coefficients)
         steepest, most = np.tensordot(powers.sum(axis=1), sizes, 1).max(), sizes.sum(axis=0).max()
         if self.bits:

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 
 from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
+from skanfis.gyro._frozen import frozen, single_rule
 from skanfis.gyro._models import make_polynomial
 from skanfis.gyro.targets.error_model import ErrorModel
 
@@ -33,18 +34,9 @@ def framed(X):
     return pd.concat([X, corners])
 
 
-class Polynomial:
-    """A fitted polynomial by its numbers: of powers of (x - center) / scale."""
-
-    def __init__(self, X, y, degree=3):
-        self._fitted = make_polynomial(degree).fit(X, y)
-        scaler, features, line = (step for _, step in self._fitted.steps)
-        self.center, self.scale = scaler.mean_, scaler.scale_
-        self.powers = np.vstack([0 * features.powers_[:1], features.powers_])
-        self.coefficients = np.append(line.intercept_, line.coef_)
-
-    def predict(self, X):
-        return self._fitted.predict(X)
+def polynomial(X, y, degree=3):
+    """A fitted polynomial as it is written."""
+    return frozen(make_polynomial(degree).fit(X, y), single_rule(framed(X), "clip"))
 
 
 def law_and_line():
@@ -61,7 +53,7 @@ def error_of(kind):
     rate = X["output"] / COUNTS - error
     make = {
         "rules": quick([3, 4]).fit,
-        "polynomial": Polynomial,
+        "polynomial": polynomial,
         "constant": quick([1, 1], order=0).fit,
         "law and line": law_and_line().fit,
     }[kind]
@@ -77,7 +69,7 @@ def error_over_temperature(kind="rules"):
     """The ErrorModel of the temperature alone."""
     points = rows(800)[:, :1]
     X = pd.DataFrame(points, columns=AXES[:1])
-    make = {"rules": quick([4]).fit, "polynomial": Polynomial}[kind]
+    make = {"rules": quick([4]).fit, "polynomial": polynomial}[kind]
     estimator = make(X, planted(points[:, 0], 0.0))
     compensator = GyroCompensator(estimator, AXES[:1])
     return ErrorModel(compensator, estimator, framed(X))

@@ -9,7 +9,7 @@ from skanfis.gyro.targets.error_model import ErrorModel
 from skanfis.gyro.targets.piecewise import Piecewise, difference, spread
 from skanfis.gyro.targets.tables import Table
 
-from .models import ENDS, Polynomial, error_of, error_over_temperature, rows
+from .models import ENDS, error_of, error_over_temperature, polynomial, rows
 
 BEND = 3e-5  # deg/s/degC^2
 
@@ -25,7 +25,7 @@ def line_through(function, edges, shift=0.0):
 @pytest.fixture(scope="module")
 def parabola():
     x = pd.DataFrame({"temperature": np.linspace(-20.0, 60.0, 50)})
-    model = Polynomial(x, BEND * x["temperature"] ** 2, degree=2)
+    model = polynomial(x, BEND * x["temperature"] ** 2, degree=2)
     return ErrorModel(GyroCompensator(model, ("temperature",)), model, x)
 
 
