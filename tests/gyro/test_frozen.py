@@ -1,7 +1,6 @@
 """Simple compensations as they are written: the same rates as the model, the flags of its rows."""
 
 import json
-import warnings
 
 import numpy as np
 import pytest
@@ -115,9 +114,3 @@ def test_a_file_that_was_changed_is_refused(log, tmp_path, spoil, message):
     (tmp_path / "it.json").write_text(json.dumps(document))
     with pytest.raises(ValueError, match=message):
         GyroCompensator.read_json(tmp_path / "it.json")
-
-
-def test_no_warning_is_left(log):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        single_rule(log[["temperature"]].iloc[:20], "nan")

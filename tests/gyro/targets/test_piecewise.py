@@ -6,10 +6,10 @@ import pytest
 
 from skanfis.gyro import GyroCompensator
 from skanfis.gyro.targets.error_model import ErrorModel
-from skanfis.gyro.targets.piecewise import Piecewise, difference, spread
+from skanfis.gyro.targets.piecewise import Piecewise, difference
 from skanfis.gyro.targets.tables import Table
 
-from .models import ENDS, error_of, error_over_temperature, polynomial, rows
+from .models import error_of, error_over_temperature, polynomial, rows
 
 BEND = 3e-5  # deg/s/degC^2
 
@@ -64,10 +64,3 @@ def test_over_the_temperature(type_name):
     assert low <= off.min()
     assert off.max() <= high
     assert max(-low, high) < 1.1 * np.abs(off).max() + target.slack
-
-
-def test_beyond_its_ends_a_target_is_held():
-    target = Table(error_over_temperature(), "double", 5).piecewise
-    ends = target(np.array([[-20.0], [60.0]]))
-    np.testing.assert_array_equal(target(np.array([[-99.0], [99.0]])), ends)
-    assert spread(ENDS).shape == (64**2, 2)
