@@ -326,40 +326,33 @@ class Clock:
         fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
         best = max(_FORMATS, key=lambda form: fits[form])
         self.form = best if 2 * fits[best] > len(texts) else ""
-        self._days, self._last = 0.0, None
-        self._first, self._hours, self.notes = None, 0.0, []
+        self._ends, self._added, self.notes = None, 0.0, []
 
     def seconds(self, column):
         """Seconds since 1970, or since the midnight before the first row; NaN for no time."""
         seconds = _moments(_texts(column), self.form)
         known = np.flatnonzero(np.isfinite(seconds))
-        if self.form == _CLOCK and known.size:
-            values = seconds[known]
-            last = values[0] if self._last is None else self._last
-            days = self._days + np.cumsum(np.diff(values, prepend=last) < -0.5 * _DAY)
-            self._days, self._last = float(days[-1]), float(values[-1])
-            seconds[known] += _DAY * days
         if known.size:
-            seconds[known] = self._without_daylight_saving(seconds[known], column.iloc[known])
+            seconds[known] = self._going_on(seconds[known], column.iloc[known])
         return seconds
 
-    def _without_daylight_saving(self, values, texts):
-        """Times that go on where the clock was put one hour back."""
-        first = self._first or (values[0], values[0])
-        steps = np.diff(values, prepend=first[1])
+    def _going_on(self, values, texts):
+        """Times that go on past midnight, and where the clock was put one hour back."""
+        first, last = self._ends or (values[0], values[0])
+        steps = np.diff(values, prepend=last)
+        added = self._added + _DAY * np.cumsum((steps < -0.5 * _DAY) & (self.form == _CLOCK))
         usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else np.inf
-        back = np.abs(steps + _HOUR - usual) <= 3.0 * usual
+        back = (steps < 0.0) & (np.abs(steps + _HOUR - usual) <= 3.0 * usual)
         # An hour back to where all began is a clock that was set anew.
-        back &= (steps < 0.0) & (values > first[0] + usual)
+        back &= values + added > first + usual
         for row in np.flatnonzero(back):
             self.notes.append(
                 f"the clock goes one hour back at {texts.iloc[row]!s}: daylight saving; the time "
                 "goes on"
             )
-        self._first = first[0], values[-1]
-        hours = self._hours + _HOUR * np.cumsum(back)
-        self._hours = float(hours[-1])
-        return values + hours
+        added += _HOUR * np.cumsum(back)
+        self._ends, self._added = (first, values[-1]), float(added[-1])
+        return values + added
 
 
 def _moments(texts, form):
