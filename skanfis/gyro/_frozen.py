@@ -44,7 +44,7 @@ def frozen(model, rule):
     held = rule.model.with_out_of_bounds("clip" if policy == "linear" else policy)
     coefficients = np.append(line.intercept_, line.coef_)
     return FrozenPolynomial(
-        replace(rule, model=held), scaler.mean_, scaler.scale_, coefficients, features.degree
+        held, rule.positions, scaler.mean_, scaler.scale_, coefficients, features.degree
     )
 
 
@@ -62,14 +62,13 @@ def _giving(rule, constant, slopes=()):
 
 
 @dataclass(frozen=True, eq=False)
-class FrozenPolynomial:
+class FrozenPolynomial(FrozenRules):
     """A polynomial in z = (x - center) / scale, with coefficients in the order of scikit-learn.
 
-    Beyond the box of the single ``rule``, which gives zero, the
-    value at the edge is held, or there is none. All columns of X are inputs.
+    Beyond the box of the single rule, which gives zero, the value
+    at the edge is held, or there is none. All columns of X are inputs.
     """
 
-    rule: FrozenRules
     center: np.ndarray
     scale: np.ndarray
     coefficients: np.ndarray
@@ -82,7 +81,7 @@ class FrozenPolynomial:
 
     def predict(self, X):
         """What the polynomial gives."""
-        X, model = np.asarray(X, dtype=float), self.rule.model
+        X, model = np.asarray(X, dtype=float), self.model
         nearest = np.clip(X, model.minimum, model.maximum)
         Z = (nearest - self.center) / self.scale
         found = np.zeros(len(X))
@@ -92,17 +91,9 @@ class FrozenPolynomial:
             found[(nearest != X).any(axis=1)] = np.nan
         return found
 
-    def in_bounds(self, X):
-        """Tell which rows lie in the box of the rows fitted to."""
-        return self.rule.in_bounds(X)
-
-    def coverage(self, X):
-        """Tell how well the rows fitted to cover each row."""
-        return self.rule.coverage(X)
-
     def bounds(self, box):
         """Limits of what it gives in a box (n_inputs, 2): no term exceeds |c| max |z|^powers."""
-        near = np.clip(box.T, self.rule.model.minimum, self.rule.model.maximum)
+        near = np.clip(box.T, self.model.minimum, self.model.maximum)
         sizes = np.abs(near - self.center).max(axis=0) / self.scale
         varies = self.powers.any(axis=1)
         most = np.prod(sizes**self.powers, axis=1) @ np.abs(self.coefficients * varies)

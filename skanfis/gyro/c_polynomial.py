@@ -65,7 +65,7 @@ def export_c_polynomial(
     longest = LONGEST_NAME - len(_SUFFIX)
     stem, name = check_arguments(path, None, dtype, std, min_coverage, longest)
     dialect = Dialect(name, dtype, std)
-    part = RulesPart(polynomial.rule.model, dialect, _SUFFIX, min_coverage)
+    part = RulesPart(polynomial.model, dialect, _SUFFIX, min_coverage)
     model, kind, powers = part.model, dialect.dtype, polynomial.powers
     tables = {key: getattr(polynomial, key) for key in ("center", "scale", "coefficients")}
     tables = {"low": part.low, "high": part.high} | tables
@@ -115,14 +115,12 @@ def export_c_polynomial(
 
 def _known_answers(polynomial, part, kind, limits):
     """Rows, outputs, status and tolerance: rows and status of the rule alone."""
-    model = polynomial.rule.model
+    model = polynomial.model
     numbers = SimpleNamespace(
         model=part.model, dtype=kind, low=part.low, high=part.high, reference=model.reference
     )
     X, _, status, _ = known_answers(numbers, part.min_coverage)
-    held = replace(
-        polynomial, rule=replace(polynomial.rule, model=part.model.with_out_of_bounds("clip"))
-    )
+    held = replace(polynomial, model=part.model.with_out_of_bounds("clip"))
     y = np.clip(held.predict(X), *limits.astype(float))
     y[status & STATUS["NO_OUTPUT"] != 0] = 0.0
     # What is summed, at most; rounding of an input far from zero moves it too.

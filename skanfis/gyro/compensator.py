@@ -202,7 +202,7 @@ class GyroCompensator:
         """
         found, law, polynomial = found_by_search(self.estimator), None, None
         if isinstance(found, FrozenPolynomial):
-            rules = found.rule
+            rules = found
             polynomial = {key: getattr(found, key).tolist() for key in _OF_POLYNOMIAL}
         elif isinstance(found, ResidualRegressor):
             fitted, rules = law_and_rules(found)
@@ -372,7 +372,7 @@ def _read_polynomial(document, rule):
     }
     for j, value in enumerate(document["scale"]):
         _divisor(value, f"polynomial.scale[{j}]")
-    return FrozenPolynomial(rule, **lists)
+    return FrozenPolynomial(rule.model, rule.positions, **lists)
 
 
 def _divisor(value, where):

@@ -304,7 +304,7 @@ def _use(results):
     calibration = results.calibration
     compensator = calibration.compensator
     rules = compensator.estimator
-    rules = getattr(rules, "residual_", getattr(rules, "rule", rules))
+    rules = getattr(rules, "residual_", rules)
     model = rules.model if isinstance(rules, FrozenRules) else rules[-1].model_
     policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     text = (

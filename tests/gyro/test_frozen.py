@@ -87,7 +87,7 @@ def test_bounds_of_a_polynomial_hold_and_are_exact_for_one_input(log):
     rule = single_rule(X[["temperature"]], "clip")
     low, high = rule.model.minimum[0], rule.model.maximum[0]
     third = (high - low) / 3.0
-    one = FrozenPolynomial(rule, np.array([low + third]), np.array([third]),
+    one = FrozenPolynomial(rule.model, rule.positions, np.array([low + third]), np.array([third]),
                            np.array([0.0, 0.0, 2.0, 1.0]))  # fmt: skip
     np.testing.assert_allclose(one.bounds(np.array([[low, high]])), [-16.0, 16.0], atol=1e-9)
     assert one.predict([[high]])[0] == pytest.approx(16.0)
