@@ -65,8 +65,8 @@ def _giving(rule, constant, slopes=()):
 class FrozenPolynomial(FrozenRules):
     """A polynomial in z = (x - center) / scale, with coefficients in the order of scikit-learn.
 
-    Beyond the box of the single rule, which gives zero, the value
-    at the edge is held, or there is none. All columns of X are inputs.
+    Beyond the box of the single rule, which gives zero, the value at the edge is held, or there is
+    none. All columns of X are inputs.
     """
 
     center: np.ndarray
@@ -77,16 +77,17 @@ class FrozenPolynomial(FrozenRules):
     @property
     def powers(self):
         """Of every term, by input."""
-        return PolynomialFeatures(self.degree).fit(self.center[None]).powers_
+        return self._terms.powers_
+
+    @property
+    def _terms(self):
+        return PolynomialFeatures(self.degree).fit(self.center[None])
 
     def predict(self, X):
         """What the polynomial gives."""
         X, model = np.asarray(X, dtype=float), self.model
         nearest = np.clip(X, model.minimum, model.maximum)
-        Z = (nearest - self.center) / self.scale
-        found = np.zeros(len(X))
-        for coefficient, powers in zip(self.coefficients, self.powers, strict=True):
-            found += coefficient * np.prod(Z**powers, axis=1)
+        found = self._terms.transform((nearest - self.center) / self.scale) @ self.coefficients
         if model.out_of_bounds in SILENT:
             found[(nearest != X).any(axis=1)] = np.nan
         return found

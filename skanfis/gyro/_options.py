@@ -114,12 +114,10 @@ def make_parser():
     told = "with --c: hold what the rules give between the proven limits"
     add("--saturate", told, action="store_true")
     told = (
-        "also write a simple target, where it is good enough: in C table[:TYPE] over temperature, "
+        "also a simple target, where it is good enough: in C table[:TYPE] over temperature, "
+        "rate-table[:TYPE] over output too (float, double, q31, q15); parameters of one AXIS of a "
+        "gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] or ardupilot:AXIS[:INSTANCE]"
     )
-    told += (
-        "rate-table[:TYPE] over the output too (float, double, q31, q15); parameters of one AXIS "
-    )
-    told += "of a gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] or ardupilot:AXIS[:INSTANCE]"
     add("--target", told, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")

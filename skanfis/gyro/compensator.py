@@ -202,9 +202,8 @@ class GyroCompensator:
         """
         found, law, polynomial = found_by_search(self.estimator), None, None
         if isinstance(found, FrozenPolynomial):
-            rules = found
             polynomial = {key: getattr(found, key).tolist() for key in _OF_POLYNOMIAL}
-        elif isinstance(found, ResidualRegressor):
+        if isinstance(found, ResidualRegressor):
             fitted, rules = law_and_rules(found)
             law = _law_document(fitted, self.inputs)
         else:
@@ -306,7 +305,7 @@ def _settings(document):
     if document["law"] is not None:
         estimator = joined(_read_law(document["law"], inputs), estimator)
     if document["polynomial"] is not None:
-        estimator = _read_polynomial(document["polynomial"], estimator)
+        estimator = _read_polynomial(document["polynomial"], estimator, len(inputs))
     settings = {key: document[key] for key in _KEYS} | numbers
     return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
 
@@ -358,18 +357,16 @@ def _read_law(document, inputs):
     return law
 
 
-def _read_polynomial(document, rule):
+def _read_polynomial(document, rule, n_inputs):
     """The polynomial that a file's content describes; ValueError where it is none."""
     if not isinstance(document, dict) or set(document) != set(_OF_POLYNOMIAL):
         raise ValueError(f"its polynomial must be an object of {', '.join(_OF_POLYNOMIAL)}")
-    if not isinstance(rule, FrozenRules) or rule.model.n_rules != 1 or rule.model.order:
-        raise ValueError("a polynomial goes with a single rule of order 0, and no law")
-    n = rule.model.n_inputs
-    sizes = {"center": n, "scale": n, "coefficients": comb(n + 3, 3)}
-    lists = {
-        key: _list_of_numbers(document[key], key, size, size, "polynomial")
-        for key, size in sizes.items()
-    }
+    n = n_inputs
+    is_single = isinstance(rule, FrozenRules) and rule.model.n_rules == 1 and not rule.model.order
+    if not is_single or rule.positions.tolist() != list(range(n)):
+        raise ValueError("a polynomial goes with a single rule of order 0 on all inputs, no law")
+    sizes = dict(zip(_OF_POLYNOMIAL, (n, n, comb(n + 3, 3)), strict=True))
+    lists = {k: _list_of_numbers(document[k], k, n, n, "polynomial") for k, n in sizes.items()}
     for j, value in enumerate(document["scale"]):
         _divisor(value, f"polynomial.scale[{j}]")
     return FrozenPolynomial(rule.model, rule.positions, **lists)

@@ -140,9 +140,8 @@ def literals(values, indent=""):
 def comment(text):
     """Any name as something that cannot end a comment, continue a line or make a trigraph."""
     text = str(text)
-    return _escaped(r"[^ -~]|[*?\\]", text[:_LONGEST_COMMENT]) + (
-        "..." if len(text) > _LONGEST_COMMENT else ""
-    )
+    rest = "..." if len(text) > _LONGEST_COMMENT else ""
+    return _escaped(r"[^ -~]|[*?\\]", text[:_LONGEST_COMMENT]) + rest
 
 
 def remark(text):
