@@ -32,6 +32,15 @@ _TARGET = re.compile(
     r"(rate-)?table(:(float|double|q31|q15))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
 )
 
+_OF_TARGETS = (
+    "also a simple target, where it is good enough: in C table[:TYPE] over temperature, "
+    "rate-table[:TYPE] over output too (float, double, q31, q15); parameters of one AXIS of a "
+    "gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] or ardupilot:AXIS[:INSTANCE]"
+)
+_OF_OUTSIDE = (
+    "beyond the range of the calibration, where rows are flagged: hold the edge (clip), go on "
+    "along the tangent for a while (linear, default; a cubic is held), or give none (nan)"
+)
 _WHAT = """\
 Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
 what is known on board, its output, its temperature and how fast that changes, and the time since
@@ -88,11 +97,7 @@ def make_parser():
     told = "fit the arcsine law of open-loop fiber-optic gyros first; rules learn what it leaves"
     add("--physics", told, action="store_true")
     group = parser.add_argument_group("where it holds, and how it is checked")
-    told = (
-        "beyond the range of the calibration, where rows are flagged: hold the edge (clip), go on "
-        "along the tangent for a while (linear, default; a cubic is held), or give none (nan)"
-    )
-    add("--outside", told, choices=("clip", "linear", "nan"), default=Recipe.outside)
+    add("--outside", _OF_OUTSIDE, choices=("clip", "linear", "nan"), default=Recipe.outside)
     told = "where the report proves how large the compensation can be"
     add("--box", told, type=parse_box, metavar="INPUT=LOW:HIGH", **several)
     add("--groups", "what to hold out", choices=KINDS, default="auto")
@@ -113,12 +118,7 @@ def make_parser():
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
     told = "with --c: hold what the rules give between the proven limits"
     add("--saturate", told, action="store_true")
-    told = (
-        "also a simple target, where it is good enough: in C table[:TYPE] over temperature, "
-        "rate-table[:TYPE] over output too (float, double, q31, q15); parameters of one AXIS of a "
-        "gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] or ardupilot:AXIS[:INSTANCE]"
-    )
-    add("--target", told, type=_target, **several)
+    add("--target", _OF_TARGETS, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
     return parser
