@@ -54,7 +54,7 @@ pytest = $(1)/bin/python -m pytest -n $(WORKERS) --maxprocesses 4 --dist workste
 help:
 	@echo "make demo         run the gyro example and save its pictures in figures/"
 	@echo "make test         all tests and docstring examples, newest dependencies"
-	@echo "make fuzz         the properties alone, on fifty times as much that is drawn anew"
+	@echo "make fuzz         the properties alone, on fifty times as much that is drawn anew; 1,000 logs"
 	@echo "make lint         style, format, types"
 	@echo "make format       put style and format right where a tool can"
 	@echo "make test-floors  the tests at the oldest dependencies that pyproject.toml allows"
@@ -91,6 +91,7 @@ test: $(DEV)/.installed
 
 fuzz: $(DEV)/.installed
 	$(call pytest,$(DEV)) tests/properties --hypothesis-profile fuzz --hypothesis-show-statistics
+	LOG_VARIANTS=1000 $(call pytest,$(DEV)) tests/gyro/test_log_variants.py
 
 lint: $(DEV)/.installed
 	$(DEV)/bin/ruff check

@@ -46,7 +46,16 @@ LAYERS = {
     "intervals": SKLEARN,
     "dask": [*SKLEARN, "pandas", "dask"],
     "datasets": [*SKLEARN, "pandas"],
-    "gyro": [*PLOTTING, "allantools", "jinja2", "joblib", "pyarrow"],
+    "gyro": [
+        *PLOTTING,
+        "allantools",
+        "h5py",
+        "jinja2",
+        "joblib",
+        "openpyxl",
+        "pyarrow",
+        "weasyprint",
+    ],
 }
 # The version, which what is exported carries.
 ALSO = {"export": [PUBLIC]}
@@ -71,9 +80,12 @@ ONLY_INSIDE_FUNCTIONS = {
     "dask",
     "matplotlib",
     "allantools",
+    "h5py",
     "jinja2",
+    "openpyxl",
     "onnx",
     "pyarrow",
+    "weasyprint",
     "skl2onnx",
 }
 DOOR_TO_PRIVATE_SKLEARN = "_sklearn"

@@ -10,7 +10,8 @@ interval is a little too narrow.
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -20,14 +21,14 @@ from ..exceptions import OutOfBoundsWarning
 from ._checks import find_glitches
 from ._columns import SIGNALS, ask
 from ._models import Choice, fit_model, some_rows
-from ._simpler import Simpler, simpler_compensations
+from ._simpler import NAMES, Simpler, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, features
 from .errors import LogError
 from .metrics import rms, scale_factor
 
 _TIME_CONSTANT = 30.0  # of the rate of the temperature [s]
-_MOST_FIT_ROWS = 100_000
+_MOST_FIT_ROWS = 10_000
 # Of a verdict: the name of the model in it, and what a gain must be above to be worth having.
 _MODEL, _LEAST_GAIN = "this model", 1.02
 _CONFIDENCE = 0.95
@@ -39,16 +40,20 @@ _ROUNDING = 1e-9
 class Recipe:
     """What a calibration is asked to do.
 
-    ``terms`` is "search" or numbers, one per input.
+    ``terms`` is "search" or numbers, one per input. ``units`` are those of the files by part, and
+    ``assumed`` has sentences on those that were neither named nor told.
     """
 
     inputs: tuple[str, ...]
     output_unit: str = "deg/s"
     scale_factor: float = 1.0  # of a raw signal at rest, which does not tell it
+    write: str = "recommended"  # or "rules", or one of NAMES in _simpler
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
     box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
+    units: dict[str, str] = field(default_factory=dict)
+    assumed: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -77,6 +82,7 @@ class Verdict:
     gains: dict[str, Gain]
     n_groups: int
     recommended: str
+    is_one_cycle: bool = False  # and cannot tell whether it repeats
 
     @property
     def model(self):
@@ -93,16 +99,20 @@ class Verdict:
 class Calibration:
     """A compensator, and what was found out about it.
 
-    ``before`` and ``after`` are the indicated rate and the held-out compensated one of every row,
-    ``inside`` whether the row was in the bounds of the model that had not seen it. ``choice`` is of
-    the model's structure, ``fold_choices`` of those held out, each from its fold's training rows;
-    None where it was given. ``simpler`` are compensations without rules, judged with the model by
-    ``verdict`` on the rows in range. ``warnings`` are those of the fit; ``glitches`` sentences on
-    rows that no other supports. ``n_rows`` is how many rows there were, of which ``log`` has some.
+    ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
+    the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
+    rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
+    of the model that had not seen it. ``choice`` is of the model's structure, ``fold_choices`` of
+    those held out, each from its fold's training rows; None where it was given. ``simpler`` are
+    compensations without rules, judged with the model by ``verdict`` on the rows in range.
+    ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
+    ``n_rows`` is how many rows there were, of which ``log`` has some.
     """
 
     recipe: Recipe
     compensator: GyroCompensator
+    written: str
+    model: Any
     split: Split
     log: pd.DataFrame
     X: pd.DataFrame
@@ -117,11 +127,17 @@ class Calibration:
     warnings: list
     glitches: list
     n_rows: int
+    fold_models: list  # of what is written, those that had not seen the test rows of each fold
 
     @property
     def rules(self):
         """The pipeline of the rules: beside the arcsine law, what adds to it."""
-        return getattr(self.compensator.estimator, "residual_", self.compensator.estimator)
+        return getattr(self.model, "residual_", self.model)
+
+    @property
+    def writes_model(self):
+        """Whether law and rules are what is written."""
+        return self.written == self.verdict.model
 
     @property
     def is_thinned(self):
@@ -171,66 +187,61 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         factor = recipe.scale_factor if at_rest else scale_factor(log["rate"], log["output"])
     X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
-    glitches = [
-        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
-        "and calibrate again."
-        for row, reason in find_glitches(log, before - rate)
-    ]
-    for sentence in glitches:
-        tell(f"warning: {sentence}")
+    glitches = _glitches(log, before - rate, name_row, tell)
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
-    predicted, inside, folds, choices = _held_out(X, target, groups, split, recipe, tell, rng)
+    found = _held_out(X, target, groups, split, recipe, tell, rng)
+    predicted, inside, folds, choices, fold_models = found
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
-    simpler = list(simpler_compensations(X, rate, before, folds, rows))
-    tell(f"fitting to {rows.size:,} rows")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        # Of rows that trial fits have not seen; the final one is asked of none.
-        warnings.simplefilter("ignore", OutOfBoundsWarning)
-        estimator, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
-    if choice.terms is not None:
-        tell(f"terms {','.join(map(str, choice.terms))}")
-    if recipe.physics:
-        tell(f"law of the open loop with coefficients of degree {choice.degree} in temperature")
+    simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
+    estimator, choice, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
+    predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
+    model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
+    # The same rows for all: those that the model answered in range.
+    judged = inside & np.isfinite(after)
+    every = [each for each in [*simpler, model] if each.after is not None]
+    errors = {each.name: (each.after - rate)[judged] for each in every}
+    verdict = judge(errors, split.labels[judged], split.kind == "piece" and not np.ptp(rate))
+    written = _to_write(recipe, verdict, simpler)
+    chosen = next(each for each in every if each.name == written)
     compensator = GyroCompensator(
-        estimator,
+        chosen.estimator,
         recipe.inputs,
-        predicts="rate" if recipe.physics else "error",
+        predicts=chosen.predicts,
         scale_factor=factor,
         output_unit=recipe.output_unit,
         time_constant=_TIME_CONSTANT,
+        units={part: recipe.units[part] for part in recipe.units if part in log},
+        assumed=recipe.assumed,
     )
-    after = compensator.compensate(before, predicted)
-    # The same rows for all: those that the model answered in range.
-    judged = inside & np.isfinite(after)
-    rates = {each.name: each.after for each in simpler if each.after is not None} | {_MODEL: after}
-    errors = {name: (compensated - rate)[judged] for name, compensated in rates.items()}
     return Calibration(
         recipe=recipe,
         compensator=compensator,
+        written=written,
+        model=estimator,
         split=split,
         log=log,
         X=X,
         before=before,
-        after=after,
-        inside=inside,
+        after=chosen.after,
+        inside=judged,
         choice=choice,
         fold_choices=choices if recipe.physics or isinstance(recipe.terms, str) else None,
         simpler=simpler,
-        verdict=judge(errors, split.labels[judged]),
+        verdict=verdict,
         n_fit_rows=rows.size,
-        warnings=sorted({str(warning.message) for warning in caught}),
+        warnings=messages,
         glitches=glitches,
         n_rows=len(log) if n_rows is None else n_rows,
+        fold_models=chosen.fold_models,
     )
 
 
 def _held_out(X, target, groups, split, recipe, tell, rng):
-    """Predictions of every row by a model new to it, which are in range, folds, and choices."""
+    """Predictions of every row by a model new to it, which are in range, folds, choices, models."""
     predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
-    folds, choices = [], []
+    folds, choices, models = [], [], []
     for number, (train, test) in enumerate(split.folds, 1):
         tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
         rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
@@ -242,19 +253,57 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
             predicted[test] = model.predict(X.iloc[test])
             inside[test] = ask(model, "in_bounds", X.iloc[test])
         choices.append(choice)
+        models.append(model)
     if not (inside & np.isfinite(predicted)).any():
         raise LogError(
             f"the compensator could not be checked: every row lies outside the range of the rows "
             f"that the model had seen while its group was held out ({split.kind}). Log groups that "
             "overlap in temperature, rate and time."
         )
-    return predicted, inside, folds, choices
+    return predicted, inside, folds, choices, models
 
 
-def judge(errors, groups):
+def _fit(X, target, groups, recipe, tell):
+    """The model of all rows, its choice, and what warnings said."""
+    tell(f"fitting to {len(X):,} rows")
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        # Of rows that trial fits have not seen; the final one is asked of none.
+        warnings.simplefilter("ignore", OutOfBoundsWarning)
+        estimator, choice = fit_model(X, target, groups, recipe)
+    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
+    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
+    return estimator, choice, sorted({str(warning.message) for warning in caught})
+
+
+def _glitches(log, error, name_row, tell):
+    """Sentences on rows that no other supports, told as well."""
+    found = [
+        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
+        "and calibrate again."
+        for row, reason in find_glitches(log, error)
+    ]
+    for sentence in found:
+        tell(f"warning: {sentence}")
+    return found
+
+
+def _to_write(recipe, verdict, simpler):
+    """Name of what is written: what is recommended, or asked for."""
+    if recipe.write == "recommended":
+        return verdict.recommended
+    name = NAMES.get(recipe.write, verdict.model)
+    if name not in verdict.rms:
+        reasons = [each.missing for each in simpler if each.name == name] or ["no such on this log"]
+        raise LogError(f"--write {recipe.write}: {reasons[0]}.")
+    return name
+
+
+def judge(errors, groups, is_one_cycle=False):
     """Judge compensations by their errors on the same rows, and what was held out together.
 
     ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
+    One thermal cycle at rest shows of no more than a constant that it repeats.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     counts = np.bincount(codes)
@@ -270,8 +319,10 @@ def judge(errors, groups):
         for place, name in enumerate(names)
         if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
+    if is_one_cycle:
+        recommended = min(names[:2], key=lambda name: of_all[name])
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
-    return Verdict(of_all, gains, counts.size, recommended)
+    return Verdict(of_all, gains, counts.size, recommended, is_one_cycle)
 
 
 def _gain(logs):

@@ -25,9 +25,16 @@ _TABLE = {
         "degF": (5.0 / 9.0, "°f ℉ f fahrenheit deg_f"),
     },
     "rate": {
-        "deg/s": (1.0, "°/s dps deg_s degps deg/sec °/sec deg_sec degs deg_per_s deg_per_sec"),
-        "deg/h": (1 / 3600.0, "°/h dph deg_h deg/hr °/hr deg_hr degph deg_per_h deg/hour"),
+        "deg/s": (
+            1.0,
+            "°/s dps deg_s degps deg/sec °/sec deg_sec degs deg_per_s deg_per_sec °_per_s °_s",
+        ),
+        "deg/h": (
+            1 / 3600.0,
+            "°/h dph deg_h deg/hr °/hr deg_hr degph deg_per_h deg_per_hr deg/hour",
+        ),
         "rad/s": (180.0 / math.pi, "rad_s rads radps rad/sec rad_sec rad_per_s"),
+        "mdeg/s": (1e-3, "mdps mdeg_s mdegps"),
         "mrad/s": (0.18 / math.pi, "mrad_s mradps"),
         "rpm": (6.0, ""),
     },
@@ -67,6 +74,11 @@ def units_of(quantity):
 def convert(values, quantity, unit):
     """Values in the canonical unit; those of a raw signal as they are."""
     return values * _FACTORS[quantity][unit] + _ZERO.get(unit, 0.0)
+
+
+def convert_back(values, quantity, unit):
+    """Values in a unit, from those in the canonical one."""
+    return (values - _ZERO.get(unit, 0.0)) / _FACTORS[quantity][unit]
 
 
 def declared_units(units):

@@ -3,7 +3,7 @@
 from ..export import fold
 from ..inspection import export_text
 from ._headline import readability_of
-from ._simpler import LAW_AND_LINE
+from ._simpler import LAW_AND_LINE, NOTHING
 from .physics import past_phase
 
 
@@ -17,19 +17,24 @@ def formula_of(calibration, name):
     if simple.predicts == "rate":
         return law_text(simple.model, recipe)
     rate = f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n"
-    if name == "constant":
-        return f"{rate}error = {float(simple.model.constant_.item()):.9g}"
+    if name in (NOTHING, "constant"):
+        return f"{rate}error = {simple.model:.9g}"
     return rate + _polynomial("error", simple.model, recipe.inputs)
 
 
 def rules_text(calibration, found=None):
-    """The rules as sentences, behind what speaks against reading them and the law's formula."""
+    """What is written, as text: a formula, or the rules as sentences.
+
+    Before these stand what speaks against reading them, and the law's formula.
+    """
+    if not calibration.writes_model:
+        return f"{formula_of(calibration, calibration.written)}\n"
     found = readability_of(calibration) if found is None else found
     caution = ""
     if found.findings:
         head = "The rules are not fit to be read one by one:"
         caution = "\n".join([head, *found.findings, "", ""])
-    estimator = calibration.compensator.estimator
+    estimator = calibration.model
     # Folded, a model knows of no readability in training, and the text has the caution once.
     if calibration.recipe.physics:
         rules = export_text(fold(estimator.residual_), output_names=["rate beyond the law"])
@@ -64,23 +69,6 @@ def _in_powers(coefficients):
 def _term(value, factor=""):
     """What is to be added, with its sign; nothing for zero."""
     return f" {'-' if value < 0 else '+'} {abs(value):.8g}{factor}" if value else ""
-
-
-def on_board(compensator):
-    """The steps around the model, as they run on the gyro's processor."""
-    arguments, lines = ", ".join(compensator.inputs), []
-    if "temperature_rate" in compensator.inputs:
-        lines += [
-            "/* at power-on temperature_rate = 0, previous = temperature; then every h seconds */",
-            f"temperature_rate += (1 - exp(-h / {compensator.time_constant:g}))",
-            "    * ((temperature - previous) / h - temperature_rate);",
-            "previous = temperature;",
-        ]
-    if compensator.predicts == "error":
-        lines.append(f"rate = output / {compensator.scale_factor:.9g} - error({arguments});")
-    else:
-        lines.append(f"rate = law({arguments}) + rules({arguments});")
-    return "\n".join(lines)
 
 
 def _polynomial(what, pipeline, inputs):

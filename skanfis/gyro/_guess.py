@@ -10,24 +10,28 @@ import pandas as pd
 from ._checks import PARTS
 from ._columns import CANONICAL, declared_units, unit_in
 from ._source import Clock, as_numbers
+from ._units import assumed_text, settle_units
 from .errors import LogError
 
-_SAMPLE_ROWS = 5_000
-_RATE = "rate omega angular velocity speed"
+_SAMPLE_ROWS = 100_000
+_RATE = "rate omega w angular velocity speed drehrate"
 _OUTPUT = (
     "gyro gyroscope fog output out signal raw counts count adc measured meas indicated sensor imu "
     "dut uut kreisel"
 )
-_TRUTH = "true truth table turntable drehtisch ref reference stage commanded command cmd encoder"
+_TRUTH = (
+    "true truth table turntable drehtisch ref reference stage commanded command cmd encoder soll "
+    "consigne"
+)
 # How much a word in a column's name speaks for a part. A chamber's thermometer is no gyro's.
 _WORDS = {
     "time": {
-        5.0: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime 时间",
+        5.0: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime temps 时间",
         4.0: "clock elapsed",
         3.0: "t sec secs seconds epoch utc tow ms millis us",
     },
     "temperature": {
-        5.0: "temp temperature temperatur tmp therm thermometer thermistor ntc rtd celsius 温度",
+        5.0: "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度",
         3.0: "t",
         -3.5: "start set setpoint target chamber oven ambient amb room min max board",
     },
@@ -39,12 +43,14 @@ _SCORES = {
     for part, table in _WORDS.items()
 }
 _STRANGER = -0.5  # any other word
+_FOLLOWS = 0.9  # correlation of the axis that the table turns
 _SIGNAL, _UNIT = 3.0, 0.25  # a unit of a raw signal, for the output; any unit
 _OF_NO_PART = (
     "residual fit fitted error err std sigma var variance status flag valid crc checksum seq "
     "sequence index trend delta diff acc accel accelerometer mag pressure humidity supply vdd "
     "current heater bias corrected compensated filtered direction"
 )
+_LABVIEW = {"X_Value": ("time", "s")}  # its name for the time
 _LABELS = {
     "run": {"run", "cycle", "session", "powerup"},
     "device": {"device", "serial", "sn", "unit"},
@@ -56,10 +62,6 @@ _QUANTITIES = {
     "output": ("rate", "signal"),
     "rate": ("rate",),
 }
-_COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
-# Numbers that large count from 1970, in these units.
-_EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
-_LARGEST_RATE = 1000  # of whole numbers, beyond which they are taken for counts
 
 _BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]\s*$|[,/]\s*([^,/\s][^,]*)$")
 # mV first: it is one word, for all its letters of two cases.
@@ -80,6 +82,7 @@ class Request:
     units: dict = field(default_factory=dict)
     require: tuple[str, ...] = ("temperature", "output", "rate")
     guess: bool = False
+    assumed: dict | None = None  # units of columns that name none; else by the values
 
 
 def checked_request(request):
@@ -94,13 +97,17 @@ def checked_request(request):
 
 @dataclass
 class Layout:
-    """Places of the parts in a file and their units there; ``others`` would do as well."""
+    """Places of the parts in a file and their units there; ``others`` would do as well.
+
+    ``assumed`` has sentences by part on units that are neither told nor in the names.
+    """
 
     header: list
     places: dict
     units: dict
     notes: list = field(default_factory=list)
     others: dict = field(default_factory=dict)
+    assumed: dict = field(default_factory=dict)
 
     def name(self, part):
         """The part's name in the file."""
@@ -123,10 +130,12 @@ def settle(source, request, first=None):
         elif part in request.columns:
             raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
     if request.guess:
-        _guess(source, request, layout, is_first=first is None)
+        _guess(source, request, layout, first)
     for part in request.require:
         if part not in layout.places:
-            raise LogError(f"{source.path}: {_no_column(part, names[part], source.header)}")
+            taken = layout.places.values() if request.guess else ()
+            told = _no_column(part, names[part], source.header, taken)
+            raise LogError(f"{source.path}: {told}")
     if len(set(layout.places.values())) < len(layout.places):
         raise LogError(f"{source.path}: two parts cannot be the same column of the file.")
     layout.places = {part: layout.places[part] for part in PARTS if part in layout.places}
@@ -134,10 +143,10 @@ def settle(source, request, first=None):
     return layout
 
 
-def _guess(source, request, layout, is_first):
+def _guess(source, request, layout, first):
     """Add the parts that names and units tell, and the units."""
     # Of the first file, a column that is called rate may be the gyro's own.
-    is_told = "rate" in request.columns or not is_first
+    is_told = "rate" in request.columns or first is not None
     called_rate = None if is_told else layout.places.pop("rate", None)
     places = range(len(source.header))
     sample = next(source.pieces(places, _SAMPLE_ROWS), pd.DataFrame(columns=places, dtype=float))
@@ -155,16 +164,18 @@ def _guess(source, request, layout, is_first):
                 layout.places.setdefault(part, column.place)
     if called_rate is not None and called_rate not in layout.places.values():
         layout.places.setdefault("rate", called_rate)
-    _settle_units(columns, layout)
-    layout.notes += _sentences(layout, request)
+    of_first = request.assumed if first is None else first.units
+    _settle_axis(columns, layout)
+    _settle_units(columns, layout, of_first)
+    layout.notes += _sentences(layout)
 
 
 class _Column:
     """A column's name, read (its words, unit, what that is a unit of), and its first values."""
 
     def __init__(self, place, name, values, decimal):
-        self.place = place
-        meant, rest = None, name.strip()
+        self.place, self.name = place, name
+        meant, rest = _LABVIEW.get(name.strip()), name.strip()
         bracketed = _BRACKETED.search(rest)
         if bracketed and (found := unit_in(bracketed[1] or bracketed[2] or "")):
             meant, rest = found, rest[: bracketed.start()]
@@ -177,6 +188,7 @@ class _Column:
         axes = [letter for letter in "xyz" if letter in words and len(words) > 1]
         self.words = set(words) - set(axes[-1:])
         numbers = as_numbers(values, decimal)
+        self.aligned = np.where(np.isfinite(numbers), numbers, np.nan)
         self.numbers = numbers[np.isfinite(numbers)]
         self.is_time = False
         if self.numbers.size <= 0.5 * len(values):
@@ -192,9 +204,8 @@ class _Column:
             return False
         if part == "time":
             steps = np.diff(self.numbers)
-            return self.is_time or (
-                self.numbers.size > 0 and np.sum(steps < 0.0) <= 0.1 * steps.size
-            )
+            against = min(np.sum(steps < 0.0), np.sum(steps > 0.0))  # the last may come first
+            return self.is_time or (self.numbers.size > 0 and against <= 0.1 * steps.size)
         # A flag or a trend takes a few whole values.
         is_flag = part == "temperature" and np.isin(self.numbers, (-1.0, 0.0, 1.0)).all()
         return self.numbers.size > 0 and not is_flag
@@ -231,39 +242,57 @@ def _by_unit(part, columns, layout):
         layout.places[part] = found[0].place
 
 
-def _settle_units(columns, layout):
-    """Units that the names say, or else the values."""
-    for part in _QUANTITIES.keys() & layout.places.keys() - layout.units.keys():
+def _settle_axis(columns, layout):
+    """Of outputs whose names say as much, that of the axis which the table turns."""
+    others = [column for column in columns if column.name in layout.others.get("output", [])]
+    if not others or "rate" not in layout.places:
+        return
+    rate = columns[layout.places["rate"]].aligned
+    own = [columns[layout.places["output"]], *others]
+    if not rate.size or any(not column.aligned.size for column in own):
+        return
+    table = pd.DataFrame({column.place: column.aligned for column in own})
+    follows = table.corrwith(pd.Series(rate)).abs() > _FOLLOWS
+    if follows.sum() == 1:
+        layout.places["output"] = int(follows.idxmax())
+        layout.others.pop("output")
+
+
+def _settle_units(columns, layout, of_first):
+    """Units that the names say; or else those of the first file, or what the values tell."""
+    values, own = {}, {}
+    for part in _QUANTITIES.keys() & layout.places.keys():
         column = columns[layout.places[part]]
-        values = column.numbers
         if column.unit and column.quantity in _QUANTITIES[part]:
-            layout.units[part] = column.unit
-        elif values.size == 0:
-            continue
-        elif part == "temperature" and values.min() > _COLDEST_IN_KELVIN:
-            layout.units[part] = "K"
-        elif part == "time" and values.min() > _EPOCHS[-1][0]:
-            layout.units[part] = next(unit for least, unit in _EPOCHS if values.min() > least)
-        elif part == "output" and max(abs(values)) > _LARGEST_RATE and not any(values % 1.0):
-            layout.units[part] = "counts"
+            own[part] = column.unit
+        if not column.is_time:
+            values[part] = column.aligned
+    layout.units = own | layout.units
+    lacking = [part for part in values if part not in layout.units and values[part].size]
+    if of_first is None:
+        found = settle_units(values, layout.units, is_all=False)
+    else:
+        found = {part: of_first.get(part, CANONICAL[part]) for part in lacking}
+    layout.units |= found
+    layout.assumed = {
+        part: assumed_text(values[part], part, layout.name(part), found[part])
+        for part in PARTS
+        if part in found
+    }
 
 
-def _sentences(layout, request):
-    """What was guessed, in words; what is named as it should be is not worth a word."""
+def _sentences(layout):
+    """Which columns were taken in which units, in words, and which of these were assumed."""
     told = []
     for part in (part for part in PARTS if part in layout.places):
         name, unit = layout.name(part), layout.units.get(part, "")
         others = ", ".join(map(repr, layout.others.get(part, [])))
-        is_told = part in request.columns or name.strip().casefold() == part
-        if is_told and not others and unit in ("", CANONICAL.get(part), request.units.get(part)):
-            continue
         told.append(
             f"{part} = {name!r}"
             + (f" in {unit}" if unit else "")
             + (f" ({others} would do too)" if others else "")
         )
-    say = "columns, as guessed: {}. Say otherwise with --columns and --units"
-    return [say.format("; ".join(told))] if told else []
+    yield f"columns: {'; '.join(told)}. Say otherwise with --columns and --units"
 
 
 def _place(source, name, taken):
@@ -280,13 +309,14 @@ def _place(source, name, taken):
     return found[0] if found else None
 
 
-def _no_column(part, name, header):
+def _no_column(part, name, header, taken=()):
     found = ", ".join(map(repr, header[:20])) + (", ..." if len(header) > 20 else "")
     # Columns that are called as another part are that.
-    free = [other for other in header if other.strip().casefold() not in PARTS]
+    left = [other for place, other in enumerate(header) if place not in taken]
+    free = [other for other in left if other.strip().casefold() not in PARTS]
     close = [part] if part in header else difflib.get_close_matches(name, free, n=1, cutoff=0.4)
-    advice = f"{part}={close[0]}" if close else f"{part}=NAME"
+    advice = f"{part}={close[0]}" if close else f"{part}={free[0] if free else 'NAME'}"
     return (
         f"there is no column {name!r} for the {part}; the file has {found}. Say which it is "
-        f"(--columns {advice}; columns= in Python)."
+        f"(such as --columns {advice}; columns= in Python)."
     )

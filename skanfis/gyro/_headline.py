@@ -14,7 +14,8 @@ effects of a one-way analysis of variance, with the chi^2 interval of G - 1 degr
 Model: the root mean square over the rows of the posterior's deviation without its noise.
 """
 
-from typing import Any, NamedTuple
+from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -23,20 +24,17 @@ from scipy.stats import chi2
 from ..bounds import bounds, gradient_bounds
 from ..inspection import readability
 from ._columns import RATE_UNITS, evenly_chosen
-from ._simpler import LAW_AND_LINE, NOTHING, options_for
+from ._frozen import FrozenPolynomial
+from ._simpler import NAMES, NOTHING
+from .compose import FrozenRules
 from .displays import figures
 from .metrics import rms
 
-ARTICLES = {
-    NOTHING: "no compensation",
-    "constant": "a constant",
-    "straight line": "a straight line",
-    "arcsine law": "the arcsine law",
-    LAW_AND_LINE: "the arcsine law and a line",
-    "cubic polynomial": "a cubic polynomial",
-}
+ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
+ARTICLES[NOTHING] = NOTHING
 _MOST_ROWS = 100_000  # evenly chosen, for the rules, the noise and the model
 _CONFIDENCE = 0.95  # of every interval in the report
+_MANY_FLAGGED = 0.2  # of the rows
 _MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter
 
 
@@ -60,6 +58,9 @@ def headline(calibration, unit):
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
+    if verdict.is_one_cycle:
+        safe = "leave the gyro as it is" if name == NOTHING else "a constant is safe"
+        title = f"One cycle cannot tell whether this repeats; until then {safe}"
     what = {
         NOTHING: "Without any compensation the error is",
         "constant": "Subtracting a constant leaves",
@@ -68,7 +69,12 @@ def headline(calibration, unit):
         "Nothing more elaborate that was tried is better by more than the scatter over the "
         f"{groups} can explain (95 %)."
     )
-    if verdict.n_groups == 1:
+    if verdict.is_one_cycle:
+        why = (
+            "Whatever follows the temperature was learnt and judged on the same cycle: record two "
+            "more, then calibrate again from all."
+        )
+    elif verdict.n_groups == 1:
         why = (
             "Only one held-out group has rows in range: how far errors scatter is not known, and "
             "nothing can be shown to be better. Log more groups that overlap."
@@ -84,7 +90,24 @@ def held_out_groups(calibration):
     kind, n_groups = calibration.split.kind.split("+")[0], calibration.verdict.n_groups
     if kind == "level":
         kind = "rate level"
-    return f"{n_groups} held-out {kind}{'s' if n_groups > 1 else ''}"
+    n_all = np.unique(calibration.split.labels.astype(str)).size
+    of_all = "" if n_all == n_groups else f" (of {n_all})"
+    return f"{n_groups}{of_all} held-out {kind}{'s' if n_groups > 1 or of_all else ''}"
+
+
+def flagged_text(calibration):
+    """How many held-out rows were flagged, and what that means."""
+    n_rows, n_flagged = calibration.inside.size, np.count_nonzero(~calibration.inside)
+    if not n_flagged:
+        return f"None of the {n_rows:,} held-out rows was flagged."
+    share = n_flagged / n_rows
+    advice = "They are the ends of the range, which no other group reaches."
+    if share > _MANY_FLAGGED:
+        advice = (
+            "That is much: the figures say nothing of these rows. Log groups that overlap more, "
+            "above all at both ends of the range."
+        )
+    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged. {advice}"
 
 
 def errors_and_verdict(calibration):
@@ -104,11 +127,14 @@ def errors_and_verdict(calibration):
             f"{rms(after[outside]):.4g} after, on {outside.sum():,} held-out rows, all of them "
             "flagged"
         )
+    lines.append(f"flagged        {flagged_text(calibration)}")
     title, reason = headline(calibration, "deg/s")
     lines.append(f"VERDICT        {title}. {reason}")
-    if wanted := options_for(calibration.verdict.recommended, len(calibration.recipe.inputs)):
-        lines.append(f"instead        {wanted} writes the files of it; the report has its formula")
-    if findings := readability_of(calibration).findings:
+    what = ARTICLES.get(calibration.written, "the fuzzy rules")
+    asked = calibration.recipe.write != "recommended"
+    others = "as --write asks" if asked else "as recommended; --write names another"
+    lines.append(f"written is     {what}, {others}")
+    if calibration.writes_model and (findings := readability_of(calibration).findings):
         lines.append(f"rules          not fit to be read one by one. {findings[0]}")
     return lines
 
@@ -116,7 +142,7 @@ def errors_and_verdict(calibration):
 def readability_of(calibration):
     """Whether the rules can be read: against what the law leaves of the rate, or the error."""
     places = evenly_chosen(len(calibration.X), _MOST_ROWS)
-    X, estimator = calibration.X.iloc[places], calibration.compensator.estimator
+    X, estimator = calibration.X.iloc[places], calibration.model
     if not calibration.recipe.physics:
         return readability(estimator, X, (calibration.before - calibration.rate)[places])
     left = calibration.rate[places] - estimator.base_.predict(X)
@@ -149,13 +175,14 @@ def budget_of(calibration):
     residual = calibration.compensator.compensate(before, estimator.predict(X)) - rate
     answered = np.isfinite(residual)
     groups, in_range = calibration.split.labels.astype(str), calibration.in_range
-    noise = noise_within(residual[answered], groups[rows][answered], rules.noise_std_)
+    of_fit = rules.noise_std_ if calibration.writes_model else None
+    noise = noise_within(residual[answered], groups[rows][answered], of_fit)
     errors = (calibration.after - calibration.rate)[in_range]
     model = np.nan
-    if rules.noise_std_ is not None:
+    if of_fit is not None:
         deviation = calibration.rules.predict(X[answered], return_std=True)[1]
         # Of the difference of two squares rounding may leave less than nothing.
-        beyond = np.maximum(deviation**2 - rules.noise_std_**2, 0.0)
+        beyond = np.maximum(deviation**2 - of_fit**2, 0.0)
         model = float(np.sqrt(np.mean(beyond)))
     scatter, low, high = scatter_between(errors, groups[in_range])
     return Budget(noise, scatter, low, high, model)
@@ -187,32 +214,46 @@ def scatter_between(errors, groups):
 
 
 class Proven(NamedTuple):
-    """What is proven over a box.
+    """What is proven over a box, of what the rules give [deg/s].
 
-    ``found`` are :class:`~skanfis.bounds.Bounds` of what the rules give [deg/s]; no compensation in
-    the box exceeds ``largest`` in size, and ``attained`` is the largest size that was met, and the
-    inputs where it was. ``rate_rises`` is whether the compensated rate is proven to go with the
-    output, in the sense of the scale factor; None where the output is no input, or a law beside the
-    rules is not bounded.
+    It lies between ``limits``; ``met`` is the largest size that was met, and the inputs where it
+    was. ``rate_rises`` is whether the compensated rate is proven to go with the output, in the
+    sense of the scale factor; None where the output is no input, or what is beside the rules is not
+    bounded. ``box`` is by ``names``.
     """
 
-    found: Any
-    largest: float
-    attained: tuple
+    limits: np.ndarray
+    met: tuple
     rate_rises: bool | None
+    names: tuple
+    box: np.ndarray
+
+    @property
+    def largest(self):
+        """No compensation in the box exceeds it in size."""
+        return float(np.abs(self.limits).max())
 
 
 def proven_bounds(calibration):
     """Bounds over the box of the recipe, other inputs in the range of the calibration."""
-    recipe, own = calibration.recipe, 1.0 / calibration.compensator.scale_factor
-    box = {name: (low, high) for name, low, high in recipe.box} or None
-    found = bounds(calibration.rules, box, max_boxes=_MOST_BOXES)
-    sizes = [float(abs(found.lowest[0])), float(abs(found.highest[0]))]
-    side = int(np.argmax(sizes))
-    attained = sizes[side], (found.at_lowest[0], found.at_highest[0])[side]
-    rises = None
-    if not recipe.physics and "output" in recipe.inputs:
+    recipe, compensator = calibration.recipe, calibration.compensator
+    own, given = 1.0 / compensator.scale_factor, {name: ends for name, *ends in recipe.box} or None
+    rules, rises = compensator.estimator, None
+    if isinstance(rules, FrozenPolynomial):
+        X = calibration.X
+        box = np.array([(given or {}).get(name, [X[name].min(), X[name].max()]) for name in X])
+        rows = X.to_numpy()[((box[:, 0] <= X) & (box[:, 1] >= X)).all(axis=1)]
+        sizes = np.abs(rules.predict(rows))
+        met = max(zip(sizes, rows, strict=True), key=itemgetter(0), default=(np.nan, None))
+        return Proven(rules.bounds(box), met, None, recipe.inputs, box)
+    rules = getattr(rules, "residual_", rules)
+    rules = rules.model if isinstance(rules, FrozenRules) else rules
+    found = bounds(rules, given, max_boxes=_MOST_BOXES)
+    ends = (found.lowest[0], found.at_lowest[0]), (found.highest[0], found.at_highest[0])
+    size, place = max(((abs(value), at) for value, at in ends), key=itemgetter(0))
+    if compensator.predicts == "error" and "output" in recipe.inputs:
         # rate = output / factor - error: its slope has the factor's sign where the error's is less.
-        slope = gradient_bounds(calibration.rules, "output", box, max_boxes=_MOST_BOXES)
+        slope = gradient_bounds(rules, "output", given, max_boxes=_MOST_BOXES)
         rises = bool(np.all(slope.upper[0] < own if own > 0.0 else slope.lower[0] > own))
-    return Proven(found, float(found.magnitude[0]), attained, rises)
+    limits = np.array([found.lower[0], found.upper[0]])
+    return Proven(limits, (float(size), place), rises, found.input_names, found.box)

@@ -110,9 +110,9 @@ def make_law(inputs, degree, outside):
     )
 
 
-def make_law_and_line(inputs):
+def make_law_and_line(inputs, outside="linear"):
     """The law and a straight line in all inputs, in turns, as a single rule beside it is fitted."""
-    law = make_law(inputs, 1, "linear")
+    law = make_law(inputs, 1, outside)
     return ResidualRegressor(law, make_polynomial(1), n_rounds=_ROUNDS)
 
 

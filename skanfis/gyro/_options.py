@@ -15,6 +15,7 @@ from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
 from ._guess import Request, checked_request
+from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
 from .errors import UsageError, shortened
@@ -27,6 +28,19 @@ _SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
 _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
 _AT_LEAST = ("reduction_factor",)  # of this more is better
 
+_TARGET = re.compile(
+    r"(rate-)?table(:(float|double|q31|q15))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
+)
+
+_OF_TARGETS = (
+    "also a simple target, where it is good enough: in C table[:TYPE] over temperature, "
+    "rate-table[:TYPE] over output too (float, double, q31, q15); parameters of one AXIS of a "
+    "gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] or ardupilot:AXIS[:INSTANCE]"
+)
+_OF_OUTSIDE = (
+    "beyond the range of the calibration, where rows are flagged: hold the edge (clip), go on "
+    "along the tangent for a while (linear, default; a cubic is held), or give none (nan)"
+)
 _WHAT = """\
 Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
 what is known on board, its output, its temperature and how fast that changes, and the time since
@@ -45,6 +59,7 @@ examples:
 exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
+  5  a target was refused; all else is written
 """
 
 
@@ -82,11 +97,7 @@ def make_parser():
     told = "fit the arcsine law of open-loop fiber-optic gyros first; rules learn what it leaves"
     add("--physics", told, action="store_true")
     group = parser.add_argument_group("where it holds, and how it is checked")
-    told = (
-        "beyond the range of the calibration, where rows are flagged: hold the value at its edge "
-        "(clip), go on along the tangent for a while (linear, default), or give no rate (nan)"
-    )
-    add("--outside", told, choices=("clip", "linear", "nan"), default=Recipe.outside)
+    add("--outside", _OF_OUTSIDE, choices=("clip", "linear", "nan"), default=Recipe.outside)
     told = "where the report proves how large the compensation can be"
     add("--box", told, type=parse_box, metavar="INPUT=LOW:HIGH", **several)
     add("--groups", "what to hold out", choices=KINDS, default="auto")
@@ -95,24 +106,32 @@ def make_parser():
     add("--operator", "who made the calibration", default="")
     told = "of the specification, as in residual_rms=0.01deg/s (at most), reduction_factor=10"
     add("--limits", f"{told} (at least)", type=parse_limit, metavar="FIGURE=VALUE", **several)
+    add("--pdf", "also write it as report.pdf", action="store_true")
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
+    add("--trust", "of a .joblib, which runs the code in it: trust its maker", action="store_true")
     told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
+    told = "what is recommended (default), or another: the rules of the model, or what is simpler"
+    add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
     told = "with --c: hold what the rules give between the proven limits"
     add("--saturate", told, action="store_true")
+    add("--target", _OF_TARGETS, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
     return parser
 
 
-def request_of(options, require):
-    """What the options ask of a reading; UsageError where they name an unknown part or unit."""
+def request_of(options, require, assumed=None):
+    """What the options ask of a reading; UsageError where they name an unknown part or unit.
+
+    ``assumed`` are units of columns that name none; None leaves them to the values.
+    """
     columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
     try:
-        return checked_request(Request(columns, units, tuple(require), guess=True))
+        return checked_request(Request(columns, units, tuple(require), True, assumed))
     except ValueError as error:
         raise UsageError(str(error)) from error
 
@@ -132,6 +151,16 @@ def check_once(option, names):
     for name in names:
         if names.count(name) > 1:
             raise UsageError(f"{option}: {name} is given twice.")
+
+
+def _target(text):
+    if not _TARGET.fullmatch(text):
+        raise ArgumentTypeError(
+            f"{shortened(text)} must be table:TYPE or rate-table:TYPE (float, double, q31, q15), "
+            "px4:AXIS:INSTANCE:DEVICE_ID (x, y or z; 0 to 3) or ardupilot:AXIS:INSTANCE (1 to 3); "
+            "all but the axis may be left out"
+        )
+    return text
 
 
 def _scale_factor(text):

@@ -164,8 +164,8 @@ class Results:
         lines = self.merit.set_index("figure")
         return [check_limit(limit, lines) for limit in self.options.limits]
 
-    def pictures(self):
-        """The pictures of the held-out rows that have a sense on this log."""
+    def pictures(self, only=tuple(_PICTURES), besides=()):
+        """The pictures of the held-out rows that have a sense on this log, of those asked for."""
         heat, change = {"temperature": self.temperature}, self.temperature_rate
         label = "temperature [degC]"
         found = {
@@ -183,7 +183,7 @@ class Results:
         if isinstance(self.of_allan, dict):
             found["allan-deviation"] = self.of_allan
         for subject, (kind, caption) in _PICTURES.items():
-            if subject not in found:
+            if subject not in found or subject not in only or subject in besides:
                 continue
             options = dict(found[subject])
             rows = options.pop("rows", slice(None))

@@ -1,23 +1,28 @@
-"""The table in a file, text or Parquet: its header, its rows in pieces, and columns as numbers."""
+"""The table in a file: its header, its rows in pieces, and columns as numbers."""
 
 import codecs
 import contextlib
 import csv
 import re
+from functools import partial
 from itertools import islice
 
 import numpy as np
 import pandas as pd
 
+from ._columns import unit_in
+from ._tables import EXCEL, MATLAB, excel_source, matlab_source
 from .errors import LogError
 
 # What loggers write where there is no value, beside what pandas knows.
 NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 
-_LONGEST_FIELD = 2**31 - 1  # the largest limit that the module csv takes on every system
+# Longer is no log, but would take minutes to be found to be none.
+_LONGEST_LINE, _MOST_COLUMNS = 2**22, 10_000
 _HEAD_BYTES = 2**16
 # Lines above the header that a logger may write, and a few rows.
 _HEAD_RECORDS = 60
+_END_OF_PREAMBLE = "***End_of_Header***"
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars"}
 _NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
 # A number or a moment, in full; a number with a fraction.
@@ -36,13 +41,22 @@ _FORMATS = [
 ]
 _CLOCK_ROWS = 200  # by which the form of a clock is told
 _EPOCH = pd.Timestamp(0, tz="UTC")
-_DAY = 86_400.0  # s
+_DAY, _HOUR = 86_400.0, 3_600.0  # s
 
 
-def open_source(path):
-    """The table in a file; LogError where there is none."""
-    is_parquet = str(path).lower().endswith((".parquet", ".pq"))
-    return _ParquetSource(path) if is_parquet else _TextSource(path)
+def open_source(path, *, head_only=False):
+    """The table in a file; LogError where there is none, as far as its head tells if asked so."""
+    name = str(path).lower()
+    if name.endswith((".parquet", ".pq")):
+        return _ParquetSource(path)
+    if name.endswith((*MATLAB, *EXCEL)):
+        if head_only:
+            return None
+        return excel_source(path, header_place) if name.endswith(EXCEL) else matlab_source(path)
+    source = _TextSource(path)
+    if not head_only:
+        source.check_lengths()
+    return source
 
 
 class _TextSource:
@@ -63,7 +77,6 @@ class _TextSource:
             raise LogError(f"{path}: is empty.")
         self._place_header(head)
         self.decimal = self._find_decimal(head)
-        self._check_lengths()
 
     def _find_separator(self):
         """The first sign that is on all lines, those of a preamble aside; else a comma."""
@@ -84,23 +97,19 @@ class _TextSource:
         return ","
 
     def _place_header(self, head):
-        """Find the header: the last line before the first of numbers."""
-        rows = [values for _, values in head]
-        first = next((k for k, values in enumerate(rows) if _is_data(values)), 1)
-        if first == 0:
-            raise LogError(
-                f"{self.path}, line {head[0][0]}: has numbers where the names of the columns are "
-                "due; give the file a header."
-            )
-        n_fields = len(rows[first]) if first < len(rows) else len(rows[0])
-        place = max((k for k in range(first) if len(rows[k]) == n_fields), default=0)
-        self._n_above = place + 1
-        self._n_lines = head[place + 1][0] - 1 if place + 1 < len(head) else None
-        self.header = rows[place]
+        """Find the header, and where the rows begin."""
+        try:
+            place, first, self.header = header_place([values for _, values in head])
+        except LogError as error:
+            raise LogError(f"{self.path}, line {head[0][0]}: {error}") from error
+        self._n_above = first
+        self._n_lines = head[first][0] - 1 if first < len(head) else None
         if place:
-            self.notes.append(f"the header is line {head[place][0]}")
+            self.notes.append(
+                f"the header is line {head[place][0]}; {place} lines above it are passed over"
+            )
 
-    def _check_lengths(self):
+    def check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut without a word."""
         n_columns = len(self.header)
         for line, values in islice(self._records(), self._n_above, None):
@@ -115,21 +124,38 @@ class _TextSource:
 
         LogError where the file is no such table.
         """
-        limit = csv.field_size_limit(_LONGEST_FIELD)
+        limit = csv.field_size_limit(_LONGEST_LINE)
         line = 1
         try:
             with open(self.path, encoding=self._encoding, newline="") as file:
-                reader = csv.reader(file, delimiter=self._separator, skipinitialspace=True)
+                lines = self._lines(file)
+                reader = csv.reader(lines, delimiter=self._separator, skipinitialspace=True)
                 for values in reader:
+                    if len(values) > _MOST_COLUMNS:
+                        raise LogError(
+                            f"{self.path}, line {line}: has {len(values):,} columns; a log has "
+                            f"{_MOST_COLUMNS:,} at most."
+                        )
                     if len(values) > 1 or "".join(values).strip():
                         yield line, values
                     line = reader.line_num + 1
+        except LogError:
+            raise
         except UnicodeError as error:
             raise _no_text(self.path) from error
         except (csv.Error, ValueError) as error:
             raise LogError(f"{self.path}, line {line}: is no table: {error}.") from error
         finally:
             csv.field_size_limit(limit)
+
+    def _lines(self, file):
+        for number, line in enumerate(iter(partial(file.readline, _LONGEST_LINE), ""), 1):
+            if len(line) == _LONGEST_LINE:
+                raise LogError(
+                    f"{self.path}, line {number}: is longer than {_LONGEST_LINE:,} signs; that is "
+                    "no log."
+                )
+            yield line
 
     def place_of(self, row):
         """In words, on which line of the file, from 1, a row starts."""
@@ -212,6 +238,45 @@ class _ParquetSource:
             raise self._damaged(error) from error
 
 
+def header_place(rows):
+    """Places of the header and of the first row below it, among the first rows; the names.
+
+    The header is the last line before those of numbers. Units may have a line of their own.
+    """
+    # LabVIEW's own end of a preamble, which has lines of numbers.
+    ends = [k for k, values in enumerate(rows) if values[0].strip() == _END_OF_PREAMBLE]
+    start = ends[-1] + 1 if ends else 0
+    data = [k >= start and _is_data(values) for k, values in enumerate(rows)]
+    if not any(data) and len(rows) == _HEAD_RECORDS:
+        raise LogError(f"has no row of numbers in its first {len(rows)} lines.")
+    # A line of the preamble may hold numbers too, but no three such lines in a row.
+    together = [
+        k
+        for k in range(len(rows))
+        if all(data[k : k + 3]) and len({len(values) for values in rows[k : k + 3]}) == 1
+    ]
+    first = next(iter(together), data.index(True) if any(data) else start + 1)
+    if first == 0:
+        raise LogError(
+            "has numbers where the names of the columns are due; give the file a header."
+        )
+    n_fields = len(rows[first]) if first < len(rows) else len(rows[start])
+    fits = [k for k in range(start, first) if len(rows[k]) == n_fields]
+    place = fits[-1] if fits else start
+    names = rows[place]
+    units = [unit_in(cell.strip(" []()")) for cell in names]
+    if len(fits) > 1 and sum(map(bool, units)) > 1 and all(
+        unit or not cell.strip(" []()-") for unit, cell in zip(units, names, strict=True)
+    ):  # fmt: skip
+        above, place = rows[fits[-2]], fits[-2]
+        told = [cell.strip(" []()-") for cell in names]
+        names = [
+            f"{name} [{unit}]" if unit else name for name, unit in zip(above, told, strict=True)
+        ]
+        return place, fits[-1] + 1, names
+    return place, place + 1, names
+
+
 def _find_encoding(path):
     with open(path, "rb") as file:
         head = file.read(_HEAD_BYTES)
@@ -261,19 +326,33 @@ class Clock:
         fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
         best = max(_FORMATS, key=lambda form: fits[form])
         self.form = best if 2 * fits[best] > len(texts) else ""
-        self._days, self._last = 0.0, None
+        self._ends, self._added, self.notes = None, 0.0, []
 
     def seconds(self, column):
         """Seconds since 1970, or since the midnight before the first row; NaN for no time."""
         seconds = _moments(_texts(column), self.form)
         known = np.flatnonzero(np.isfinite(seconds))
-        if self.form == _CLOCK and known.size:
-            values = seconds[known]
-            last = values[0] if self._last is None else self._last
-            days = self._days + np.cumsum(np.diff(values, prepend=last) < -0.5 * _DAY)
-            self._days, self._last = float(days[-1]), float(values[-1])
-            seconds[known] += _DAY * days
+        if known.size:
+            seconds[known] = self._going_on(seconds[known], column.iloc[known])
         return seconds
+
+    def _going_on(self, values, texts):
+        """Times that go on past midnight, and where the clock was put one hour back."""
+        first, last = self._ends or (values[0], values[0])
+        steps = np.diff(values, prepend=last)
+        added = self._added + _DAY * np.cumsum((steps < -0.5 * _DAY) & (self.form == _CLOCK))
+        usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else np.inf
+        back = (steps < 0.0) & (np.abs(steps + _HOUR - usual) <= 3.0 * usual)
+        # An hour back to where all began is a clock that was set anew.
+        back &= values + added > first + usual
+        for row in np.flatnonzero(back):
+            self.notes.append(
+                f"the clock goes one hour back at {texts.iloc[row]!s}: daylight saving; the time "
+                "goes on"
+            )
+        added += _HOUR * np.cumsum(back)
+        self._ends, self._added = (first, values[-1]), float(added[-1])
+        return values + added
 
 
 def _moments(texts, form):

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from sklearn.model_selection import GroupKFold
 
 from ._columns import check_column, check_number, label_texts
 from .errors import LogError
@@ -257,13 +256,8 @@ def _fold_numbers(part, groups, n_parts):
         return groups % (_N_LEVEL_FOLDS_BESIDE if n_parts > 1 else _N_FOLDS)
     if part == "piece":
         return cut_legs(groups)
-    n_folds = min(_N_FOLDS, np.unique(groups).size)
-    if part == "leg":
-        return groups % n_folds
-    numbers = np.empty_like(groups)
-    for place, (_, test) in enumerate(GroupKFold(n_folds).split(groups, groups=groups)):
-        numbers[test] = place
-    return numbers
+    # In their order, whatever their sizes: a row more or less moves no group to another fold.
+    return groups % min(_N_FOLDS, np.unique(groups).size)
 
 
 def _labels(log, part, groups):
@@ -274,8 +268,15 @@ def _labels(log, part, groups):
         levels = log["rate"].abs().groupby(groups).median()
         names = [f"|{level:.4g}| °/s" for level in levels]
     else:
+        legs = groups
+        if part == "piece":
+            groups = np.unique(legs * _N_FOLDS + _pieces(legs), return_inverse=True)[1]
         ends = log["temperature"].groupby(groups).agg(["first", "last"]).to_numpy()
-        names = [f"{leg}: {a:.0f} to {b:.0f} °C" for leg, (a, b) in enumerate(ends, start=1)]
+        number = [f"{leg}" for leg in np.unique(legs) + 1]
+        if part == "piece":
+            pairs = np.unique(np.column_stack([legs, _pieces(legs)]), axis=0) + 1
+            number = [f"{leg}.{piece}" for leg, piece in pairs]
+        names = [f"{no}: {a:.0f} to {b:.0f} °C" for no, (a, b) in zip(number, ends, strict=True)]
     return np.array(names, dtype=object)[groups]
 
 
@@ -320,6 +321,10 @@ def cut_legs(legs):
     With a piece of a leg that warms goes one at another temperature of the next, which cools: the
     model has seen each temperature one way.
     """
+    return (_pieces(legs) + 2 * legs) % _N_FOLDS
+
+
+def _pieces(legs):
+    """Number of each row's piece of its leg."""
     by_leg = pd.Series(legs).groupby(legs)
-    pieces = by_leg.cumcount() * _N_FOLDS // by_leg.transform("size")
-    return ((pieces + 2 * legs) % _N_FOLDS).to_numpy()
+    return (by_leg.cumcount() * _N_FOLDS // by_leg.transform("size")).to_numpy()

@@ -6,6 +6,7 @@ heap, no state, the status word.
 """
 
 import warnings
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from os import PathLike
@@ -15,7 +16,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..exceptions import OutOfBoundsWarning
-from ..export.c import CCode
+from ..export.c import CCode, export_c
 from ..export.c.builder import RulesPart, cost_lines, header_of, input_lines, policy_line
 from ..export.c.dialect import (
     LONGEST_NAME,
@@ -23,15 +24,32 @@ from ..export.c.dialect import (
     Dialect,
     check_arguments,
     index_type,
+    remark,
     write_files,
 )
 from ..export.c.self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ..export.c.templates import FINITE_INPUT, rejection
+from ..export.folding import found_by_search
 from ..policies import SILENT
-from .compose import law_and_rules
+from ._frozen import FrozenPolynomial
+from .c_polynomial import export_c_polynomial
+from .compose import FrozenRules, ResidualRegressor, law_and_rules
 from .physics import past_phase
 
 _SUFFIX = "_r"
+SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
+_TAKE = "y[0] is the compensated rate: take it in the place of the raw rate."
+
+# Of inputs of a compensator: units, and how they are made.
+_UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
+_NOTES = {
+    "time": "time is that since power-on: zero at the first sample.",
+    "temperature": "temperature is that of the thermometer that was logged in the calibration.",
+    "temperature_rate": "temperature_rate is low-passed, with a time constant of $lag s. At "
+    "power-on: temperature_rate = 0, previous = temperature. At every sample after that, h [s] "
+    "after the one before: temperature_rate += (1 - exp(-h / $lag)) * ((temperature - previous) / "
+    "h - temperature_rate); then previous = temperature.",
+}
 
 _POLYNOMIAL = """
 static $real $name_polynomial(const $real *c, int n, $real t)
@@ -88,7 +106,7 @@ $within    rate = (sign < 0 ? -phase : phase) / sagnac - $name_polynomial($name_
         z[i] = x[$name_rules_input[i]];
     }
     status |= $rules_predict(z, left);
-    if (status & $NAME_NO_OUTPUT) {
+    if ((status & $NAME_NO_OUTPUT) != 0) {
         return $NAME_REJECT(y, status);
     }
     rate += left[0];
@@ -121,6 +139,8 @@ def export_c_physics(
     std: str = "c99",
     min_coverage: float | None = 0.1,
     saturate: Any = None,
+    units: Mapping[str, str] | None = None,
+    notes: Sequence[str] = (),
 ) -> CCode:
     """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
 
@@ -138,6 +158,8 @@ def export_c_physics(
         As of :func:`skanfis.export.export_c`; ``name`` has at most 14 characters.
     saturate : Bounds or array-like of shape (1, 2), default=None
         Limits between which what the rules add to the law is held. None holds nothing.
+    units, notes
+        As of :func:`skanfis.export.export_c`; the output is called "rate".
 
     Returns
     -------
@@ -188,9 +210,53 @@ def export_c_physics(
         ]
     )
     price = _cost(whole)
-    written = CCode(name, _header(whole, dialect, price), code, price)
+    written = CCode(name, _header(whole, dialect, price, units, notes), code, price)
     write_files(written, path)
     return written
+
+
+def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
+    """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
+    if saturate is not None:
+        # A constant's limits are the same: a hair is between them.
+        saturate = (saturate + [-1e-12, 1e-12] * (1.0 + np.abs(saturate)))[None]
+    found, units = found_by_search(compensator.estimator), units_of(compensator)
+    export: Any = export_c_physics
+    if isinstance(found, FrozenPolynomial):
+        export = export_c_polynomial
+    elif not isinstance(found, ResidualRegressor):
+        export, found = export_c, FrozenRules.of(found, len(compensator.inputs)).model
+        units[found.output_names[0]] = "deg/s"
+    assumed = [f"Unit assumed: {text}" for text in compensator.assumed.values()]
+    return export(
+        found,
+        path,
+        std=std,
+        min_coverage=compensator.min_coverage,
+        saturate=saturate,
+        units=units,
+        notes=notes_on(compensator) + assumed,
+    )
+
+
+def notes_on(compensator):
+    """What to do with the output, and how inputs are made, as sentences."""
+    use = SUBTRACT if compensator.predicts == "error" else _TAKE
+    notes = [f"{use} {raw_rate_of(compensator)}"]
+    notes += [note for name, note in _NOTES.items() if name in compensator.inputs]
+    return [note.replace("$lag", f"{compensator.time_constant:g}") for note in notes]
+
+
+def units_of(compensator):
+    """Units of the inputs of a compensator, and of the rate."""
+    return _UNITS | {"output": compensator.output_unit, "rate": "deg/s"}
+
+
+def raw_rate_of(compensator):
+    """What the raw rate is, as a sentence."""
+    factor = compensator.scale_factor
+    divided = "" if factor == 1.0 else f" divided by {factor:.9g}"
+    return f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."
 
 
 class _Composition:
@@ -277,16 +343,18 @@ def _law_source(dialect, whole, silent):
     return "".join(parts)
 
 
-def _header(whole, dialect, price):
+def _header(whole, dialect, price, units, notes):
     law, part, model = whole.law, whole.part, whole.rules.model
+    units, (low, high) = units or {}, whole.box
     lines = [
+        *map(remark, notes),
         f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
         f"{model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(price, "an arcsine, "),
         "",
-        *input_lines(whole.names, *whole.box),
+        *input_lines(whole.names, low, high, units),
         "Outputs y:",
-        "  [0] rate, in the unit of the training data",
+        f"  [0] rate, in {units.get('rate', 'the unit of the training data')}",
         "",
         f"Beyond a phase of {law.max_phase:g} rad {past_phase(law.out_of_bounds, 'output')}.",
         policy_line(model, "Of the rules alone: outside their range"),

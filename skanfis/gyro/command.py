@@ -5,17 +5,20 @@ It writes files all together or not at all. ``--apply`` compensates logs piece b
 
 import contextlib
 import os
+import platform
 import shlex
+import shutil
+import signal
 import sys
 import tempfile
 import time
 from datetime import datetime
 from pathlib import Path
 
+import joblib
 import numpy as np
 import pandas as pd
 
-from ..export import export_c
 from ..export.c.dialect import STATUS
 from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
@@ -24,20 +27,25 @@ from ._columns import SIGNALS
 from ._formulas import rules_text
 from ._headline import errors_and_verdict, proven_bounds
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
+from ._source import open_source
 from ._split import choose_split
-from .c_code import export_c_physics
+from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator, features
 from .errors import ExistsError, LogError, UsageError
-from .html_report import check_installed, report_page
+from .html_report import check_installed, report_page, write_pdf
 from .log import LogFile, RunFinder, digests_of, find_logs, read
+from .targets.write import FILES, write_targets
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
+INCOMPLETE = 5  # a target was refused; all else is written
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 _FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
 _ON_BOARD = ["time", "temperature", "output", "run"]
-_MOST_ROWS = 1_000_000  # that are held
+_MOST_ROWS = 200_000  # that are held
+_PICKLES = (".joblib", ".pkl", ".pickle")
+_STAGED = f".skanfis-{platform.node()}-"  # of folders that hold files until all are written
 
 
 def main(arguments=None):
@@ -47,8 +55,11 @@ def main(arguments=None):
     options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
     tell = _progress(options.quiet)
     try:
-        (_apply if options.apply else _calibrate)(options, tell)
-        return DONE
+        if arguments is None:
+            # Also where the package has set it aside, see skanfis/__init__.py.
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, signal.default_int_handler)
+        return (_apply if options.apply else _calibrate)(options, tell)
     except UsageError as error:
         parser.error(printable(error))  # exits
     except LogError as error:
@@ -75,25 +86,37 @@ def _calibrate(options, tell):
         )
         tell("drawing the report")
         _write(calibration, options, reading.digests, written)
+        targets = list(write_targets(calibration, options.target, written))
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(_summary(calibration, folder, reading.notes))
+    _say(
+        f"{'target' if is_written else 'REFUSED':14} {name}: {told}"
+        for name, told, is_written in targets
+    )
     tell("done, but see the warnings" if calibration.cautions() else "done")
+    return DONE if all(done for *_, done in targets) else INCOMPLETE
 
 
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     check_once("--inputs", options.inputs or ())
     check_once("--box", [name for name, *_ in options.box])
+    targets = [text.partition(":")[0] for text in options.target]
+    check_once("--target", targets)
     if options.saturate and not options.c:
         raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    names = (*_FILES, *(_C_FILES if options.c else ()))
-    _refuse_existing([folder / name for name in names], options.force)
-    check_installed()
+    names = [*_FILES, *(_C_FILES if options.c else ()), *(["report.pdf"] if options.pdf else [])]
+    names += [name for target in targets for name in FILES[target]]
+    _refuse_existing([folder / name for name in names], options.force, paths)
+    with contextlib.suppress(OSError):
+        # What is no log at all is refused before libraries load.
+        open_source(paths[0], head_only=True)
+    check_installed(options.pdf)
     return folder, paths
 
 
@@ -103,6 +126,8 @@ def _read(options, paths, tell):
     if {"time", "temperature_rate"} & set(options.inputs or ()):
         required.append("time")
     reading = read(paths, request_of(options, required), tell=tell, most_rows=_MOST_ROWS)
+    if reading.assumed:
+        reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
     for note in reading.notes:
         tell(f"note: {note}")
     numbers = {"row": reading.n_rows}
@@ -163,10 +188,13 @@ def _recipe(options, reading, at_rest):
         inputs=inputs,
         output_unit=unit if unit in SIGNALS else "deg/s",
         scale_factor=options.scale_factor or 1.0,
+        write=options.write,
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
         box=tuple(options.box),
+        units=reading.units,
+        assumed=reading.assumed,
     )
 
 
@@ -193,16 +221,16 @@ def _write(calibration, options, files, folder):
     page = report_page(calibration, printable(f"{files[0][0]}{more}"), told)
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")
+    if options.pdf:
+        write_pdf(page, folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
-        export = export_c_physics if calibration.recipe.physics else export_c
-        export(
-            compensator.estimator,
+        export_c_compensator(
+            compensator,
             folder / "compensator",
             std=options.c,
-            min_coverage=compensator.min_coverage,
-            saturate=proven_bounds(calibration).found if options.saturate else None,
+            saturate=proven_bounds(calibration).limits if options.saturate else None,
         )
 
 
@@ -223,15 +251,15 @@ def _apply(options, tell):
     if len(paths) > 1 and options.output is None:
         raise UsageError("--apply to several logs needs --output.")
     target = options.output or Path(f"{Path(paths[0]).stem}-compensated.csv")
-    _refuse_existing([target], options.force)
-    try:
-        compensator = GyroCompensator.read_json(options.apply)
-    except ValueError as error:
-        raise UsageError(str(error)) from error
+    _refuse_existing([target], options.force, [*paths, options.apply])
+    compensator = _compensator_of(options)
     needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
     if "temperature_rate" in compensator.inputs:
         needed |= {"time", "temperature"}
-    request = request_of(options, sorted(needed))
+    units = dict(compensator.units)
+    if units.get("output") in SIGNALS and "output" not in compensator.assumed:
+        del units["output"]  # which is asked for again
+    request = request_of(options, sorted(needed), units)
     digests_of(paths)
     tallies: list = []
     with _staged(target.parent) as folder:
@@ -249,6 +277,26 @@ def _apply(options, tell):
         tell(f"writing {target}")
     _say(_summary_of_rates(target, tallies))
     tell("done")
+    return DONE
+
+
+def _compensator_of(options):
+    """The compensator that the options name; of a .joblib it is said what reading it means."""
+    path = options.apply
+    if not path.endswith(_PICKLES):
+        if options.trust:
+            raise UsageError(f"--trust is for a model of {', '.join(_PICKLES)}; JSON needs none.")
+        try:
+            return GyroCompensator.read_json(path)
+        except ValueError as error:
+            raise UsageError(str(error)) from error
+    _write_to(sys.stderr, f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
+    if not options.trust:
+        raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
+    found = joblib.load(path)
+    if not isinstance(found, GyroCompensator):
+        raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
+    return found
 
 
 def _compensated(file, compensator, stem, tell):
@@ -268,7 +316,8 @@ def _compensated(file, compensator, stem, tell):
             labels = labels.map(lambda number: stem if number in "1" else f"{stem} / {number}")
         log["run"] = labels.to_numpy()[log["run"]]
         yield log if any(labels) else log.drop(columns="run"), compensated
-    for note in [*file.notes, *filter(None, [finder.note])]:
+    assumed = [f"units as in the calibration: {text}" for text in file.layout.assumed.values()]
+    for note in [*file.notes, *assumed, *filter(None, [finder.note])]:
         tell(f"note: {note}")
     tell(f"{file.n_rows:,} rows")
 
@@ -358,12 +407,30 @@ def _write_to(stream, text):
     stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
 
 
-def _refuse_existing(paths, force):
+def _refuse_existing(paths, force, read=()):
+    """Refuse to replace files, and with ``force`` those that are ``read``."""
     for path in paths:
+        if any(path.resolve() == Path(other).resolve() for other in read):
+            raise ExistsError(
+                f"{path} is what is read; --force does not replace it: choose another --output."
+            )
         if path.is_dir():
             raise ExistsError(f"{path} is a folder: choose another --output.")
         if path.exists() and not force:
             raise ExistsError(f"{path} exists already: choose another --output, or --force.")
+
+
+def _clean(folder):
+    """Remove what runs on this machine that were killed have left."""
+    for path in folder.glob(f"{_STAGED}*-*"):
+        owner = path.name.removeprefix(_STAGED).partition("-")[0]
+        try:
+            if os.name == "posix":
+                os.kill(int(owner), 0)  # asks, and sends nothing
+        except (ProcessLookupError, ValueError, OverflowError):
+            shutil.rmtree(path, ignore_errors=True)
+        except OSError:
+            pass  # it runs, by another user
 
 
 @contextlib.contextmanager
@@ -375,7 +442,8 @@ def _staged(folder):
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".skanfis-", dir=folder) as name:
+        _clean(folder)
+        with tempfile.TemporaryDirectory(prefix=f"{_STAGED}{os.getpid()}-", dir=folder) as name:
             yield Path(name)
             for path in sorted(Path(name).iterdir()):
                 os.replace(path, folder / path.name)

@@ -2,7 +2,8 @@
 
 import json
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from math import comb
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -16,7 +17,8 @@ from ..export.c.dialect import STATUS
 from ..export.folding import found_by_search
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
-from ._columns import ask
+from ._columns import ask, declared_units
+from ._frozen import FrozenPolynomial
 from .compose import FrozenRules, ResidualRegressor, joined, law_and_rules
 from .features import ThermalRate
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
@@ -24,11 +26,15 @@ from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, c
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
-_KEYS = ("inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage")
+_KEYS = (
+    "inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage", "units",
+    "assumed",
+)  # fmt: skip
 # Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
 _NUMBERS = ("offset", "thermometer_lag", "reference_temperature")
 _RANGE = ("minimum", "maximum")
+_OF_POLYNOMIAL = ("center", "scale", "coefficients")
 _PARAMETERS = ("max_phase", "out_of_bounds")
 # As of a model alone: see skanfis.export.model_json.
 _MOST_BYTES = 2**24
@@ -60,6 +66,11 @@ class GyroCompensator:
         Time constant of "temperature_rate" [s].
     min_coverage : float, default=0.1
         Rows that the training data cover less are flagged.
+    units : dict of str to str, default={}
+        Units of the calibration's files by part, such as {"temperature": "degF"}: for columns of
+        other files that name none.
+    assumed : dict of str to str, default={}
+        Sentences by part on those of these units that neither a name nor an option told.
 
     Examples
     --------
@@ -82,6 +93,8 @@ class GyroCompensator:
     output_unit: str = "deg/s"
     time_constant: float = 60.0
     min_coverage: float = 0.1
+    units: dict[str, str] = field(default_factory=dict)
+    assumed: dict[str, str] = field(default_factory=dict)
 
     def features(self, log: pd.DataFrame) -> pd.DataFrame:
         """The estimator's inputs.
@@ -181,12 +194,15 @@ class GyroCompensator:
         Raises
         ------
         ValueError, TypeError
-            If the estimator is neither an ANFIS behind scalers nor a :class:`ResidualRegressor` of
-            the arcsine law and such, or a number is beyond what :meth:`read_json` takes.
+            If the estimator is neither an ANFIS behind scalers, nor a :class:`ResidualRegressor` of
+            the arcsine law and such, nor one of the simple compensations that the command writes;
+            or a number is beyond what :meth:`read_json` takes.
         OSError
             If the file cannot be written.
         """
-        found, law = found_by_search(self.estimator), None
+        found, law, polynomial = found_by_search(self.estimator), None, None
+        if isinstance(found, FrozenPolynomial):
+            polynomial = {key: getattr(found, key).tolist() for key in _OF_POLYNOMIAL}
         if isinstance(found, ResidualRegressor):
             fitted, rules = law_and_rules(found)
             law = _law_document(fitted, self.inputs)
@@ -197,6 +213,7 @@ class GyroCompensator:
             "version": _VERSION,
             **{key: getattr(self, key) for key in _KEYS},
             "law": law,
+            "polynomial": polynomial,
             "columns": [self.inputs[j] for j in rules.positions],
             "model": json.loads(export_json(rules.model)),
         }
@@ -257,7 +274,7 @@ def _settings(document):
         raise ValueError(f'its "format" is not "{_FORMAT}"')
     if document.get("version") != _VERSION:
         raise ValueError(f"its version is {document.get('version')!r}, this reads {_VERSION}")
-    if set(document) != {"format", "version", "law", "columns", "model", *_KEYS}:
+    if set(document) != {"format", "version", "law", "polynomial", "columns", "model", *_KEYS}:
         raise ValueError(f"its keys are {', '.join(document)}")
     inputs, columns, unit = (document[key] for key in ("inputs", "columns", "output_unit"))
     if not _are_of(inputs, INPUTS):
@@ -271,6 +288,11 @@ def _settings(document):
     }
     if not (isinstance(unit, str) and unit.isprintable() and 0 < len(unit) <= _LONGEST_UNIT):
         raise ValueError(f"output_unit: {shown(unit)} is not the name of a unit")
+    for key in ("units", "assumed"):
+        found = document[key]
+        if not (isinstance(found, dict) and all(isinstance(text, str) for text in found.values())):
+            raise ValueError(f"{key} is {shown(found)}; it must be an object of texts")
+    declared_units(document["units"])
     try:
         model = parse_json(json.dumps(document["model"]))
     except ValueError as error:
@@ -282,6 +304,8 @@ def _settings(document):
     estimator = FrozenRules(model, np.array([inputs.index(name) for name in columns]))
     if document["law"] is not None:
         estimator = joined(_read_law(document["law"], inputs), estimator)
+    if document["polynomial"] is not None:
+        estimator = _read_polynomial(document["polynomial"], estimator, len(inputs))
     settings = {key: document[key] for key in _KEYS} | numbers
     return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
 
@@ -333,17 +357,32 @@ def _read_law(document, inputs):
     return law
 
 
+def _read_polynomial(document, rule, n_inputs):
+    """The polynomial that a file's content describes; ValueError where it is none."""
+    if not isinstance(document, dict) or set(document) != set(_OF_POLYNOMIAL):
+        raise ValueError(f"its polynomial must be an object of {', '.join(_OF_POLYNOMIAL)}")
+    n = n_inputs
+    is_single = isinstance(rule, FrozenRules) and rule.model.n_rules == 1 and not rule.model.order
+    if not is_single or rule.positions.tolist() != list(range(n)):
+        raise ValueError("a polynomial goes with a single rule of order 0 on all inputs, no law")
+    sizes = dict(zip(_OF_POLYNOMIAL, (n, n, comb(n + 3, 3)), strict=True))
+    lists = {k: _list_of_numbers(document[k], k, n, n, "polynomial") for k, n in sizes.items()}
+    for j, value in enumerate(document["scale"]):
+        _divisor(value, f"polynomial.scale[{j}]")
+    return FrozenPolynomial(rule.model, rule.positions, **lists)
+
+
 def _divisor(value, where):
     """A number of either sign that something is divided by."""
     size = number(abs(number(value, where)), f"{where}, in size", SMALLEST_NUMBER)
     return size if value > 0 else -size
 
 
-def _list_of_numbers(values, key, fewest, most):
+def _list_of_numbers(values, key, fewest, most, where="law"):
     if not isinstance(values, list) or not fewest <= len(values) <= most:
         count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-        raise ValueError(f"law.{key}: {shown(values)} must be a list of {count} number(s)")
-    return np.array([number(value, f"law.{key}[{k}]") for k, value in enumerate(values)])
+        raise ValueError(f"{where}.{key}: {shown(values)} must be a list of {count} number(s)")
+    return np.array([number(value, f"{where}.{key}[{k}]") for k, value in enumerate(values)])
 
 
 def _are_of(names, known):

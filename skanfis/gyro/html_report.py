@@ -14,19 +14,59 @@ from .. import __version__
 from ..inspection.labels import printable
 from ..policies import policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
-from ._formulas import formula_of, law_text, on_board, rules_text
-from ._headline import ARTICLES, budget_of, headline, held_out_groups, proven_bounds, readability_of
+from ._formulas import formula_of, law_text, rules_text
+from ._headline import (
+    ARTICLES,
+    budget_of,
+    flagged_text,
+    headline,
+    held_out_groups,
+    proven_bounds,
+    readability_of,
+)
 from ._options import ReportOptions
 from ._results import Results
-from ._simpler import NOTHING, options_for
+from ._simpler import NAMES, NOTHING
+from .c_code import notes_on, units_of
+from .compose import FrozenRules
 from .displays import figures, signs
 from .metrics import rms
 
-_UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
 _BUDGET = (
     "Combined and RMS error are two ways to one figure: where the error is clearly larger, the "
     "rules cannot follow the gyro between the groups, and no part of the budget knows of it."
 )
+# On the first page, with a picture; the others follow.
+_FIRST = (
+    "residual_rms", "residual_peak", "reduction_factor", "bias", "bias_temperature_sensitivity",
+    "hysteresis", "scale_factor_error", "scale_factor_nonlinearity",
+)  # fmt: skip
+_ON_FIRST_PAGE = ("error-by-temperature",)
+_OWN = "none: of indicated less true rate"
+# What the standards call the figures; docs/gyro_metrics.rst says how each is computed.
+_TERMS = {
+    "residual_rms": _OWN,
+    "residual_peak": _OWN,
+    "residual_peak_to_peak": _OWN,
+    "reduction_factor": "none: RMS before over RMS after",
+    "scale_factor_error": "scale factor error (528, 1780)",
+    "scale_factor_nonlinearity": "linearity error, largest (528, 952)",
+    "scale_factor_nonlinearity_rms": "linearity error, RMS (528, 952)",
+    "scale_factor_asymmetry": "asymmetry error (528, 952)",
+    "scale_factor_repeatability": "scale factor repeatability (528, 952, 1780)",
+    "scale_factor_temperature_sensitivity": "scale factor temperature sensitivity (952)",
+    "bias": "bias (528, 952, 1780)",
+    "bias_repeatability": "bias repeatability (528, 952, 1780)",
+    "bias_temperature_sensitivity": "bias temperature sensitivity, D_T (952)",
+    "bias_ramp_sensitivity": "bias temperature ramp sensitivity, D_Tdot (952)",
+    "hysteresis": "hysteresis error (528)",
+    "bias_stability_10s": "none: standard deviation of means over 10 s",
+    "bias_stability_100s": "none: standard deviation of means over 100 s",
+    "angle_random_walk": "angle random walk, N (528, 952)",
+    "bias_instability": "bias instability, B (528, 952)",
+    "allan_minimum": "none: least Allan deviation, 0.664 B",
+    "rate_random_walk": "rate random walk, K (528, 952)",
+}
 _PROOF = "Proven for every point of the box. How far the gyro is from the compensator is not."
 
 
@@ -41,34 +81,49 @@ class Block(NamedTuple):
 def report_page(calibration, title, options=None):
     """The report of a calibration, as the text of an HTML file; ``options`` a ReportOptions."""
     results = Results(calibration, options or ReportOptions())
-    recipe, verdict = calibration.recipe, calibration.verdict
+    recipe, name = calibration.recipe, calibration.written
     what = "Arcsine law and fuzzy rules" if recipe.physics else "Fuzzy rules (ANFIS)"
-    target = "rate" if recipe.physics else "rate error"
-    inputs = ", ".join(map(_words, recipe.inputs))
+    what = what if calibration.writes_model else ARTICLES[name].capitalize()
+    target = "rate" if calibration.compensator.predicts == "rate" else "rate error"
     cautions = calibration.cautions(results.symbol, RATE_UNITS[results.unit])
-    sections = [_identity, _check, _instead, _merit, _pictures, _use, _sure, _rules, _log]
-    kept = verdict.model_is_worth_it and all(check.result == "pass" for check in results.checks)
+    cautions = [f"Warning: {sentence}" for sentence in cautions]
+    if recipe.assumed:
+        cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
+    sections = [_check, _merit, _pictures, _sure, _instead, _rules, _use, _log]
+    kept = calibration.verdict.recommended != NOTHING
+    kept = kept and all(check.result == "pass" for check in results.checks)
     return _template().render(
         title=f"Gyro compensation: {title}",
-        subtitle=f"{what} that predict the gyro's {target} from {inputs}.",
+        subtitle=f"{what}: the gyro's {target} from {', '.join(map(_words, recipe.inputs))}.",
         verdict=headline(calibration, results.unit)[0],
         verdict_kind="good" if kept else "bad",
         reasons=map(signs, _reasons(results)),
-        cautions=[f"Warning: {sentence}" for sentence in cautions],
+        cautions=cautions,
+        first=[_summary(results), _identity(results)],
         sections=[section for make in sections if (section := make(results))],
         footer=f"Made by skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
         f"{np.__version__}, SciPy {scipy.__version__} and Python {platform.python_version()}. "
-        "Figures of merit in the terms of IEEE Std 952.",
+        "Figures of merit in the terms of IEEE Std 528-2019, 952 and 1780-2022; see their table.",
     )
 
 
-def check_installed():
+def write_pdf(page, path):
+    """The page on paper."""
+    import weasyprint
+
+    weasyprint.HTML(string=page).write_pdf(path)
+
+
+def check_installed(pdf=False):
     """ImportError where the report could not be made: at the end that would be found out late."""
-    for name in ("matplotlib", "jinja2"):
+    for name in ("matplotlib", "jinja2", *(["weasyprint"] if pdf else [])):
         try:
             __import__(name)
-        except ImportError as error:
-            raise ImportError(f"the report needs {name}: pip install {name}") from error
+        except (ImportError, OSError) as error:
+            # OSError: of Pango, which draws the text of a PDF.
+            reason = printable(str(error)).partition("\n")[0]
+            told = f"the report needs {name}: pip install {name} ({reason})"
+            raise ImportError(told + pdf * "; or print report.html from a browser") from error
         except ValueError as error:
             # Of matplotlib's settings; MPLBACKEND is one.
             reason = printable(str(error).partition(";")[0])
@@ -103,8 +158,34 @@ def _reasons(results):
             names = [_words(c.limit.figure) for c in results.checks if c.result == result]
             parts += [f"{words}: {', '.join(names)}"] if names else []
         yield f"Specification: {'; '.join(parts)}."
-    if not results.calibration.verdict.model_is_worth_it:
-        yield "The files, and the figures below, are of the fuzzy rules all the same."
+    calibration = results.calibration
+    what = ARTICLES.get(calibration.written, "the fuzzy rules")
+    if calibration.written == calibration.verdict.recommended:
+        yield f"The files, and the figures below, are of {what}."
+    else:
+        yield (
+            f"The files, and the figures below, are of {what} all the same: --write "
+            f"{calibration.recipe.write} asked for it."
+        )
+
+
+def _summary(results):
+    """For whoever reads one page: the figures that count, and where they hold."""
+    table, calibration = results.merit.set_index("figure"), results.calibration
+    lines = []
+    for name in (name for name in _FIRST if name in table.index):
+        unit, before, after = table.loc[name, ["unit", "before", "after"]]
+        if pd.notna(after):
+            lines.append((_words(name), figures(before), figures(after), signs(unit)))
+    error = next((each for each in results.pictures(_ON_FIRST_PAGE)), None)
+    ends = calibration.X.agg(["min", "max"]).T
+    blocks = [
+        _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
+        Block("soft", flagged_text(calibration)),
+        _box(calibration, ends.index, ends.to_numpy(), "It may be used from"),
+        *([Block("pictures", [error])] if error else []),
+    ]
+    return "Summary", blocks
 
 
 def _identity(results):
@@ -134,17 +215,14 @@ def _check(results):
     beyond = ~calibration.inside & np.isfinite(calibration.after)
     if beyond.any():
         error = results.shown(rms((calibration.after - results.rate)[beyond]))
-        texts.append(
-            f"{beyond.mean():.1%} of the held-out rows are out of range; on them the RMS error "
-            f"after compensation is {error} {results.symbol}."
-        )
+        texts.append(f"On rows out of range the RMS error after is {error} {results.symbol}.")
     if calibration.is_thinned:
         texts.append(
             f"Of the log's {calibration.n_rows:,} rows {len(calibration.log):,} were kept, evenly "
             "from each run. Figures that need every row, of bias stability and Allan's deviation, "
             "are left out."
         )
-    if calibration.fold_choices is not None:
+    if calibration.fold_choices is not None and calibration.writes_model:
         found = Counter(_terms_text(choice.terms) for choice in calibration.fold_choices)
         several = ", ".join(f"{text} ({count})" for text, count in found.most_common())
         texts.append(
@@ -153,7 +231,8 @@ def _check(results):
     blocks = [Block("text", text) for text in texts]
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
-        "On the same held-out rows in range. What this model is better by is the ratio of RMS "
+        "On the same held-out rows in range. What this model, the fuzzy rules, is better by is "
+        "the ratio of RMS "
         f"errors, in the geometric mean over {held_out_groups(calibration)}. Recommended is the "
         "simplest that no more elaborate one beats with an interval above 1.02."
     )
@@ -174,22 +253,17 @@ def _check(results):
 
 
 def _instead(results):
-    """The simpler compensation, where that is the one to use: what to compute."""
-    calibration, name = results.calibration, results.calibration.verdict.recommended
-    if calibration.verdict.model_is_worth_it:
+    """What is written, where that is something simpler than rules: what to compute."""
+    calibration, name = results.calibration, results.calibration.written
+    if calibration.writes_model:
         return None
-    if name == NOTHING:
-        factor = calibration.compensator.scale_factor
-        text = f"The indicated rate as it is: rate = output / {factor:.9g} [deg/s]."
-        return "What to use instead", [Block("text", text)]
     text = (
         f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
-        "deg/s, inputs in the units of the range of the calibration below."
+        "deg/s, inputs in the units of the range of the calibration. The command writes another "
+        "compensation, with its own report, with --write: rules, " + ", ".join(NAMES) + "."
     )
-    if wanted := options_for(name, calibration.X.shape[1]):
-        text += f" The command writes its files, C code included, with {wanted}."
     formula = Block("open", formula_of(calibration, name), "What to compute")
-    return "What to use instead", [Block("text", text), formula]
+    return "What is written", [Block("text", text), formula, _on_board(calibration)]
 
 
 def _merit(results):
@@ -200,8 +274,8 @@ def _merit(results):
         for side in ("before", "after"):
             value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
             cells += [figures(value), _interval(low, high)]
-        lines.append((_words(line["figure"]), *cells, signs(line["unit"])))
-    head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit"]
+        lines.append((_words(line["figure"]), *cells, signs(line["unit"]), _TERMS[line["figure"]]))
+    head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit", "IEEE term"]
     resampled = results.merit.attrs["resampled"]
     blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
     for note, part in table[table["note"] != ""].groupby("note", sort=False):
@@ -211,7 +285,7 @@ def _merit(results):
             (_words(limit.figure), signs(limit.text), figures(value), signs(limit.unit), *told)
             for limit, value, *told in results.checks
         ]
-        caption = "After compensation by the fuzzy rules, on the held-out rows in range"
+        caption = "After compensation, on the held-out rows in range"
         head = ["figure", "required", "after", "unit", "result", "remark"]
         heading = Block("heading", "Limits of the specification")
         blocks += [heading, _table(head, checks, caption)]
@@ -219,7 +293,7 @@ def _merit(results):
 
 
 def _pictures(results):
-    blocks = [Block("pictures", list(results.pictures()))]
+    blocks = [Block("pictures", list(results.pictures(besides=_ON_FIRST_PAGE)))]
     if isinstance(results.of_allan, str):
         blocks.append(Block("soft", f"Allan deviation: {results.of_allan}."))
     return "Pictures", blocks
@@ -228,10 +302,11 @@ def _pictures(results):
 def _use(results):
     """The box of the calibration, and what lies beyond."""
     calibration = results.calibration
-    compensator, recipe = calibration.compensator, calibration.recipe
-    policy = "no rate is given"
-    if recipe.outside != "nan":
-        policy = policy_in_words(recipe.outside, calibration.rules[-1].model_.max_extrapolation)
+    compensator = calibration.compensator
+    rules = compensator.estimator
+    rules = getattr(rules, "residual_", rules)
+    model = rules.model if isinstance(rules, FrozenRules) else rules[-1].model_
+    policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     text = (
         f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
         "Inside them, rows near which there are hardly any data "
@@ -259,12 +334,11 @@ def _sure(results):
     lines[1][2] = _interval(budget.scatter_low, budget.scatter_high, results.shown)
     head = ["part", f"standard deviation [{results.symbol}]", "95 % interval", "meaning"]
     caption = "Of one compensated row in range, in a group that the model has not seen"
-    size, names = certain.attained[0], certain.found.input_names
-    added = calibration.recipe.physics
-    what = "addition of the rules to the arcsine law" if added else "compensation"
+    added = hasattr(calibration.compensator.estimator, "residual_")
+    what = "addition to the arcsine law" if added else "compensation"
     proven = [
         (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}"),
-        ("largest that was met", f"{results.shown(size)} {results.symbol}"),
+        ("largest that was met", f"{results.shown(certain.met[0])} {results.symbol}"),
     ]
     if certain.rate_rises is not None:
         told = "proven" if certain.rate_rises else "not proven"
@@ -275,7 +349,7 @@ def _sure(results):
         Block("heading", "What is proven"),
         _table(["over the box below", "result"], proven),
         # What rounding leaves of zero, where a box is in the units before a scaler, is zero.
-        _box(calibration, names, np.round(certain.found.box, 9) + 0.0),
+        _box(calibration, certain.names, np.round(certain.box, 9) + 0.0),
         Block("soft", _PROOF),
     ]
 
@@ -283,22 +357,29 @@ def _sure(results):
 def _rules(results):
     """The rules in pictures and as text, and whether they can be read one by one."""
     calibration, blocks = results.calibration, []
+    if not calibration.writes_model:
+        return None
     if calibration.recipe.physics:
         law = law_text(calibration.compensator.estimator.base_, calibration.recipe)
         text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
         blocks += [Block("text", text), Block("details", law, "The arcsine law")]
     blocks.append(Block("pictures", list(results.memberships())))
     found = readability_of(calibration)
-    text, steps = rules_text(calibration, found), on_board(calibration.compensator)
+    text = rules_text(calibration, found)
     n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         *blocks,
         Block("details", text, f"All rules as text ({n_rules}, {terms})"),
-        Block("details", steps, "What to compute on board"),
+        _on_board(calibration),
         Block("heading", "Can the rules be read?"),
         *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
     ]
+
+
+def _on_board(calibration):
+    notes = "\n".join(notes_on(calibration.compensator))
+    return Block("details", f"y[0] is what it gives.\n{notes}", "What to compute on board")
 
 
 def _log(results):
@@ -320,12 +401,12 @@ def _log(results):
     return "The log", [_table(["quantity", "value", "unit"], lines)]
 
 
-def _box(calibration, names, ends):
+def _box(calibration, names, ends, caption=""):
     lines = [
         (_words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name))
         for name, (low, high) in zip(names, ends, strict=True)
     ]
-    return _table(["input", "from", "to", "unit"], lines)
+    return _table(["input", "from", "to", "unit"], lines, caption)
 
 
 def _table(head, lines, caption=""):
@@ -341,7 +422,7 @@ def _words(name):
 
 
 def _unit_of(calibration, name):
-    return signs(_UNITS.get(name, calibration.recipe.output_unit))
+    return signs(units_of(calibration.compensator).get(name, "deg/s"))
 
 
 def _terms_text(terms):

@@ -8,7 +8,7 @@ A log that has been read has its columns by these names, in s, degC and deg/s.
 import hashlib
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from glob import glob
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from ._checks import LABELS, RowChecks, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, checked_request, settle
 from ._source import NO_VALUE, Clock, as_numbers, open_source
+from ._units import settle_by_all
 from .errors import LogError, shortened
 
 _ROWS = 200_000  # of a piece, which is all that is held beside the log itself
@@ -52,7 +53,8 @@ def read_log(
         they differ from it; blanks around names, and capitals, do not matter.
     units : dict of str to str, default=None
         Units in the file of "time" (s, ms, us, ns, min, h), "temperature" (degC, K, degF), "rate"
-        and "output" (deg/s, deg/h, rad/s, mrad/s, rpm); "output" may also be in counts, V or mV.
+        and "output" (deg/s, deg/h, rad/s, mdeg/s, mrad/s, rpm); "output" may also be in counts, V
+        or mV.
     require : sequence of str, default=("temperature", "output", "rate")
         Parts without which the log is refused.
 
@@ -95,7 +97,8 @@ class Reading:
     """A log that has been read, with what was found out on the way, in sentences (``notes``).
 
     Of the ``n_rows`` rows that there were ``log`` holds every k-th of each run where they are too
-    many. ``files`` and ``rows`` tell the file of each row, and its position there.
+    many. ``files`` and ``rows`` tell the file of each row, and its position there. ``assumed`` has
+    sentences on units, by part, that neither names nor options tell.
     """
 
     log: pd.DataFrame
@@ -105,6 +108,7 @@ class Reading:
     notes: list
     n_rows: int
     digests: tuple
+    assumed: dict
 
     @property
     def units(self):
@@ -147,6 +151,13 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     table, parts = pd.concat(thinned.pieces), files[0].layout.places
     code, runs = table["run"].to_numpy(), finder.runs
     log = table[[part for part in parts if part not in LABELS]].reset_index(drop=True)
+    layout = files[0].layout
+    if layout.assumed and request.assumed is None:
+        found = settle_by_all(log, layout)
+        if not found.items() <= layout.units.items():
+            # All rows tell otherwise than the first ones.
+            retold = replace(request, assumed=layout.units | found)
+            return read(paths, retold, tell=tell, most_rows=most_rows)
     names = _names_of_runs(runs, paths, "run" in parts or finder.note)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
@@ -155,7 +166,7 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     notes = [note for file in files for note in file.notes]
     notes = list(dict.fromkeys([*notes, *filter(None, [finder.note, thinned.note])]))
     file, row = runs["file"].to_numpy()[code], table.index.to_numpy()
-    return Reading(log, file, row, files, notes, thinned.n_rows, digests)
+    return Reading(log, file, row, files, notes, thinned.n_rows, digests, layout.assumed)
 
 
 class LogFile:
@@ -193,25 +204,31 @@ class LogFile:
         labels = [places[part] for part in LABELS if part in places]
         lacking = pd.Series(0, index=list(places))
         n_left_out, first = 0, 0
-        for piece in self.source.pieces(list(places.values()), _ROWS, labels):
-            self.n_rows += len(piece)
+        for table in self.source.pieces(list(places.values()), _ROWS, labels):
+            self.n_rows += len(table)
+            piece = table  # of which an error tells the rows
             try:
-                piece = self._converted(piece)
+                piece = self._in_order(self._converted(table), table)
                 missing = piece.isna()
                 bad = missing.any(axis=1)
                 if bad.any():
                     lacking += missing.sum()
                     first = first if n_left_out else int(bad.idxmax())
                     n_left_out += int(bad.sum())
-                    piece = piece[~bad].copy()
-                if piece.empty:
+                # A gap in one column is none in the clock.
+                known = ~missing[[part for part in ("time", *LABELS) if part in piece]].any(axis=1)
+                piece, bad = piece[known].copy(), bad[known]
+                if bad.all():
                     continue
                 piece["run"] = finder.codes(piece, number)
+                piece = piece[~bad]
                 if checks is not None:
                     checks.add(piece)
             except LogError as error:
                 raise self.located(error, piece.index) from error
             yield piece
+        if self._clock is not None:
+            self.notes += self._clock.notes
         if not n_left_out:
             return
         names = {self.layout.name(part): n for part, n in lacking[lacking > 0].items()}
@@ -221,6 +238,25 @@ class LogFile:
             raise LogError(f"{said}: too many to go on without them.")
         place = self.source.place_of(first)
         self.notes.append(f"{said}; they are left out, the first of them {place}")
+
+    def _in_order(self, piece, table):
+        """A piece whose rows do not occur twice, and that begins with the first row."""
+        if not self._allow_missing or "time" not in piece:
+            return piece
+        twice = piece.duplicated() & piece["time"].notna()
+        # Runs of one value all through are alike, and two runs.
+        if twice.any() and not piece[twice].drop(columns="time").duplicated()[1:].all():
+            times = table[self.layout.places["time"]][twice]
+            self.notes.append(
+                f"{self.path}: {twice.sum():,} rows occur twice, from time {times.iloc[0]} to "
+                f"{times.iloc[-1]}; the second time they are left out"
+            )
+            piece = piece[~twice]
+        steps = np.diff(piece["time"].dropna())
+        if len(table) < _ROWS and steps.size and (steps < 0.0).all():
+            self.notes.append(f"{self.path}: the last row comes first; rows are turned round")
+            piece = piece[::-1]
+        return piece
 
     def _converted(self, table):
         piece = pd.DataFrame(index=table.index)
@@ -383,6 +419,7 @@ def digests_of(paths):
     """
     found: dict = {}
     for path in paths:
+        open_source(path, head_only=True)  # what is no log is refused before all of it is read
         with open(path, "rb") as opened:
             digest = hashlib.file_digest(opened, "sha256").hexdigest()
             size = opened.tell()

@@ -14,6 +14,7 @@ from sklearn.preprocessing import RobustScaler
 
 from skanfis.bounds import bounds
 from skanfis.export import export_c, fold
+from skanfis.export.c.builder import in_digits
 from skanfis.export.c.dialect import STATUS
 from skanfis.export.c.self_test import size_of_sum
 from skanfis.learning import VariableProjection
@@ -280,6 +281,26 @@ def test_grid_takes_an_exponential_per_term():
     known = 1 + np.count_nonzero(model.model_.support.share)
     assert cost.coverage_multiply_adds == known * (3 + 2 + 5)
     assert export_c(model, name="m", min_coverage=None).cost.coverage_multiply_adds == 0
+
+
+def test_ranges_have_digits_that_mean_something():
+    assert in_digits(-1.4e-14, 60.0123456) == ["0", "60.0123"]
+    assert in_digits(-0.0, 2e-5) == ["0", "2e-05"]
+    assert in_digits(1.7e9, 1.7e9 + 12.3456789) == ["1700000000", "1700000012.35"]
+    assert in_digits(20.5, 20.5) == ["20.5", "20.5"]
+    assert in_digits(-np.inf, 1.0) == ["-inf", "1"]
+
+
+def test_units_and_notes_stand_in_the_header():
+    X, y = surface()
+    notes = ["A star * multiplies; */ and /* and \\ end nothing."]
+    units = {"x1": "degC", "y": "deg/s */"}
+    header = export_c(quick(n_mfs=1).fit(X, y), name="m", units=units, notes=notes).header
+    comment = header.partition("#ifndef")[0]
+    assert comment.count("*/") == 1
+    assert "A star * multiplies; <U+002A>/ and /<U+002A> and <U+005C> end nothing." in comment
+    assert "[1] x1 [degC]: " in comment
+    assert "[0] y [deg/s <U+002A>/]: " in comment
 
 
 @pytest.mark.theory

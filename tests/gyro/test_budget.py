@@ -24,7 +24,7 @@ def calibrated(error, gain=1.0, noise=NOISE, scatter=SCATTER, **options):
     output = gain * rate + error(temperature) + off
     columns = {"run": run, "temperature": temperature, "rate": rate, "output": output}
     log = pd.DataFrame(columns)
-    recipe = Recipe(("temperature", "output"), terms=(1, 1), **options)
+    recipe = Recipe(("temperature", "output"), write="rules", terms=(1, 1), **options)
     return calibrate(log, choose_split(log, "run"), recipe, lambda text: None)
 
 
@@ -85,7 +85,7 @@ def test_largest_compensation_of_a_line_is_that_of_its_corner():
     # error = output - rate, as a line in temperature and output.
     corner = 90.0 - (90.0 - 0.005 - 2e-4 * 45.0) / 1.001
     assert certain.largest == pytest.approx(corner, rel=1e-3)
-    size, place = certain.attained
+    size, place = certain.met
     np.testing.assert_array_equal(place, [45.0, 90.0])
     assert size <= certain.largest
     assert certain.rate_rises is True

@@ -1,5 +1,8 @@
 """Law and rules as C, compiled and run, answer what ResidualRegressor answers."""
 
+import re
+import shutil
+import subprocess
 from copy import deepcopy
 from functools import cache
 
@@ -14,8 +17,15 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
-from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_physics
+from skanfis.gyro import (
+    GyroCompensator,
+    OpenLoopArcsineRegressor,
+    ResidualRegressor,
+    export_c_physics,
+)
 from skanfis.gyro._columns import ask
+from skanfis.gyro.c_code import export_c_compensator
+from skanfis.gyro.compensator import features
 
 from ..export.c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from ..quick import quick
@@ -238,6 +248,69 @@ def test_header_says_what_goes_in():
     assert "#define GYRO_N_INPUTS 4" in header
     assert "Beyond a phase of 0.9 rad the law goes on along its tangent." in header
     assert "unused" not in header
+
+
+def told(header):
+    """The first comment of a header as one line."""
+    return " ".join(header.partition("*/")[0].replace("\n *", " ").split())
+
+
+def test_header_of_a_compensator_says_units_and_how_inputs_are_made(log, tmp_path):
+    inputs = ("time", "temperature", "temperature_rate", "output")
+    X = features(log, inputs, 25.0)
+    rules = quick([1, 2, 1, 1]).fit(X, log["output"] / COUNTS - log["rate"])
+    compensator = GyroCompensator(rules, inputs, "error", COUNTS, "counts", 25.0)
+    text = told(export_c_compensator(compensator, tmp_path / "gyro", std="c89").header)
+    (time_0, *_, time_1) = sorted(X["time"])
+    for part in (
+        "subtract y[0] from the raw rate. The raw rate [deg/s] is the output of the gyro [counts] "
+        "divided by -27000.",
+        "time is that since power-on: zero at the first sample.",
+        "temperature_rate is low-passed, with a time constant of 25 s. At power-on: "
+        "temperature_rate = 0, previous = temperature.",
+        "temperature_rate += (1 - exp(-h / 25)) * ((temperature - previous) / h - "
+        "temperature_rate); then previous = temperature.",
+        f"[0] time [s]: {time_0:g} to {time_1:g}",
+        "[1] temperature [degC]: ",
+        "[2] temperature_rate [degC/s]: 0 to ",
+        "[3] output [counts]: ",
+        "[0] y [deg/s]: ",
+        "MISRA C:2012",
+    ):
+        assert part in text
+    model = ResidualRegressor(
+        OpenLoopArcsineRegressor("output", "temperature"), quick([1, 1, 1, 1])
+    )
+    model.fit(X, log["rate"])
+    compensator = GyroCompensator(model, inputs, "rate", COUNTS, "counts", 25.0)
+    text = told(export_c_compensator(compensator, tmp_path / "gyro", std="c99").header)
+    assert "compensated rate: take it in the place of the raw rate" in text
+    assert "subtract" not in text
+    assert "[0] rate, in deg/s" in text
+    assert "in range: an arcsine, " in text
+
+
+def test_the_rate_of_the_temperature_is_made_as_the_header_says(log):
+    run = log[log["run"] == log["run"].min()]
+    made = features(run, ("temperature_rate",), 25.0).to_numpy()[:, 0]
+    rate, previous, by_hand = 0.0, run["temperature"].iloc[0], [0.0]
+    for h, temperature in zip(np.diff(run["time"]), run["temperature"].iloc[1:], strict=True):
+        rate += (1 - np.exp(-h / 25.0)) * ((temperature - previous) / h - rate)
+        previous = temperature
+        by_hand.append(rate)
+    np.testing.assert_allclose(made, by_hand, atol=1e-15)
+
+
+@pytest.mark.skipif(shutil.which("cppcheck") is None, reason="cppcheck is not installed")
+def test_of_misra_c_is_kept_what_the_header_says(tmp_path):
+    model, _ = everything()
+    code = export_c_physics(model, tmp_path / "gyro")
+    command = ["cppcheck", "--addon=misra", "--std=c99", "--enable=style", "gyro.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    found = set(re.findall(r"misra-c2012-(\d+\.\d+)", done.stderr))
+    named = re.search(r"MISRA C:2012(.*?)No one", told(code.header))[1]
+    assert found
+    assert found <= set(re.findall(r"\d+\.\d+", named))
 
 
 def refused(log, base=None, residual=None):

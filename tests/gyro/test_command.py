@@ -9,12 +9,14 @@ from itertools import pairwise
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.dummy import DummyRegressor
 
 pytest.importorskip("matplotlib")
 
 from skanfis import __version__
 from skanfis.datasets import make_ofog
-from skanfis.gyro import GyroCompensator, command
+from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, command
+from skanfis.gyro._models import make_polynomial
 from skanfis.gyro._options import make_parser
 from skanfis.gyro.command import main
 
@@ -76,7 +78,7 @@ def calibrated(tmp_path_factory, log, given_weights, coarse_report):
     arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("skanfis.gyro._results._PICTURES", {})
-        assert main([*arguments, "--c", "c99", "--saturate"]) == 0
+        assert main([*arguments, "--c", "c99", "--saturate", "--write", "rules"]) == 0
     return folder
 
 
@@ -136,6 +138,46 @@ def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path
     assert "before" not in out
 
 
+@pytest.mark.usefixtures("no_pictures", "law_of_degree_one")
+@pytest.mark.parametrize(
+    ("write", "kind"),
+    [
+        ("recommended", "the arcsine law"),
+        ("none", "no compensation"),
+        ("cubic", "a cubic polynomial"),
+        ("line", "a straight line"),
+    ],
+)
+def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind, capsys):
+    path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
+    arguments = [path, "--inputs", "temperature", "output", "--terms", "1,1", "--c", "c99"]
+    assert main([*arguments, "--saturate", "--write", write, "--output", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert f"written is     {kind}, as" in said
+    compensator = GyroCompensator.read_json(out / "compensator.json")
+    X, rate = log[["temperature", "output"]], log["rate"]
+    error = log["output"] - rate
+    expected = {
+        "recommended": lambda: OpenLoopArcsineRegressor("output", "temperature").fit(X, rate),
+        "none": lambda: DummyRegressor(strategy="constant", constant=0.0).fit(X, error),
+        "cubic": lambda: make_polynomial(3).fit(X, error),
+        "line": lambda: make_polynomial(1).fit(X, error),
+    }[write]().predict(X)
+    expected = expected if write == "recommended" else log["output"] - expected
+    found = compensator.apply(log)
+    np.testing.assert_allclose(found["rate_compensated"], expected, atol=1e-9)
+    assert (found["status"] == 0).all()
+    header = (out / "compensator.h").read_text(encoding="ascii")
+    assert "Unit assumed: 'output' has no unit, taken as deg/s" in header
+    assert "[0] temperature" in header
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert page.index("&#39;output&#39; has no unit, taken as deg/s") < page.index("<section>")
+    assert compensator.units["output"] == "deg/s"
+    # That of the report's first table is the error of what is written.
+    text = (out / "rules.txt").read_text(encoding="utf-8")
+    assert text.startswith("rate [deg/s] = arcsin(" if write == "recommended" else "rate = output")
+
+
 @pytest.mark.usefixtures("no_report")
 def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -155,6 +197,7 @@ def test_physics_and_policy(tmp_path, log, capsys):
     log = log[log["run"] < 3]
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
     arguments = [path, "--physics", "--terms", "1,2,1,1", "--outside", "nan", "--quiet"]
+    arguments += ["--write", "rules"]
     assert main([*arguments, "--output", str(out), "--c", "c99"]) == 0
     assert capsys.readouterr().err == ""
     assert sorted(path.name for path in out.iterdir()) == sorted(
@@ -168,6 +211,22 @@ def test_physics_and_policy(tmp_path, log, capsys):
     hot = compensator.apply(log.assign(temperature=log["temperature"] + 100.0))
     assert hot["rate_compensated"].isna().all()
     assert (hot["status"] == 1 + 8).all()
+
+
+@pytest.mark.usefixtures("no_report")
+def test_targets_are_written_or_refused_by_name(tmp_path, log, capsys):
+    path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
+    arguments = [path, *SMALL, "--quiet", "--output", str(out), "--target", "rate-table"]
+    assert main([*arguments, "--target", "px4:x"]) == 5
+    told = capsys.readouterr().out
+    assert "target         rate-table: it differs from the model by " in told
+    assert (
+        "REFUSED        px4:x: the model needs temperature and output, and this target says" in told
+    )
+    found = sorted(path.name for path in out.iterdir())
+    assert found == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
+    assert main([*arguments, "--force"]) == 0
+    assert main(arguments) == 4
 
 
 def one_run_without_levels(log):
@@ -227,6 +286,9 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--box", "humidity=0:1"], "--box: 'humidity' is no input; these are time, temperature"),
         (["--box", "time=85:-40"], "must be INPUT=LOW:HIGH, two numbers"),
         (["--box", "time=0:inf"], "must be INPUT=LOW:HIGH, two numbers"),
+        (["--target", "px4"], "'px4' must be table:TYPE or rate-table:TYPE (float, double, q31"),
+        (["--target", "ardupilot:x:0"], "or ardupilot:AXIS:INSTANCE (1 to 3)"),
+        (["--target", "table", "table:q15"], "--target: table is given twice"),
         (["--limits", "bias=5"], "bias takes deg/s or deg/h; found ''"),
     ],
 )
@@ -332,7 +394,7 @@ def test_a_compensation_that_makes_it_worse_says_so(tmp_path, log, capsys):
     spoilt["output"] = spoilt["rate"] + spoilt["run"].map(offsets)
     path = write_log(tmp_path / "log.csv", spoilt)
     arguments = ["--inputs", "time", "--groups", "run", "--output", str(tmp_path / "out")]
-    assert main([path, *arguments, "--terms", "1"]) == 0
+    assert main([path, *arguments, "--terms", "1", "--write", "rules"]) == 0
     out, err = capsys.readouterr()
     worse = "the compensation makes held-out rows in range worse, from 0.8944 to 1.118"
     assert f"WARNING        {worse}" in out
@@ -369,7 +431,8 @@ def thermal_cycle(*turns, n_rows=300, lag=0.05):
 def test_a_thermal_cycle_at_rest(tmp_path, capsys):
     thermal_cycle(20, -20, 60, -20, 60, 20).to_csv(tmp_path / "mems.csv", index=False)
     out = tmp_path / "out"
-    assert main([str(tmp_path / "mems.csv"), "--terms", "3,1", "--output", str(out)]) == 0
+    arguments = [str(tmp_path / "mems.csv"), "--terms", "3,1", "--write", "rules"]
+    assert main([*arguments, "--output", str(out)]) == 0
     said = capsys.readouterr().out
     assert "whole legs between turning points of the temperature held out (5 legs" in said
     assert "taken as at rest" in said
@@ -394,6 +457,13 @@ def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_p
     said = capsys.readouterr().out
     assert "pieces of the legs" in said
     assert "whether a cycle repeats, so few cannot show" in said
+    # What is safe is written, and pieces have one number.
+    assert "One cycle cannot tell whether this repeats; until then a constant is safe" in said
+    assert "record two more" in said
+    assert "2 legs, 5 pieces of each" in said
+    assert "written is     a constant, as recommended" in said
+    rates = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
+    assert rates.estimator.model.n_rules == 1
     compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
     assert (compensator.scale_factor, compensator.output_unit) == (131.0, "counts")
 
@@ -408,9 +478,10 @@ def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, c
         part.to_csv(tmp_path / "logs" / f"run{run}.csv", index=False)
     out, where = tmp_path / "out", str(tmp_path / "logs" / "*.csv")
     arguments = [where, "--terms", "1,1,2", "--inputs", "time", "temperature", "output"]
-    assert main([*arguments, "--output", str(out)]) == 3
+    wrong = ["--columns", "output=gyro_x", "--output", str(out)]
+    assert main([*arguments, *wrong]) == 3
     assert "the log, column 'gyro_x' (output): does not follow the rate" in capsys.readouterr().err
-    assert main([*arguments, "--columns", "output=gyro_y", "--output", str(out)]) == 0
+    assert main([*arguments, "--output", str(out)]) == 0
     said, told = capsys.readouterr()
     assert "read 4 of 4" in told
     assert "whole runs held out (4 runs" in said

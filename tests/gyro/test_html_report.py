@@ -22,7 +22,7 @@ from skanfis.gyro._options import ReportOptions, parse_limit
 from skanfis.gyro._results import Picture, Results
 from skanfis.gyro._split import choose_split
 from skanfis.gyro.displays import figures
-from skanfis.gyro.html_report import check_installed, report_page
+from skanfis.gyro.html_report import check_installed, report_page, write_pdf
 from skanfis.inspection import readability
 
 PNG = re.compile('data:image/png;base64,([^"]*)')
@@ -56,7 +56,8 @@ pytestmark = pytest.mark.usefixtures("given_weights", "law_of_degree_one", "coar
 
 def calibration_of(log, inputs=("time", "temperature", "temperature_rate", "output"), **options):
     split = choose_split(log, uses_output="output" in inputs)
-    return calibrate(log, split, Recipe(inputs, **options), lambda text: None)
+    recipe = Recipe(inputs, **{"write": "rules"} | options)
+    return calibrate(log, split, recipe, lambda text: None)
 
 
 @pytest.fixture(scope="module")
@@ -159,7 +160,7 @@ def test_the_formula_of_what_is_simpler_can_be_computed(calibration, name):
         variable, _, value = line.partition(" = ")
         names[variable] = eval(value, {}, names)
     simple = next(each for each in calibration.simpler if each.name == name)
-    expected = calibration.before - simple.model.predict(calibration.X)
+    expected = calibration.before - simple.estimator.predict(calibration.X)
     np.testing.assert_allclose(names["rate"], expected, atol=1e-6)
 
 
@@ -169,7 +170,7 @@ def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
     text = " ".join(Outline(report_page(calibration, "rest.csv")).text)
     assert "°/h" in text
     assert "Scale-factor error against rate" not in text
-    assert "no rate is given" in text
+    assert "there is no value" in text
 
 
 def test_the_verdict_comes_first(page, calibration):
@@ -177,10 +178,15 @@ def test_the_verdict_comes_first(page, calibration):
     verdict = calibration.verdict
     assert not verdict.model_is_worth_it  # three rules, where the law of the sensor knows more
     title = "Use the arcsine law instead of the fuzzy rules"
-    assert title in text[: text.index("This calibration")]
+    assert title in text[: text.index("Summary")]
+    assert "are of the fuzzy rules all the same: --write rules asked for it" in text
     assert f"leaves {figures(verdict.rms['arcsine law'])} °/s RMS" in text
-    model = next(each for each in calibration.simpler if each.name == "arcsine law").model
-    assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What to use instead") :]
+    simple = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="recommended")
+    text = "".join(Outline(report_page(simple, TITLE)).text)
+    model = next(each for each in simple.simpler if each.name == "arcsine law").model
+    assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What is written") :]
+    assert "are of the arcsine law." in text
+    assert "Can the rules be read?" not in text
 
 
 def test_one_unit_throughout(page, calibration, no_drawing, monkeypatch):
@@ -190,7 +196,7 @@ def test_one_unit_throughout(page, calibration, no_drawing, monkeypatch):
     rms = np.sqrt(np.mean((calibration.after - calibration.rate)[calibration.in_range] ** 2))
     for text, unit, factor, other in ((page, "°/s", 1.0, "°/h"), (hourly, "°/h", 3600.0, "°/s")):
         text = " ".join(Outline(text).text)
-        told = text[text.index("How it was checked") : text.rindex("What to use instead")]
+        told = text[text.index("How it was checked") : text.index("Figures of merit")]
         assert unit in told
         assert other not in told
         assert f"{figures(factor * rms)} {unit}" in text
@@ -244,3 +250,21 @@ def test_limits_on_both_sides_of_the_figure(page):
 def test_no_screen_is_asked_for(fresh_process):
     assert fresh_process["matplotlib_of_the_command"] == []
     assert fresh_process["pyplot_of_pictures"] == []
+
+
+def test_a_pdf_of_one_run_has_five_pages_at_most(tmp_path):
+    weasyprint = pytest.importorskip("weasyprint")
+    log = make_ofog(n_devices=1, n_runs=1, profile="ramps", duration=7200.0, random_state=0,
+                    rates=np.arange(-90.0, 91.0, 15.0))  # fmt: skip
+    inputs = ("temperature", "temperature_rate", "output")
+    calibration = calibration_of(log, inputs, terms=(1, 1, 2))
+    page = report_page(calibration, TITLE)
+    write_pdf(page, tmp_path / "report.pdf")
+    assert (tmp_path / "report.pdf").read_bytes().startswith(b"%PDF")
+    assert 2 <= len(weasyprint.HTML(string=page).render().pages) <= 5
+
+
+def test_a_pdf_without_its_library_is_a_sentence(monkeypatch):
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    with pytest.raises(ImportError, match="the report needs weasyprint: pip install weasyprint"):
+        check_installed(pdf=True)

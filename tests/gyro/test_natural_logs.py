@@ -1,8 +1,11 @@
 """Logs as they come: what a logger, a spreadsheet or a bench writes is read as it was meant."""
 
+import sys
+
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError
@@ -77,6 +80,7 @@ def test_a_log_of_one_kind_is_read_as_it_was_meant(tmp_path, truth, kind):
     told = "; ".join(reading.notes)
     for said in (f"temperature = {names[1]!r}", "split into 5 runs", "--columns"):
         assert said in told
+    assert not set(reading.assumed) & {"time", "temperature"}
 
 
 def test_lines_above_the_header_and_a_clock_past_midnight(tmp_path, truth):
@@ -140,7 +144,7 @@ def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth):
 def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
     table = pd.DataFrame({"a": truth["temperature"], "b": truth["output"], "d": truth["rate"]})
     table.to_csv(tmp_path / "log.csv", index=False)
-    with pytest.raises(LogError, match=r"Say which it is .--columns temperature=NAME"):
+    with pytest.raises(LogError, match=r"Say which it is .such as --columns temperature=a"):
         found(tmp_path / "log.csv")
     told = found(tmp_path / "log.csv", columns={"temperature": "a", "output": "D ", "rate": "b"})
     np.testing.assert_allclose(told.log["output"], truth["rate"])
@@ -210,7 +214,7 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
     assert (some.n_rows, len(some.log)) == (300, 75)
     same(some, expected, PARTS)
     assert some.log["run"].astype(int).tolist() == expected["run"].astype(int).tolist()
-    assert some.notes == ["of 300 rows 75 are used, one in 4 of each run"]
+    assert some.notes[1:] == ["of 300 rows 75 are used, one in 4 of each run"]
     assert some.name_row(7).endswith(f"line {expected.index[7] + 2}")
     # A row that would not be held is checked all the same.
     table.loc[290, "time"] = 0.0
@@ -228,7 +232,7 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
     ],
 )
 def test_runs_are_told_by_the_time(tmp_path, times, runs):
-    table = pd.DataFrame({"time": times, "temperature": 20.0, "output": 1.0})
+    table = pd.DataFrame({"time": times, "temperature": 20.0, "output_dps": 1.0})
     table.to_csv(tmp_path / "log.csv", index=False)
     log = found(tmp_path / "log.csv").log
     assert ("run" in log) == (runs is not None)
@@ -261,3 +265,154 @@ def test_what_is_no_log_is_refused_in_words(tmp_path, content, message):
         pytest.importorskip("pyarrow")
     with pytest.raises(LogError, match=message):
         found(path)
+
+
+LVM = """LabVIEW Measurement\t
+Writer_Version\t2
+Separator\tTab
+Decimal_Separator\t.
+Date\t2026/03/01
+Time\t10:00:00.5
+***End_of_Header***\t
+\t
+Channels\t3\t\t\t
+Samples\t300\t300\t300\t
+Date\t2026/03/01\t2026/03/01\t2026/03/01\t
+Time\t10:00:00.5\t10:00:00.5\t10:00:00.5\t
+X_Dimension\tTime\tTime\tTime\t
+X0\t0.0E+0\t0.0E+0\t0.0E+0\t
+Delta_X\t10.0\t10.0\t10.0\t
+***End_of_Header***\t\t\t\t
+X_Value\tTemp [degC]\tGyro [deg/s]\tTable [deg/s]\tComment
+"""
+
+
+def test_a_file_of_labview(tmp_path, truth):
+    with open(tmp_path / "log.lvm", "w", newline="") as file:
+        file.write(LVM)
+        table = truth[["clock", "temperature", "output", "rate"]].assign(comment="")
+        table.to_csv(file, sep="\t", header=False, index=False)
+    reading = found(tmp_path / "log.lvm")
+    same(reading, truth)
+    np.testing.assert_allclose(reading.log["time"], truth["clock"])
+    assert "the header is line 17; 16 lines above it are passed over" in reading.notes
+    assert reading.units["time"] == "s"
+    assert "time" not in reading.assumed
+
+
+def test_units_in_a_line_of_their_own_below_numbers(tmp_path, truth):
+    lines = ["Serial,1234", "Operator,7", "", "t,Temp,Gyro,Table", "ms,K,(rad/s),deg/s"]
+    rows = zip(1000 * truth["time"], truth["temperature"] + 273.15, np.radians(truth["output"]),
+               truth["rate"], strict=True)  # fmt: skip
+    lines += [",".join(map(repr, map(float, row))) for row in rows]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    reading = found(tmp_path / "log.csv")
+    same(reading, truth)
+    assert reading.assumed == {}
+    assert reading.name_row(3).endswith("line 9")
+
+
+@pytest.mark.parametrize("how", ["variables", "struct", "7.3"])
+def test_a_file_of_matlab(tmp_path, truth, how):
+    names = {
+        "t_ms": 1000 * truth["clock"],
+        "temp_c": truth["temperature"],
+        "fs": 10.0,
+        "gyro_dps": truth["output"],
+        "rate_dps": truth["rate"],
+        "other": np.arange(7.0),
+    }
+    values = {name: np.asarray(column)[:, None] if name != "fs" else column
+              for name, column in names.items()}  # fmt: skip
+    path = tmp_path / "log.mat"
+    if how == "7.3":
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(path, "w") as file:
+            for name, column in values.items():
+                file[f"log/{name}"] = np.transpose(column)
+    else:
+        savemat(path, values if how == "variables" else {"log": values, "who": "me"})
+    reading = found(path)
+    same(reading, truth)
+    np.testing.assert_allclose(reading.log["time"], truth["clock"])
+    assert "variables of another length are passed over: fs, other" in "; ".join(reading.notes)
+    assert reading.name_row(3).endswith("row 3")
+
+
+def test_a_file_of_excel_with_lines_above_the_header(tmp_path, truth):
+    pytest.importorskip("openpyxl")
+    names = ["Time", "Temp [°C]", "Gyro [°/s]", "Table [°/s]"]
+    moments = pd.Timestamp("2026-02-27") + pd.to_timedelta(truth["clock"], unit="s")
+    columns = [moments, truth["temperature"], truth["output"], truth["rate"]]
+    rows = [["Bench", 7, None, None], ["Serial", 1234, None, None], names]
+    rows += [list(row) for row in zip(*columns, strict=True)]
+    with pd.ExcelWriter(tmp_path / "log.xlsx", engine="openpyxl") as writer:
+        pd.DataFrame(rows).to_excel(writer, sheet_name="data", header=False, index=False)
+        pd.DataFrame([["notes"]]).to_excel(writer, sheet_name="notes", index=False)
+    reading = found(tmp_path / "log.xlsx")
+    same(reading, truth)
+    np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-5)
+    assert reading.name_row(0).endswith("row 4")
+    assert {"of 2 sheets 'data' is read", "2 rows above the header are passed over"} <= set(
+        reading.notes
+    )
+
+
+@pytest.mark.parametrize(("name", "library"), [("log.xlsx", "openpyxl"), ("log.mat", "h5py")])
+def test_a_library_that_is_missing_is_named(tmp_path, name, library, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    (tmp_path / name).write_bytes(b"\x89HDF" + 600 * b" ")
+    with pytest.raises(ImportError, match=rf"needs {library}: pip install 'skanfis\[logs\]'; or"):
+        found(tmp_path / name)
+
+
+@pytest.mark.parametrize("name", ["log.xlsx", "log.mat"])
+def test_a_damaged_file_is_refused(tmp_path, name):
+    if name == "log.xlsx":
+        pytest.importorskip("openpyxl")
+    (tmp_path / name).write_bytes(b"MATLAB 5.0 and no more" * 20)
+    with pytest.raises(LogError, match=r"is no .* file that can be read"):
+        found(tmp_path / name)
+
+
+def test_a_gap_in_one_column_is_no_power_on(tmp_path, truth):
+    table = truth[truth["run"] < 2][[*PARTS]].assign(time=10.0 * np.arange(120))
+    table.loc[40:89, "output"] = np.nan
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    assert "run" not in reading.log
+    assert "50 of 120 rows lack a value" in "; ".join(reading.notes)
+    # Where the clock stops as well, one was.
+    table.drop(index=range(40, 90)).to_csv(tmp_path / "log.csv", index=False)
+    assert found(tmp_path / "log.csv").log["run"].nunique() == 2
+
+
+@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S", "%H:%M:%S"])
+def test_a_clock_that_is_put_one_hour_back_goes_on(tmp_path, truth, form):
+    clock = pd.Timestamp("2026-10-25 01:00") + pd.to_timedelta(20.0 * np.arange(300), unit="s")
+    local = clock - pd.to_timedelta(3600.0 * (np.arange(300) >= 250), unit="s")
+    table = truth[PARTS].assign(time=local.strftime(form))
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    np.testing.assert_allclose(np.diff(reading.log["time"]), 20.0)
+    assert "run" not in reading.log
+    told = "; ".join(reading.notes)
+    assert f"one hour back at {local[250].strftime(form)}: daylight saving" in told
+
+
+def test_a_block_that_occurs_twice_is_left_out(tmp_path, truth):
+    times = pd.Timestamp("2026-03-01 10:00") + pd.to_timedelta(10.0 * np.arange(300), unit="s")
+    table = truth[PARTS].assign(time=times.strftime("%d.%m.%Y %H:%M:%S"))
+    pd.concat([table[:200], table[100:]]).to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    same(reading, truth)
+    told = "; ".join(reading.notes)
+    assert "100 rows occur twice, from time 01.03.2026 10:16:40 to 01.03.2026 10:33:10" in told
+
+
+def test_rows_from_the_last_to_the_first_are_turned_round(tmp_path, truth):
+    table = truth[PARTS].assign(time=10.0 * np.arange(300))
+    table[::-1].to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    same(reading, table, PARTS)
+    assert reading.name_row(0).endswith("line 301")

@@ -193,7 +193,26 @@ def test_pieces_leave_each_temperature_to_the_other_direction():
             assert up.min() > down.max() - 2.0 or down.min() > up.max() - 2.0
     split = choose_split(pd.DataFrame({"temperature": np.round(temperature, -1), "rate": 0.0}))
     assert split.kind == "piece"
-    one, two = sorted(set(split.labels))
-    assert one.startswith("1: -30 to ")
-    assert two.endswith(" to -30 °C")
+    # Five pieces of each leg, all of them groups.
+    labels = list(dict.fromkeys(split.labels))
+    assert len(labels) == 10
+    assert labels[0].startswith("1.1: -30 to ")
+    assert labels[-1].endswith(" to -30 °C")
     every_row_once(split, temperature.size)
+
+
+def test_a_row_less_moves_no_other_row_to_another_fold():
+    run = np.repeat(np.arange(12), 150)
+    table = {"run": run, "temperature": np.tile(np.linspace(0.0, 40.0, 150), 12), "rate": 0.0}
+    log = pd.DataFrame(table)
+
+    def tested_with(log):
+        found = np.empty(len(log), dtype=int)
+        for number, (_, test) in enumerate(choose_split(log, "run").folds):
+            found[test] = number
+        return found
+
+    whole = tested_with(log)
+    for lost in (0, 700, 1799):
+        less = tested_with(log.drop(index=lost).reset_index(drop=True))
+        np.testing.assert_array_equal(less, np.delete(whole, lost))

@@ -68,3 +68,12 @@ def test_one_group_shows_nothing(rng):
     verdict = judge(errors, GROUPS[:N_ROWS])
     assert np.isnan(verdict.gains["no compensation"].low)
     assert verdict.recommended == "no compensation"
+
+
+@pytest.mark.parametrize(("constant", "recommended"), [(0.5, "constant"), (1.2, "no compensation")])
+def test_one_cycle_shows_no_more_than_a_constant(rng, constant, recommended):
+    """However much better a line looks: it was judged on the cycle that it was learnt from."""
+    errors = errors_of(rng, constant=constant, line=0.01, model=0.001)
+    verdict = judge(errors, GROUPS, is_one_cycle=True)
+    assert (verdict.recommended, verdict.is_one_cycle) == (recommended, True)
+    assert judge(errors, GROUPS).recommended == "model"

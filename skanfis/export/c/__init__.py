@@ -1,5 +1,6 @@
 """A trained model as one C function over constant tables."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from typing import Any
@@ -51,6 +52,8 @@ def export_c(
     std: str = "c99",
     min_coverage: float | None = 0.1,
     saturate: Any = None,
+    units: Mapping[str, str] | None = None,
+    notes: Sequence[str] = (),
 ) -> CCode:
     """Write a trained model as C: one header and one source file.
 
@@ -77,6 +80,10 @@ def export_c(
         leaves that out, as do rules that have never seen data.
     saturate : Bounds or array-like of shape (n_outputs, 2), default=None
         Limits between which every output is held, such as :func:`skanfis.bounds.bounds` proves.
+    units : mapping of str to str, default=None
+        Units of inputs and outputs by name, such as {"temperature": "degC"}, for the header.
+    notes : sequence of str, default=()
+        Paragraphs for the first comment of the header: how an input is made, what the output is.
 
     Returns
     -------
@@ -113,7 +120,7 @@ def export_c(
     test = self_test(known_answers(numbers, min_coverage, limits), dialect)
     code = CCode(
         name,
-        header(numbers, dialect, source.cost(), min_coverage, limits),
+        header(numbers, dialect, source.cost(), min_coverage, limits, units, notes),
         source.text(f"{stem}.h") + test,
         source.cost(),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from ...policies import policy_in_words
 from .._numbers import Numbers
 from ._source import Source
-from .dialect import STATUS, Dialect, comment, read_limits, status_lines
+from .dialect import STATUS, Dialect, comment, read_limits, remark, status_lines
 
 _SILENT = {
     "raise": "there is no output: y stays as it is",
@@ -24,10 +24,14 @@ $facts
  *
  * Constant tables, no heap, no state: safe to call from several threads and from interrupts.
  * Compile without -ffast-math, which takes away the check of the inputs.
+ *
+ * MISRA C:2012, by cppcheck: required rules are kept, but not 10.1: the status is an int, and bits
+ * of it are set. Of the advisory ones Dir 4.6 and 4.9 (plain types, macros like functions), 2.5,
+ * 8.7, 8.9, 12.1, 12.3, 15.5 and 18.4 are not kept. No one has certified it.
  */
 #ifndef $NAME_H
 #define $NAME_H
-
+$include
 #ifdef __cplusplus
 extern "C" {
 #endif
@@ -54,16 +58,18 @@ int $name_self_test(void);
 """
 
 
-def header(numbers, dialect, cost, min_coverage, limits):
+def header(numbers, dialect, cost, min_coverage, limits, units=None, notes=()):
     """The header, whose first comment says what the model is and what it costs."""
     model = numbers.model
+    lowest, highest = model.output_limits
     lines = [
+        *map(remark, notes),
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(cost),
         "",
-        *input_lines(model.input_names, numbers.low, numbers.high),
+        *input_lines(model.input_names, numbers.low, numbers.high, units),
         "Outputs y, and what they are held within:",
-        *_ranges(model.output_names, *model.output_limits),
+        *_ranges(model.output_names, lowest, highest, units),
     ]
     if limits is not None:
         ends = zip(model.output_names, limits, strict=True)
@@ -93,14 +99,26 @@ def cost_lines(cost, besides=""):
     yield f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack."
 
 
-def input_lines(names, low, high):
+def input_lines(names, low, high, units=None):
     """The inputs and their range."""
-    return ["Inputs x, and their range in the training data:", *_ranges(names, low, high)]
+    return ["Inputs x, and their range in the training data:", *_ranges(names, low, high, units)]
 
 
-def _ranges(names, low, high):
-    ends = enumerate(zip(names, low, high, strict=True))
-    return [f"  [{k}] {comment(name)}: {a:.7g} to {b:.7g}" for k, (name, a, b) in ends]
+def _ranges(names, low, high, units=None):
+    units, sides = units or {}, zip(names, low, high, strict=True)
+    for k, (name, *ends) in enumerate(sides):
+        unit = f" [{comment(units[name])}]" if name in units else ""
+        yield f"  [{k}] {comment(name)}{unit}: {' to '.join(in_digits(*ends))}"
+
+
+def in_digits(low, high):
+    """Both ends of a range, to about a hundred-thousandth of its width."""
+    width = float(high) - float(low)
+    if not 0.0 < width < np.inf:
+        return [f"{end:.7g}" for end in (low, high)]
+    step = 10.0 ** (np.floor(np.log10(width)) - 5)
+    # Adding zero makes zero of minus zero.
+    return [f"{np.rint(float(end) / step) * step + 0.0:.12g}" for end in (low, high)]
 
 
 def policy_line(model, where):
@@ -124,8 +142,8 @@ def _precision_lines(numbers):
     ]
 
 
-def header_of(title, lines, dialect, n_inputs, n_outputs):
-    """A header whose first comment has these lines."""
+def header_of(title, lines, dialect, n_inputs, n_outputs, include=""):
+    """A header whose first comment has these lines; ``include`` is a line of code."""
     facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
     return dialect.write(
         _CODE.replace("$status_lines", status_lines()),
@@ -133,6 +151,7 @@ def header_of(title, lines, dialect, n_inputs, n_outputs):
         title=title,
         n_inputs=n_inputs,
         n_outputs=n_outputs,
+        include=f"\n{include}\n" if include else "",
     )
 
 

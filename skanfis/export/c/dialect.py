@@ -11,6 +11,7 @@ from ..._validation import check_choice
 from .._numbers import FLOOR, SMALLEST_LOG_SQUARE, rounded_within
 
 _DTYPES = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
+_INTEGERS = {"int_least16_t": np.dtype(np.int16), "int_least32_t": np.dtype(np.int32)}
 _STANDARDS = ("c99", "c89")
 # C99 tells identifiers apart by 31 characters; the longest suffix of ours takes the rest.
 LONGEST_NAME = 31 - len("_SELF_TEST_MAIN")
@@ -47,11 +48,12 @@ class Dialect:
     @property
     def dtype(self):
         """NumPy's name of the type."""
-        return _DTYPES[self.real]
+        return (_DTYPES | _INTEGERS)[self.real]
 
     def number(self, value):
         """A constant of the type."""
-        return _literal(self.dtype.type(value))
+        number = self.dtype.type(value)
+        return _literal(number) if self.dtype.kind == "f" else str(number)
 
     def write(self, template, **words):
         """The template with everything filled in."""
@@ -136,11 +138,19 @@ def literals(values, indent=""):
 
 
 def comment(text):
-    """Any text as something that cannot end a comment, continue a line or make a trigraph."""
+    """Any name as something that cannot end a comment, continue a line or make a trigraph."""
     text = str(text)
-    shown = text[:_LONGEST_COMMENT]
-    safe = re.sub(r"[^ -~]|[*?\\]", lambda found: f"<U+{ord(found[0]):04X}>", shown)
-    return safe + ("..." if len(text) > len(shown) else "")
+    rest = "..." if len(text) > _LONGEST_COMMENT else ""
+    return _escaped(r"[^ -~]|[*?\\]", text[:_LONGEST_COMMENT]) + rest
+
+
+def remark(text):
+    """A text of any length for a comment, in which a star may multiply."""
+    return _escaped(r"[^ -~]|[?\\]|\*(?=/)|(?<=/)\*", text)
+
+
+def _escaped(unsafe, text):
+    return re.sub(unsafe, lambda found: f"<U+{ord(found[0]):04X}>", text)
 
 
 def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_NAME):

@@ -37,13 +37,13 @@ int $name_self_test(void)
             y[o] = 0.0R;
         }
         status = $name_predict($name_test_x[i], y);
-        if (status != $name_test_status[i]) {
+        if (status != (int)$name_test_status[i]) {
             return i + 1;
         }
         for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-            const $real off = y[o] - $name_test_y[i][o];
-            if (!(status & $NAME_NO_OUTPUT)
-                && !(off <= $name_test_tolerance[o] && -off <= $name_test_tolerance[o])) {
+            if ((status & $NAME_NO_OUTPUT) == 0
+                && !(y[o] <= $name_test_y[i][o] + $name_test_tolerance[o]
+                    && y[o] >= $name_test_y[i][o] - $name_test_tolerance[o])) {
                 return i + 1;
             }
         }

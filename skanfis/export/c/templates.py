@@ -134,7 +134,8 @@ linear        |
               |        if (z[i] < $name_low[i]) {
               |            z[i] = $name_low[i];
               |            status = $NAME_OUT_OF_RANGE;
-              |        } else if (z[i] > $name_high[i]) {
+              |        }
+              |        if (z[i] > $name_high[i]) {
               |            z[i] = $name_high[i];
               |            status = $NAME_OUT_OF_RANGE;
               |        }
@@ -158,7 +159,8 @@ linear        |
  fades        |            distance += d * d;
  linear       |            if (e[i] > $name_reach[i]) {
  linear       |                e[i] = $name_reach[i];
- linear       |            } else if (e[i] < -$name_reach[i]) {
+ linear       |            }
+ linear       |            if (e[i] < -$name_reach[i]) {
  linear       |                e[i] = -$name_reach[i];
  linear       |            }
  linear       |            scale += (e[i] < 0.0R ? -e[i] : e[i]) * $name_inverse_spread[i];
@@ -183,13 +185,15 @@ linear        |
               |        y[o] = $name_offset[o] + sum[o];
  held         |        if (y[o] < $name_output_low[o]) {
  held         |            y[o] = $name_output_low[o];
- held         |        } else if (y[o] > $name_output_high[o]) {
+ held         |        }
+ held         |        if (y[o] > $name_output_high[o]) {
  held         |            y[o] = $name_output_high[o];
  held         |        }
  saturates    |        /* Not (y < low): NaN, of a fault, fails every comparison. */
  saturates    |        if (!(y[o] >= $name_limits[o][0])) {
  saturates    |            y[o] = $name_limits[o][0];
- saturates    |        } else if (y[o] > $name_limits[o][1]) {
+ saturates    |        }
+ saturates    |        if (y[o] > $name_limits[o][1]) {
  saturates    |            y[o] = $name_limits[o][1];
  saturates    |        }
               |    }

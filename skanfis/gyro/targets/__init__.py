@@ -1,0 +1,1 @@
+"""Simple functions in the place of a compensator, each with its certain largest difference."""

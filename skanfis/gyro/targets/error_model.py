@@ -1,0 +1,152 @@
+"""The error that a compensator takes off, with certain ranges of its values and slopes over boxes.
+
+It is a sum of rules, whose ranges are those of ``skanfis.bounds``, of polynomials and the arcsine
+law, by interval arithmetic. Intervals are pairs of arrays, with a number for every box.
+"""
+
+import warnings
+
+import numpy as np
+import pandas as pd
+
+from ...bounds.enclosure import Enclosure
+from ...bounds.terms import EPS, ROUNDINGS, product, size, square
+from ...exceptions import OutOfBoundsWarning
+from ...export.folding import found_by_search
+from ..compose import FrozenRules, ResidualRegressor
+from ..physics import OpenLoopArcsineRegressor
+
+
+class ErrorModel:
+    """The indicated minus the compensated rate [deg/s], as a function of the inputs.
+
+    ``estimator`` is that of the compensator, or of a fold, and X what it was fitted to: its range
+    is ``ends`` (n_inputs, 2).
+    """
+
+    def __init__(self, compensator, estimator, X):
+        self.ends = np.stack([X.min(), X.max()], axis=1)
+        self.names, self._estimator, self._parts = list(X), estimator, _parts_of(estimator)
+        self._output = self.names.index("output") if "output" in self.names else None
+        self._own = 1.0 / compensator.scale_factor
+        self._is_rate = compensator.predicts == "rate"
+
+    def __call__(self, points):
+        """The error at points (n_points, n_inputs); outside the range that at its edge."""
+        X = np.clip(points, *self.ends.T)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", OutOfBoundsWarning)
+            predicted = self._estimator.predict(pd.DataFrame(X, columns=self.names))
+        return self._own * X[:, self._output] - predicted if self._is_rate else predicted
+
+    def ranges(self, low, high):
+        """Range of the error over boxes (n_inputs, n_boxes), and of its slopes by input."""
+        value, slopes = np.zeros((2, low.shape[1])), np.zeros((2, *low.shape))
+        with np.errstate(all="ignore"):
+            for part in self._parts:
+                of_value, of_slopes = part.ranges(low[part.columns], high[part.columns])
+                value += of_value
+                slopes[:, part.columns] += of_slopes
+        if self._is_rate:
+            indicated = np.sort(self._own * np.stack([low, high])[:, self._output], axis=0)
+            value, slopes = indicated - value[::-1], -slopes[::-1]
+            slopes[:, self._output] += self._own
+        # Rounding, of what has no account of its own.
+        steep, far = np.abs(slopes).max(axis=0), np.maximum(np.abs(low), np.abs(high))
+        slack = ROUNDINGS * EPS * (np.abs(value).max(axis=0) + (steep * far).sum(axis=0))
+        return np.add(value, [-slack, slack]), slopes
+
+
+def polynomial_ranges(powers, coefficients, low, high):
+    """Range of sum_k c_k prod_j x_j^p_kj over boxes (n_axes, n_boxes), and of its slopes.
+
+    A coefficient is one number, or one for each box.
+    """
+    slopes = []
+    for axis in range(powers.shape[1]):
+        lowered = np.maximum(powers - (np.arange(powers.shape[1]) == axis), 0)
+        steeper = (coefficients.T * powers[:, axis]).T
+        slopes.append(_polynomial_range(lowered, steeper, low, high))
+    return _polynomial_range(powers, coefficients, low, high), np.swapaxes(slopes, 0, 1)
+
+
+def _polynomial_range(powers, coefficients, low, high):
+    total = np.zeros((2, low.shape[1]))
+    for power, coefficient in zip(powers, coefficients, strict=True):
+        term = (coefficient, coefficient)
+        for exponent, *ends in zip(power, low, high, strict=True):
+            for _ in range(exponent):
+                term = product(term, ends)
+        total += np.broadcast_arrays(*term, low[0])[:2]
+    return total
+
+
+def _parts_of(estimator):
+    """What the prediction of an estimator is the sum of."""
+    found = found_by_search(estimator)
+    if isinstance(found, ResidualRegressor):
+        return [*_parts_of(found.base_), *_parts_of(found.residual_)]
+    if isinstance(found, OpenLoopArcsineRegressor):
+        return [_Law(found)]
+    if hasattr(found, "powers"):
+        return [_Polynomial(found)]
+    return [_Rules(FrozenRules.of(found, getattr(found, "n_features_in_", None)))]
+
+
+class _Rules:
+    def __init__(self, rules):
+        self.columns = list(rules.positions)
+        self._sides = [Enclosure(rules.model, 0, sign) for sign in (-1.0, 1.0)]
+
+    def ranges(self, low, high):
+        values, slopes = [], []
+        for side in self._sides:
+            values.append(side.sign * side.values(low, high)[0])
+            each = [side.slope(low, high, j)[0] for j in range(len(low))]
+            slopes.append(side.sign * np.stack(each))
+        return values, slopes
+
+
+class _Polynomial:
+    """Of what has ``coefficients`` and ``powers``, of (x - ``center``) / ``scale``."""
+
+    def __init__(self, polynomial):
+        self._polynomial = polynomial
+        self.columns = list(range(polynomial.powers.shape[1]))
+
+    def ranges(self, low, high):
+        own = self._polynomial
+        scale = own.scale[:, None]
+        ends = [(side - own.center[:, None]) / scale for side in (low, high)]
+        value, slopes = polynomial_ranges(own.powers, own.coefficients, *ends)
+        return value, slopes / scale
+
+
+class _Law:
+    """asin((V - V0) / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
+
+    def __init__(self, law):
+        self._law, self.columns = law, list(law.columns_)
+
+    def ranges(self, low, high):
+        law = self._law
+        d = [end[1:2] - law.reference_temperature_ for end in (low, high)]
+        (a, a_slope), (k, k_slope), (b, b_slope) = (
+            polynomial_ranges(np.arange(each.size)[:, None], each, *d)
+            for each in (law.amplitude_, law.sagnac_factor_, law.bias_)
+        )
+        over_a, over_k = _inverse(a), _inverse(k)
+        sine = product((low[0] - law.offset_, high[0] - law.offset_), over_a)
+        sine = np.where(size(sine) <= np.sin(law.max_phase), sine, np.nan)
+        steep = product(product(over_a, over_k), [1 / np.sqrt(1 - s) for s in square(sine)])
+        phase = np.arcsin(sine)
+        bend = np.array(product(product(sine, a_slope[:, 0]), steep))
+        turn = np.array(product(phase, product(k_slope[:, 0], square(over_k))))
+        slopes = np.zeros((2, *low.shape))
+        slopes[:, 0], slopes[:, 1] = steep, -(bend + turn + b_slope[:, 0])[::-1]
+        return product(phase, over_k) - b[::-1], slopes
+
+
+def _inverse(ends):
+    """Range of 1 / x; unknown where x may be zero."""
+    return [np.where(ends[0] * ends[1] > 0.0, 1.0 / end, np.nan) for end in ends[::-1]]

@@ -1,0 +1,100 @@
+"""Files of simple targets, each with what it is worth; or why there is none."""
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from ...export.c.dialect import write_files
+from ..c_code import SUBTRACT, raw_rate_of, units_of
+from ..metrics import rms
+from .autopilots import NOTES, Cubic
+from .error_model import ErrorModel
+from .piecewise import difference
+from .tables import NAMES, Table
+
+FILES = {
+    "table": ("gyro_table.h", "gyro_table.c"),
+    "rate-table": ("gyro_rate_table.h", "gyro_rate_table.c"),
+    "px4": ("px4.params",),
+    "ardupilot": ("ardupilot.parm",),
+}
+# A target is let through whose error on rows held out is at most so many times the model's.
+_MOST_TIMES = 1.5
+_N_CALIBRATION_TEMPERATURES = 200
+_THERMOMETER = "The temperature [degC] must come from the thermometer that was logged."
+
+
+class RefusedError(Exception):
+    """Why a target is not written."""
+
+
+def write_targets(calibration, texts, folder):
+    """Write targets such as "px4:x:0"; yields these, a sentence, and whether it was done."""
+    for text in texts:
+        try:
+            yield text, _write(calibration, text, folder), True
+        except RefusedError as reason:
+            yield text, str(reason), False
+
+
+def _write(calibration, text, folder):
+    name, *details = text.split(":")
+    compensator, X = calibration.compensator, calibration.X
+    axes = ("temperature", "output") if name == "rate-table" else ("temperature",)
+    if set(X) != set(axes):
+        raise RefusedError(
+            f"the model needs {' and '.join(X)}, and this target says what follows from "
+            f"{' and '.join(axes)}. Calibrate again with --inputs {' '.join(axes)}, or ask for "
+            "another target."
+        )
+    make: Any = partial(Cubic, autopilot=name)
+    if name.endswith("table"):
+        make = partial(Table, type_name=(details or ["float"])[0])
+    error = ErrorModel(compensator, compensator.estimator, X)
+    made = make(error)
+    low, high = difference(error, made.piecewise)
+    # ArduPilot: of the difference at T less that at T_cal.
+    is_relative = name == "ardupilot"
+    largest = high - low if is_relative else max(-low, high)
+    model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
+    left = _held_out_rms(calibration, make, is_relative)
+    if not np.isfinite(largest):
+        raise RefusedError("no bound of its difference from the model could be proven.")
+    if left > _MOST_TIMES * model_rms:
+        raise RefusedError(
+            f"it leaves {left:.4g} deg/s RMS on rows held out, and the model {model_rms:.4g}; more "
+            f"than {_MOST_TIMES:g} times as much is not written."
+        )
+    of = "model(T) - model(T_cal), for the worst T_cal," if is_relative else "the model"
+    worth = (
+        f"it differs from {of} by {largest:.4g} deg/s at most, proven; it leaves {left:.4g} deg/s "
+        f"RMS on rows held out, and the model {model_rms:.4g}"
+    )
+    notes = [f"In the place of the model in compensator.json: {worth}.", _THERMOMETER]
+    if name.endswith("table"):
+        use = f"{SUBTRACT} {raw_rate_of(compensator)}"
+        write_files(made.code([use, *notes], units_of(compensator)), folder / NAMES[len(axes)])
+    else:
+        written = made.text([NOTES[name], *notes], *details)
+        (folder / FILES[name][0]).write_text(written, encoding="ascii", newline="\n")
+    return worth
+
+
+def _held_out_rms(calibration, make, is_relative):
+    """RMS error of rows in range by targets of models that are new to them [deg/s].
+
+    ``is_relative``: for the worst T_cal, where the offset at boot is what the model says there.
+    """
+    X, errors = calibration.X, calibration.before - calibration.rate
+    low, high = X["temperature"].min(), X["temperature"].max()
+    at, squares = np.linspace(low, high, _N_CALIBRATION_TEMPERATURES)[:, None], 0.0
+    folds = zip(calibration.split.folds, calibration.fold_models, strict=True)
+    for (train, test), estimator in folds:
+        error = ErrorModel(calibration.compensator, estimator, X.iloc[train])
+        made = make(error).piecewise
+        rows = test[calibration.in_range[test]]
+        left = errors[rows] - made(X.iloc[rows].to_numpy())
+        shift = made(at) - error(at) if is_relative else np.zeros(1)
+        squares = squares + (left**2).sum() + 2.0 * shift * left.sum() + left.size * shift**2
+    return float(np.sqrt(np.max(squares) / calibration.in_range.sum()))

@@ -1,0 +1,146 @@
+"""Tables in C, compiled and run: what they say, in every type, wherever the input lies."""
+
+import re
+
+import numpy as np
+import pytest
+from scipy.interpolate import RegularGridInterpolator
+
+from skanfis.gyro.targets.piecewise import difference
+from skanfis.gyro.targets.tables import TYPES, Table
+
+from ...export.c_compiler import SANITIZE, STRICT, gcc, needs_compiler, run
+from .models import ENDS, error_of, error_over_temperature
+
+UNITS = {"temperature": "degC", "output": "counts"}
+REALS = {"float": np.float32, "double": np.float64, "q31": np.int32, "q15": np.int16}
+DRIVER = """
+#define {macro}_SELF_TEST
+#include "{name}.c"
+#include <stdio.h>
+static {real} x[{n}][{d}], y[{n}];
+static int status[{n}];
+int main(void)
+{{
+    FILE *in = fopen("rows", "rb"), *out = fopen("answers", "wb");
+    int i;
+    if (!in || !out || fread(x, sizeof x, 1, in) != 1 || {name}_self_test() != 0) {{
+        return 2;
+    }}
+    for (i = 0; i < {n}; ++i) {{
+        status[i] = {name}_predict(x[i], &y[i]);
+    }}
+    fwrite(y, sizeof y, 1, out);
+    fwrite(status, sizeof status, 1, out);
+    return fclose(out);
+}}
+"""
+
+
+def made(kind, type_name, n_cells=8):
+    error = error_of("rules") if kind == "rate-table" else error_over_temperature()
+    return error, Table(error, type_name, n_cells)
+
+
+def evaluated(code, X, folder):
+    """What the compiled function makes of rows, and the status."""
+    real = {np.dtype(np.int32): "int_least32_t", np.dtype(np.int16): "int_least16_t"}
+    words = {
+        "name": code.name,
+        "macro": code.name.upper(),
+        "real": real.get(X.dtype, "float" if X.dtype == np.float32 else "double"),
+        "n": len(X),
+        "d": X.shape[1],
+    }
+    (folder / f"{code.name}.h").write_text(code.header, encoding="ascii")
+    (folder / f"{code.name}.c").write_text(code.source, encoding="ascii")
+    (folder / "driver.c").write_text(DRIVER.format(**words), encoding="ascii")
+    X.tofile(folder / "rows")
+    flags = ["-std=c99", *STRICT, *SANITIZE, "driver.c", "-o", "driver"]
+    gcc(flags, folder)
+    done = run(["./driver"], folder)
+    assert done.returncode == 0, done.stderr
+    data = (folder / "answers").read_bytes()
+    y = np.frombuffer(data, X.dtype, len(X))
+    return y, np.frombuffer(data, np.intc, len(X), y.nbytes)
+
+
+def scales_of(header):
+    """What a whole number stands for, by input and of the error, as the header tells it."""
+    text = header.replace("\n *", "")
+    inputs = re.findall(r"x\[\d\] is \w+ / 2\^(-?\d+) ", text)
+    unit = re.search(r"y\[0\] \* 2\^(-?\d+) ", text)[1]
+    return 2.0 ** np.array(inputs, dtype=float), 2.0 ** float(unit)
+
+
+@needs_compiler
+@pytest.mark.parametrize("type_name", TYPES)
+@pytest.mark.parametrize("kind", ["table", "rate-table"])
+def test_what_c_says_is_within_the_certain_difference(kind, type_name, tmp_path):
+    error, table = made(kind, type_name)
+    code, real = table.code(["A note */ with stars * 2."], UNITS), REALS[type_name]
+    rng, d = np.random.default_rng(5), len(table.names)
+    points = rng.uniform(*ENDS[:d].T, (5000, d))
+    if np.issubdtype(real, np.integer):
+        scales, unit = scales_of(code.header)
+        ends = np.iinfo(real).min, np.iinfo(real).max
+        whole = rng.integers(*ends, (5000, d), endpoint=True)
+        whole[:4] = np.array([ends, ends[::-1], ends[:1] * 2, ends[1:] * 2])[:, :d]
+        X = np.vstack([whole, np.rint(points / scales)]).astype(real)
+        # A step of the error is a small part of it.
+        assert unit < 1e-3 * np.abs(error(points)).max()
+    else:
+        scales, unit = np.ones(d), 1.0
+        X = np.vstack([points, 3.0 * points]).astype(real)
+    y, status = evaluated(code, X, tmp_path)
+    inputs = X * scales
+    held = inputs.clip(*table.piecewise.ends.T)
+    outside = (held != inputs).any(axis=1)
+    np.testing.assert_array_equal(status, outside)
+    assert 100 < outside.sum() < len(X) - 100
+    low, high = difference(error, table.piecewise)
+    # What the caller has rounded counts as it was before.
+    asked = held if unit == 1.0 else np.vstack([held[:5000], points]).clip(*table.piecewise.ends.T)
+    off = error(asked) - y * unit
+    assert low <= off.min()
+    assert off.max() <= high
+    # Held at the ends is the value there, to the last bit.
+    again = (held / scales).astype(real)
+    np.testing.assert_array_equal(y, evaluated(code, again, tmp_path)[0])
+
+
+@pytest.mark.parametrize("kind", ["table", "rate-table"])
+def test_a_table_is_the_interpolation_between_values_of_the_error(kind):
+    error, table = made(kind, "double", 6)
+    axes = [np.linspace(*ends, 7) for ends in ENDS[: len(table.names)]]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    values = error(grid.reshape(-1, len(axes))).reshape(grid.shape[:-1])
+    points = np.random.default_rng(6).uniform(*ENDS[: len(axes)].T, (500, len(axes)))
+    wanted = RegularGridInterpolator(axes, values)(points)
+    np.testing.assert_allclose(table.piecewise(points), wanted, atol=1e-12)
+
+
+@needs_compiler
+def test_no_answer_to_what_is_not_finite(tmp_path):
+    _, table = made("table", "float")
+    X = np.array([[np.nan], [np.inf], [-np.inf], [20.0]], dtype=np.float32)
+    y, status = evaluated(table.code([], UNITS), X, tmp_path)
+    np.testing.assert_array_equal(status, [10, 10, 10, 0])
+    assert np.all(y[:3] == 0.0)
+
+
+def test_the_header_says_what_goes_in_and_comes_out():
+    header = made("rate-table", "q15")[1].code(["Subtract it."], UNITS).header
+    told = " ".join(header.replace("\n *", " ").split())
+    for text in (
+        "Subtract it.",
+        "8 x 8 cells; C99, int_least16_t.",
+        "7 multiplications, 7 divisions",
+        "[0] temperature [degC]: -20 to 60",
+        "[1] output [counts]: -2500 to 2500",
+        "x[0] is temperature / 2^-9 (0.00195312), x[1] is output / 2^-3 (0.125), rounded by the "
+        "caller, who saturates it to -32768 and 32767.",
+        "No sum or product overflows",
+    ):
+        assert text in told
+    assert "#include <stdint.h>" in header

@@ -1,0 +1,152 @@
+"""What a target is worth on rows held out, by hand; and when there is none."""
+
+import re
+
+import numpy as np
+import pandas as pd
+import pytest
+from sklearn.model_selection import GroupKFold
+
+from skanfis.gyro._calibration import Recipe, calibrate
+from skanfis.gyro._split import Split
+from skanfis.gyro.metrics import rms
+from skanfis.gyro.targets.autopilots import Cubic
+from skanfis.gyro.targets.error_model import ErrorModel
+from skanfis.gyro.targets.tables import Table
+from skanfis.gyro.targets.write import write_targets
+
+pytestmark = pytest.mark.usefixtures("given_weights", "few_rivals")
+
+N_RUNS, N_ROWS = 6, 80
+BOTH = ("temperature", "output")
+
+
+def smooth(temperature):
+    return 1e-4 * temperature + 2e-6 * (temperature - 25.0) ** 2
+
+
+def a_step(temperature):
+    return smooth(temperature) + 0.02 * np.tanh((temperature - 25.0) / 3.0)
+
+
+def calibrated(error, inputs=("temperature",), **options):
+    rng = np.random.default_rng(0)
+    log = pd.DataFrame({"run": np.repeat(np.arange(N_RUNS), N_ROWS)})
+    log["temperature"] = rng.uniform(0.0, 50.0, len(log))
+    log["rate"] = rng.uniform(-100.0, 100.0, len(log)) * ("output" in inputs)
+    noise = 1e-3 * rng.normal(size=len(log))
+    log["output"] = log["rate"] * (1 + 1e-4 * (len(inputs) > 1)) + error(log["temperature"]) + noise
+    folds = list(GroupKFold(3).split(log, groups=log["run"]))
+    split = Split("run", folds, log["run"].astype(str).to_numpy(dtype=object), "runs held out")
+    return calibrate(log, split, Recipe(tuple(inputs), **options), lambda text: None)
+
+
+def written(calibration, folder, *texts):
+    found = write_targets(calibration, texts, folder)
+    return {text.partition(":")[0]: (told, done) for text, told, done in found}
+
+
+def numbers_of(told):
+    """The largest difference, and the errors of target and model."""
+    return [float(found) for found in re.findall(r"\b\d[\d.e-]*\d\b", told)]
+
+
+@pytest.fixture
+def calibration():
+    return calibrated(smooth, terms=(3,))
+
+
+def test_errors_on_rows_held_out_by_hand(calibration, tmp_path):
+    told = written(calibration, tmp_path, "table", "px4:x", "ardupilot:x")
+    assert all(done for _, done in told.values())
+    code = (tmp_path / "gyro_table.c").read_text()
+    n_cells = int(re.search(r"gyro_table_values\[(\d+)\]", code)[1]) - 1
+    X, rate, after = calibration.X, calibration.rate, calibration.after
+    left = {"table": np.empty(len(X)), "px4": np.empty(len(X))}
+    lefts = np.empty((len(X), 50))
+    for (train, test), model in zip(calibration.split.folds, calibration.fold_models, strict=True):
+        error = ErrorModel(calibration.compensator, model, X.iloc[train])
+        # Of the definition: the model's own prediction of rows that are new to it.
+        inside = test[calibration.in_range[test]]
+        by_hand = calibration.before[inside] - error(X.iloc[inside].to_numpy())
+        np.testing.assert_allclose(by_hand, after[inside], atol=1e-12)
+        for name, made in (
+            ("table", Table(error, "float", n_cells)),
+            ("px4", Cubic(error, "px4")),
+        ):
+            off = calibration.before - rate - made.piecewise(X.to_numpy())
+            left[name][test] = off[test]
+            if name == "px4":
+                at = np.linspace(*X.iloc[train].agg(["min", "max"])["temperature"], 50)[:, None]
+                lefts[test] = (off[:, None] + made.piecewise(at) - error(at))[test]
+    rows = calibration.in_range
+    for name in ("table", "px4"):
+        _, of_target, of_model = numbers_of(told[name][0])
+        assert of_target == pytest.approx(rms(left[name][rows]), rel=1e-3)
+        assert of_model == pytest.approx(rms((after - rate)[rows]), rel=1e-3)
+    # Of the temperatures at boot the worst counts.
+    worst = np.sqrt(np.mean(lefts[rows] ** 2, axis=0)).max()
+    largest, of_target, _ = numbers_of(told["ardupilot"][0])
+    assert of_target == pytest.approx(worst, rel=0.01)
+    assert largest > 1.5 * numbers_of(told["px4"][0])[0]
+
+
+def test_files_say_what_they_are_worth(calibration, tmp_path):
+    told = written(calibration, tmp_path, "table", "px4:x:2:7", "ardupilot:x:2")
+    px4, ardupilot = (tmp_path / name for name in ("px4.params", "ardupilot.parm"))
+    header = (tmp_path / "gyro_table.h").read_text().replace("\n * ", " ")
+    assert told["table"][0] in header
+    assert "subtract y[0] from the raw rate" in header
+    assert told["px4"][0] in px4.read_text().replace("\n# ", " ")
+    assert "1\t1\tTC_G2_ID\t7\t6\n" in px4.read_text()
+    assert "T_cal (INS_GYRn_CALTEMP) are measured at boot" in ardupilot.read_text().replace(
+        "\n# ", " "
+    )
+    assert "INS_TCAL2_GYR1_X " in ardupilot.read_text()
+
+
+def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
+    calibration = calibrated(a_step, terms=(5,))
+    told = written(calibration, tmp_path, "px4:x", "table")
+    assert not told["px4"][1]
+    assert "more than 1.5 times as much is not written" in told["px4"][0]
+    _, of_target, of_model = [0.0, *numbers_of(told["px4"][0])[:2]]
+    assert of_target > 1.5 * of_model
+    assert told["table"][1]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gyro_table.c", "gyro_table.h"]
+
+
+@pytest.mark.parametrize(
+    ("inputs", "options", "target", "message"),
+    [
+        (BOTH, {"terms": (2, 1)}, "px4:x", "the model needs temperature and output, and"),
+        (
+            ("temperature", "output"),
+            {"terms": (1, 1), "physics": True},
+            "table",
+            "the model needs temperature and output, and",
+        ),
+        (
+            ("temperature",),
+            {"terms": (2,)},
+            "rate-table",
+            "Calibrate again with --inputs temperature output, or",
+        ),
+    ],
+)
+@pytest.mark.usefixtures("law_of_degree_one")
+def test_what_a_target_cannot_say_is_refused_by_name(inputs, options, target, message, tmp_path):
+    calibration = calibrated(smooth, inputs, **options)
+    told, done = written(calibration, tmp_path, target)[target.partition(":")[0]]
+    assert not done
+    assert message in told
+    assert not list(tmp_path.iterdir())
+    if len(inputs) == 2:
+        assert written(calibration, tmp_path, "rate-table")["rate-table"][1]
+
+
+@pytest.mark.parametrize("type_name", ["float", "q15"])
+def test_where_there_is_no_rate_outside_a_table_ends_with_the_range(type_name, tmp_path):
+    calibration = calibrated(smooth, terms=(2,), outside="nan")
+    told = written(calibration, tmp_path, f"table:{type_name}", "px4:x")
+    assert all(done for _, done in told.values()), told

@@ -1,0 +1,124 @@
+"""What the command never does: replace what it reads, run a file unasked, hang, leave things."""
+
+import os
+import platform
+import signal
+import subprocess
+import sys
+import time
+
+import joblib
+import numpy as np
+import pandas as pd
+import pytest
+
+pytest.importorskip("matplotlib")
+
+from skanfis.datasets import make_ofog
+from skanfis.gyro import GyroCompensator, LogError, read_log
+from skanfis.gyro._frozen import frozen, single_rule
+from skanfis.gyro.command import _staged, main
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    """A log and a compensator of a constant, as JSON and as a .joblib."""
+    monkeypatch.chdir(tmp_path)
+    log = make_ofog(n_devices=1, n_runs=3, duration=300.0, random_state=0)
+    named = log.rename(columns={"temperature": "temp_c", "output": "gyro_dps"})
+    named[["time", "temp_c", "gyro_dps"]].to_csv("log.csv", index=False)
+    compensator = GyroCompensator(
+        frozen(0.5, single_rule(log[["temperature"]], "clip")), ("temperature",)
+    )
+    compensator.write_json("model.json")
+    joblib.dump(compensator, "model.joblib")
+    return log
+
+
+@pytest.mark.parametrize("target", ["log.csv", "model.json", "../{here}/log.csv"])
+def test_apply_never_replaces_what_it_reads(files, tmp_path, target, capsys):
+    before = [(tmp_path / name).read_bytes() for name in ("log.csv", "model.json")]
+    target = target.format(here=tmp_path.name)
+    for force in ([], ["--force"]):
+        assert main(["--apply", "model.json", "log.csv", "--output", target, *force]) == 4
+        assert "is what is read; --force does not replace it" in capsys.readouterr().err
+    assert [(tmp_path / name).read_bytes() for name in ("log.csv", "model.json")] == before
+    (tmp_path / "log-compensated.csv").write_text("old")
+    assert main(["--apply", "model.json", "log.csv", "--force"]) == 0
+    assert "old" not in (tmp_path / "log-compensated.csv").read_text()
+
+
+def test_a_calibration_never_replaces_its_log(files, tmp_path, capsys):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "log.csv").rename(tmp_path / "out" / "rules.txt")
+    assert main(["out/rules.txt", "--output", "out", "--force"]) == 4
+    assert "rules.txt is what is read" in capsys.readouterr().err
+
+
+def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, capsys):
+    arguments = ["--apply", "model.joblib", "log.csv", "--quiet"]
+    with pytest.raises(SystemExit, match="2"):
+        main(arguments)
+    told = capsys.readouterr().err
+    assert "loading model.joblib runs the code that is in it" in told
+    assert "--trust says that its maker is trusted" in told
+    assert not (tmp_path / "log-compensated.csv").exists()
+    assert main([*arguments, "--trust"]) == 0
+    assert "runs the code" in capsys.readouterr().err
+    rates = pd.read_csv("log-compensated.csv")
+    np.testing.assert_allclose(rates["rate_compensated"], files["output"] - 0.5)
+    joblib.dump({"a": 1}, "model.joblib")
+    for model, message in (("model.joblib", "holds a dict"), ("model.json", "JSON needs none")):
+        with pytest.raises(SystemExit, match="2"):
+            main(["--apply", model, "log.csv", "--trust", "--force"])
+        assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (",".join(f"c{k}" for k in range(10**6)) + "\n", "line 1: is longer than"),
+        ("a,b\n1,2\n" + "," * 2**22, "line 3: is longer than"),
+        ("," * 20_000 + "\n" + "1,2\n", "line 1: has 20,001 columns"),
+        ((("," * 999) + "\n") * 1000, "has no row of numbers in its first 60 lines"),
+    ],
+)
+def test_what_is_no_log_is_refused_at_once(tmp_path, text, message):
+    (tmp_path / "log.csv").write_text(text)
+    begin = time.perf_counter()
+    with pytest.raises(LogError, match=message):
+        read_log(tmp_path / "log.csv")
+    assert time.perf_counter() - begin < 1.0
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes of another kind")
+def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path):
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    names = (f"{process.pid}-x", f"{os.getpid()}-y")
+    left, alive = (tmp_path / f".skanfis-{platform.node()}-{name}" for name in names)
+    other = tmp_path / f".skanfis-another-machine-{process.pid}-z"
+    for folder in (left, alive, other):
+        folder.mkdir()
+        (folder / "part.csv").write_text("")
+    with _staged(tmp_path) as folder:
+        (folder / "done.csv").write_text("")
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        [alive.name, other.name, "done.csv"]
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
+@pytest.mark.parametrize("after", [0.3, 3.0])
+def test_ctrl_c_leaves_no_traceback_and_no_folder(tmp_path, after):
+    log = make_ofog(n_devices=1, n_runs=40, duration=3600.0, random_state=0)
+    log = log.rename(columns={"output": "gyro_dps", "temperature": "temp_c"})
+    log[["time", "temp_c", "gyro_dps", "rate", "run"]].to_csv(tmp_path / "log.csv", index=False)
+    command = [sys.executable, "-m", "skanfis.gyro", "log.csv", "--output", "out"]
+    process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    time.sleep(after)
+    process.send_signal(signal.SIGINT)
+    told = process.communicate(timeout=60)[1]
+    assert process.returncode in (130, -signal.SIGINT)
+    assert "Traceback" not in told
+    assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]

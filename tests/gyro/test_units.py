@@ -1,0 +1,143 @@
+"""Units that no name tells: settled where one reading is plausible, asked for where two are."""
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from skanfis.datasets import make_ofog
+from skanfis.gyro._guess import Request
+from skanfis.gyro.errors import LogError, UsageError
+from skanfis.gyro.log import read
+
+PARTS = ("temperature", "output", "rate")
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=3)
+
+
+def reading(tmp_path, truth, names, scales, offsets=(0.0,) * 4, paths=1):
+    """What is read of time, temp, gyro and rate in other units, without a word on them."""
+    columns = [truth["time"], truth["temperature"], truth["output"], truth["rate"]]
+    table = pd.DataFrame(
+        {
+            name: scale * column + offset
+            for name, column, scale, offset in zip(names, columns, scales, offsets, strict=True)
+        }
+    )
+    found = []
+    for number, rows in enumerate(np.array_split(np.arange(len(table)), paths)):
+        found.append(tmp_path / f"log{number}.csv")
+        table.iloc[rows].to_csv(found[-1], index=False)
+    return read(found, Request(require=PARTS, guess=True))
+
+
+NAMES = ("time", "temp", "gyro", "rate")
+
+
+@pytest.mark.parametrize(
+    ("scales", "offsets", "units"),
+    [
+        ((1, 1, 1, 1), (0, 0, 0, 0), ("s", "degC", "deg/s", "deg/s")),
+        ((1000, 1, 1, 1), (0, 0, 0, 0), ("ms", "degC", "deg/s", "deg/s")),
+        ((1e6, 1, 1, 1), (1.7e15, 0, 0, 0), ("us", "degC", "deg/s", "deg/s")),
+        ((1, 1, 1, 1), (0, 273.15, 0, 0), ("s", "K", "deg/s", "deg/s")),
+        # 40 to 59 degC in degF is 104 to 139.
+        ((1, 1.8, 1, 1), (0, 50, 0, 0), ("s", "degF", "deg/s", "deg/s")),
+        ((1, 1, 3600, 3600), (0, 0, 0, 0), ("s", "degC", "deg/h", "deg/h")),
+        # The output follows the rate, one to one, in one unit.
+        ((1, 1, np.pi / 180, 1), (0, 0, 0, 0), ("s", "degC", "rad/s", "deg/s")),
+        ((1, 1, -27_000, 1), (0, 0, 0, 0), ("s", "degC", "counts", "deg/s")),
+    ],
+)
+def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offsets, units):
+    found = reading(tmp_path, truth, NAMES, scales, offsets)
+    parts = ("time", *PARTS)
+    assert tuple(found.units[part] for part in parts) == units
+    assert set(found.assumed) == set(parts)
+    for part, name, unit in zip(parts, NAMES, units, strict=True):
+        signal = "a raw signal" if unit == "counts" else unit
+        assert f"{name!r} has no unit, taken as {signal} (" in found.assumed[part]
+    np.testing.assert_allclose(found.log["rate"], truth["rate"], rtol=1e-9)
+    assert f"({truth['rate'].min() * scales[3]:.4g} to" in found.assumed["rate"]
+
+
+def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, truth):
+    turn = np.pi / 180
+    with pytest.raises(UsageError) as caught:
+        reading(tmp_path, truth, NAMES, (1, 1, turn, turn))
+    told = str(caught.value)
+    assert "output=deg/s rate=deg/s or --units output=rad/s rate=rad/s" in told
+    assert "may be in deg/s (-1." in told
+    # The name of one column tells the other.
+    found = reading(tmp_path, truth, ("time", "temp", "gyro", "rate_rad_s"), (1, 1, turn, turn))
+    assert (found.units["output"], found.units["rate"]) == ("rad/s", "rad/s")
+    assert "rate" not in found.assumed
+
+
+@pytest.mark.parametrize(("slower", "ways"), [(60, "time=s or .*time=min"), (0.03, "s or .*=ms")])
+def test_a_clock_that_may_be_two_is_asked_for(tmp_path, truth, slower, ways):
+    with pytest.raises(UsageError, match=ways):
+        reading(tmp_path, truth, NAMES, (1 / slower, 1, 1, 1))
+
+
+@pytest.mark.parametrize(("low", "high"), [(20.0, 95.0), (60.0, 80.0)])
+def test_a_temperature_in_either_scale_is_asked_for(tmp_path, truth, low, high):
+    heat = np.linspace(low, high, len(truth))
+    with pytest.raises(UsageError, match="temperature=degC or --units temperature=degF"):
+        reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
+
+
+def test_round_levels_of_a_rate_table_tell_its_unit(tmp_path, truth):
+    rate = np.repeat([-20.0, -10.0, 0.0, 10.0, 20.0], len(truth) // 5)
+    log = truth.iloc[: rate.size].assign(rate=rate, output=1.01 * rate)
+    turn = np.pi / 180
+    for scale, unit in ((1.0, "deg/s"), (turn, "rad/s")):
+        found = reading(tmp_path, log, NAMES, (1, 1, scale, scale))
+        assert (found.units["output"], found.units["rate"]) == (unit, unit)
+    with pytest.raises(UsageError, match="output=rad/s rate=rad/s"):
+        reading(tmp_path, log.assign(rate=1.03 * rate), NAMES, (1, 1, 1, 1))
+
+
+def test_all_files_tell_what_the_first_leaves_open(tmp_path, truth):
+    """A first file that is hot throughout, and a last one that is cold."""
+    log = truth.assign(temperature=np.linspace(50.0, 10.0, len(truth)))
+    found = reading(tmp_path, log, NAMES, (1, 1, 1, 1), paths=4)
+    assert found.units["temperature"] == "degC"
+    fahrenheit = reading(tmp_path, log.assign(temperature=log["temperature"] + 5), NAMES,
+                         (1, 1.8, 1, 1), (0, 32, 0, 0), paths=4)  # fmt: skip
+    assert fahrenheit.units["temperature"] == "degF"
+    np.testing.assert_allclose(fahrenheit.log["temperature"], log["temperature"] + 5, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("output", "readings"),
+    [
+        (0.005, "output=deg/s or --units output=rad/s"),
+        (15.0, "output=deg/s or --units output=deg/h"),
+        ([-300, 400], "output=deg/h or --units output=counts"),
+    ],
+)
+def test_a_bias_alone_tells_no_unit(tmp_path, output, readings):
+    heat = np.linspace(20.0, 60.0, 200)
+    table = {"temp_c": heat, "gyro": np.resize(output, 200)}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(UsageError, match=readings):
+        read([tmp_path / "log.csv"], Request(require=("temperature", "output"), guess=True))
+
+
+def test_the_rate_of_the_earth_is_known(tmp_path):
+    heat = np.linspace(20.0, 60.0, 200)
+    table = {"temp_c": heat, "gyro_deg_h": 15.0 + 0.1 * heat, "rate": 15.041}
+    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    found = read([tmp_path / "log.csv"], Request(require=PARTS, guess=True))
+    assert found.units["rate"] == "deg/h"
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_row_or_two_and_columns_without_numbers_tell_nothing(tmp_path, rows):
+    table = {"time": [1.0, 2.0], "temp": ["", ""], "gyro": [1.0, ""], "rate": [2.0, 3.0]}
+    pd.DataFrame(table)[:rows].to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises((LogError, UsageError)):
+        read([tmp_path / "log.csv"], Request(require=("output",), guess=True))
