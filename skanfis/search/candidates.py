@@ -1,9 +1,8 @@
 """What a search may try: kinds of rule bases, each a sequence from small to large.
 
-Both kinds begin with one rule, a line. A grid grows by one term at a time, on the input where the
-error expected of new rows promises to be the smallest before any premise has moved; an input that
-asks for no terms gets none. Scattered rules stand on the clusters of k-means, half as many again
-each time.
+Both kinds begin with one rule, a line. A grid grows by one term at a time, beside those that have
+learnt already (``trials`` knows on which input); an input that asks for no terms gets none.
+Scattered rules stand on the clusters of k-means, half as many again each time.
 """
 
 from collections.abc import Sequence
