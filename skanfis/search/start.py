@@ -48,7 +48,7 @@ class Start:
     penalty: Penalty
     displacement: np.ndarray | None = None  # of the premises; None is zero
     is_free: bool = False  # whether terms have no bounds (see ``premise``)
-    # Agreement is such that the strongest rule holds alone: it does not fall as the rows rise.
+    # Agreement was raised as far as the tolerance allows: it does not fall as the rows rise.
     agreement_is_raised: bool = False
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules

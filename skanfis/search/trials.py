@@ -31,7 +31,7 @@ from .tuning import FIRST_STEPS, Tuned, tune
 _ROWS_EACH, _FEWEST_ROWS = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
-# Of one training.
+# Of a pass over the rows of a training.
 _MOST_OPERATIONS = 1e9
 # Turns of weights and premises of a candidate.
 _TURNS = 2
@@ -92,7 +92,8 @@ class Trials:
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
         self.scattered_inputs = plan.inputs
-        self._begun[self.one_rule] = self._train(self.one_rule)
+        # A line has no premises to move: begun is done.
+        self._begun[self.one_rule] = self._found[self.one_rule] = self._train(self.one_rule)
         # Scattered rules have terms on those inputs of which the line's residual says something.
         scores = self._scores(self.one_rule)
         asked = scores > _SIGNIFICANT
@@ -129,10 +130,10 @@ class Trials:
         promising = [(one, self._train(one, smaller, 0, _STEPS_TO_PROMISE)) for one in grown]
         if not promising:
             return None
+        # Of columns that are alike, rounding is not to choose: six digits.
         promising.sort(key=lambda pair: float(f"{self.expected(pair[1]):.6g}"))
         leading = promising[:_TRAINED]
         self._begun.update(leading)
-        # Of columns that are alike, rounding is not to choose.
         return min(leading, key=lambda pair: float(f"{self.expected(self.tuned(pair[0])):.6g}"))[0]
 
     def _asking(self, candidate):

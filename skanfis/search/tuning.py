@@ -65,7 +65,7 @@ class Tuned:
     evaluation: Evaluation
     displacement: np.ndarray
     posterior: Laplace
-    agreement_is_raised: bool = False  # agreement was raised until the strongest rule holds alone
+    agreement_is_raised: bool = False  # as far as the tolerance allows
 
     @property
     def penalty(self):
