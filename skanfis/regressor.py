@@ -199,7 +199,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     _parameter_constraints: ClassVar[dict] = {
         "n_mfs": [StrOptions({"auto"}), Integral, "array-like"],
         "partition": [
-            StrOptions({"auto", "grid", "scattered"}),
+            StrOptions({"auto", "grid", "scattered", "tree"}),
             HasMethods(["fit", "fit_predict"]),
             HasMethods(["predict", "strengths"]),
         ],

@@ -4,6 +4,7 @@ from .base import Antecedent, TermGroup
 from .grid import GridAntecedent
 from .rule_table import RuleTableAntecedent
 from .scattered import ScatteredAntecedent
+from .tree import TreeAntecedent
 
 __all__ = [
     "Antecedent",
@@ -11,4 +12,5 @@ __all__ = [
     "RuleTableAntecedent",
     "ScatteredAntecedent",
     "TermGroup",
+    "TreeAntecedent",
 ]

@@ -95,6 +95,16 @@ class Antecedent(ABC):
         """Whether rules share the terms of an input, which then can be kept in order."""
         return True
 
+    @property
+    def least_width(self):
+        """Of a term, in standardised units; what is narrower is crisp, and does not move."""
+        return 0.0
+
+    @property
+    def tied(self):
+        """Of every entry of :attr:`parameters`, by which displacement it moves (``premise``)."""
+        return np.arange(self.parameters.size)
+
     def factor_terms(self) -> list[dict[int, np.ndarray]]:
         """For each factor of the strengths, by input, the terms of each of its shares.
 

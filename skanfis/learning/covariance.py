@@ -102,7 +102,8 @@ def _premises(problem, premise, evaluation):
     x = premise.displacement(evaluation.antecedent.parameters)
     raw = problem.curvature(evaluation)
     identity = np.eye(premise.size)
-    transposed, hessian = premise.pull_back(x, identity, raw.gauss_newton)
+    every = np.eye(raw.gauss_newton.shape[0])
+    transposed, hessian = premise.pull_back(x, every, raw.gauss_newton)
     stiffness = problem.penalty.stiffness
     try:
         inverse = NormalFactor(hessian + stiffness * identity).half_solve(identity)

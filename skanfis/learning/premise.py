@@ -30,6 +30,7 @@ class Premise:
     lower: np.ndarray
     upper: np.ndarray
     _unit: np.ndarray  # raw units per unit of displacement of what moves by itself
+    _tied: np.ndarray  # the displacement by which each parameter moves
     _ordered: tuple[OrderedTerms, ...]
 
     @classmethod
@@ -57,7 +58,16 @@ class Premise:
             # Up to one width beyond the data, or where the term stands already.
             lower[locations] = np.minimum((minimum[j] - raw[locations]) / widths - 1.0, 0.0)
             upper[locations] = np.maximum((maximum[j] - raw[locations]) / widths + 1.0, 0.0)
-        return cls(antecedent, lower, upper, unit, tuple(ordered))
+            first = np.array([term.widths[0] for term in own])
+            is_crisp = widths < antecedent.least_width
+            with np.errstate(divide="ignore"):
+                least = np.log(antecedent.least_width) - raw[first]
+            lower[first] = np.maximum(lower[first], least)
+            for still in (locations[is_crisp], first[is_crisp]):
+                lower[still] = upper[still] = 0.0
+        tied = antecedent.tied
+        size = np.unique(tied).size
+        return cls(antecedent, lower[:size], upper[:size], unit, tied, tuple(ordered))
 
     @property
     def size(self):
@@ -69,7 +79,7 @@ class Premise:
         if not np.any(displacement):
             # What is not moved is as it was given, to the last bit.
             return self.antecedent.parameters
-        raw = self.antecedent.parameters + self._unit * displacement
+        raw = self.antecedent.parameters + self._unit * displacement[self._tied]
         for row in self._ordered:
             gaps = row.gaps(displacement)
             raw[row.locations] = row.low + np.cumsum(gaps)[:-1]
@@ -78,7 +88,7 @@ class Premise:
 
     def displacement(self, parameters):
         """The displacement at which the antecedent has these parameters."""
-        x = (parameters - self.antecedent.parameters) / self._unit
+        x = ((parameters - self.antecedent.parameters) / self._unit)[: self.size]
         for row in self._ordered:
             gaps = row.gaps_of(parameters[row.locations])
             x[row.locations] = row.from_gaps(gaps)
@@ -90,7 +100,8 @@ class Premise:
 
     def pull_back(self, displacement, gradient, gauss_newton):
         """Gradient and Gauss-Newton matrix by the displacements from those by the parameters."""
-        jacobian = np.diag(self._unit)
+        jacobian = np.zeros((self._unit.size, self.size))
+        jacobian[np.arange(self._unit.size), self._tied] = self._unit
         for row in self._ordered:
             by_location, by_gaps = row.jacobian(displacement)
             jacobian[row.locations[:, None], row.locations] = by_location

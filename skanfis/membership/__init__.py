@@ -4,7 +4,7 @@ from .base import GREATEST_CROSSING, LEAST_TRUTH, Membership, Parameter
 from .bell import Bell
 from .flanked import PiShaped, SShaped, Trapezoidal, Triangular, TwoSidedGaussian, ZShaped
 from .gaussian import Gaussian
-from .sigmoid import SigmoidDifference, SigmoidProduct
+from .sigmoid import SigmoidDifference, SigmoidFalling, SigmoidProduct, SigmoidRising
 
 __all__ = [
     "GREATEST_CROSSING",
@@ -18,7 +18,9 @@ __all__ = [
     "PiShaped",
     "SShaped",
     "SigmoidDifference",
+    "SigmoidFalling",
     "SigmoidProduct",
+    "SigmoidRising",
     "Trapezoidal",
     "Triangular",
     "TwoSidedGaussian",

@@ -12,6 +12,8 @@ is negative in the tail on the less steep side. So the difference has one flank,
 The top, at u = 0, is below one: tanh(v / 2) for the difference, s(v)^2 for the product.
 """
 
+from typing import ClassVar
+
 import numpy as np
 
 from .base import Membership, Parameter
@@ -127,3 +129,50 @@ class SigmoidProduct(Membership):
         v = _first_ratio(overlap)
         flank = 0.5 * spacing / np.arccosh(0.5 * np.exp(v) / overlap - np.cosh(v))
         return np.stack([center, np.log(v * flank), np.log(flank), np.log(flank)])
+
+
+class _Side(Membership):
+    """One side of a cut."""
+
+    parameters = (Parameter("center", "location"), Parameter("width", "log_width"))
+    side: ClassVar[float]  # on which it is true: 1 right, -1 left
+
+    @classmethod
+    def value(cls, x, theta):
+        cut, log_width = theta[:, :, None]
+        return 1.0 / (1.0 + np.exp(-cls.side * (x - cut) * np.exp(-log_width)))
+
+    @classmethod
+    def log_value(cls, x, theta):
+        cut, log_width = theta[:, :, None]
+        return _log_sigmoid(cls.side * (x - cut) * np.exp(-log_width))
+
+    @classmethod
+    def log_value_and_gradient(cls, x, theta):
+        cut, log_width = theta[:, :, None]
+        inverse_width = cls.side * np.exp(-log_width)
+        u = (x - cut) * inverse_width
+        log_mu = _log_sigmoid(u)
+        # d log s(u) / du = 1 - s(u)
+        by_u = -np.expm1(log_mu)
+        return log_mu, np.stack([-inverse_width * by_u, -u * by_u])
+
+    @classmethod
+    def start(cls, center, spacing, overlap):
+        # Over half a spacing log odds fall by three, to those of the overlap.
+        width, odds = spacing / 6.0, 3.0 + np.log(overlap / (1.0 - overlap))
+        return np.stack([center - cls.side * odds * width, np.log(width)])
+
+
+class SigmoidRising(_Side):
+    """mu(x) = s((x - c) / h), with theta = (c, log h): "above c"."""
+
+    name = "sigmoid_rising"
+    side = 1.0
+
+
+class SigmoidFalling(_Side):
+    """mu(x) = s((c - x) / h), with theta = (c, log h): "below c"."""
+
+    name = "sigmoid_falling"
+    side = -1.0

@@ -22,7 +22,7 @@ from ..learning.premise import Premise
 from ..membership import Membership
 from ..model import TSKModel
 from ..policies import TargetRange
-from .candidates import Candidate, RuleBases, term_scores
+from .candidates import Candidate, RuleBases, best_splits, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
 from .tuning import FIRST_STEPS, Tuned, tune
@@ -119,7 +119,14 @@ class Trials:
 
     def larger(self, kind, candidate, n_steps=1) -> Candidate | None:
         """The next of a kind, or the one so many steps on; None where there are not the rows."""
-        if kind == "scattered":
+        if kind == "tree":
+            for _ in range(n_steps - 1):
+                candidate = self.larger(kind, candidate)
+                if candidate is None:
+                    return None
+            splits = best_splits(self.tuned(candidate), self.plan.inputs, _TRIED)
+            grown = [candidate.with_split(split) for split in splits]
+        elif kind == "scattered":
             grown = [candidate.with_more_clusters(n_steps)] if self.scattered_inputs.size else []
         else:
             tried = combinations_with_replacement(self._asking(candidate), n_steps)

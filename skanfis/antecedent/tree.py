@@ -1,0 +1,82 @@
+r"""A tree of soft splits: rules are its leaves.
+
+Node n cuts one input j at c over a width s,
+
+    sigma_n(x) = 1 / (1 + exp(-(x_j - c) / s)) ,
+
+the truth of "x_j is above c"; below c it is 1 - sigma_n. A rule's strength is the product over the
+nodes on its path. Strengths sum to one as they are (Jordan and Jacobs 1994), so that no rule comes
+back far away, and a rule speaks of the inputs on its path alone.
+
+As a rule base it is a table of rules over two terms per node, its sides: first all that are above,
+then all that are below. Both sides have one cut and one width.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..membership import SigmoidFalling, SigmoidRising
+from .base import TermGroup
+from .rule_table import RuleTableAntecedent
+
+# A side is 0.9 true 0.1 standard deviations from its cut, no sooner: the error hardly tells a soft
+# split from a jump, and a reader does.
+LEAST_WIDTH = 0.1 / np.log(9.0)
+# Of two values: in lengths of its width, each is so far from the cut that its side is one to the
+# last bit.
+CRISP = 40.0
+
+
+@dataclass(frozen=True, eq=False)
+class TreeAntecedent(RuleTableAntecedent):
+    """Leaves of a tree; ``table`` has the sides on the path of each, from the root on."""
+
+    @classmethod
+    def build(cls, inputs, theta, paths):
+        """Of the input of each node, theta (2, n_nodes), and for every leaf its path.
+
+        A path is a sequence of (node, is_above) from the root on.
+        """
+        inputs, theta = np.asarray(inputs, dtype=int), np.asarray(theta, dtype=float)
+        table = np.full((len(paths), max(map(len, paths), default=0)), -1)
+        for row, path in zip(table, paths, strict=True):
+            row[: len(path)] = [node if is_above else inputs.size + node for node, is_above in path]
+        sides = (SigmoidRising, SigmoidFalling)
+        return cls(tuple(TermGroup(side, inputs, theta.copy()) for side in sides), table)
+
+    @property
+    def is_ordered(self):
+        return False
+
+    @property
+    def n_nodes(self):
+        """Number of nodes that cut."""
+        return self.n_terms // 2
+
+    @property
+    def least_width(self):
+        return LEAST_WIDTH
+
+    @property
+    def tied(self):
+        """Parameters of both sides are one: of every entry of the vector, which displacement."""
+        return np.tile(np.arange(2 * self.n_nodes), 2)
+
+    @property
+    def paths(self):
+        """Of every leaf, (node, is_above) from the root on."""
+        n = self.n_nodes
+        return [[(int(t) % n, bool(t < n)) for t in row if t >= 0] for row in self.table]
+
+    def split(self, leaf, j, cut, log_width):
+        """The tree in which two leaves stand for one: above the cut, in its place, and below."""
+        paths, node = self.paths, self.n_nodes
+        paths[leaf : leaf + 1] = [[*paths[leaf], (node, side)] for side in (True, False)]
+        nodes = self.groups[0]
+        theta = np.column_stack([nodes.theta, [cut, log_width]])
+        return self.build(np.append(nodes.inputs, j), theta, paths)
+
+    def normalise(self, log_mu):
+        strengths = np.exp(self._contains @ log_mu)
+        return strengths, strengths
