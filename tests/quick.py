@@ -28,6 +28,5 @@ def of_given_stiffness(solver):
 
 def with_few_candidates(patch):
     """Let the search for a structure go all of its ways, but not as often."""
-    patch.setattr(search, "_MOST_STEPS", 1)
+    patch.setattr(search, "_FURTHER", 1)
     patch.setattr(trials, "_TRIED", 1)
-    patch.setattr(trials, "_TRAINED", 1)

@@ -1,8 +1,9 @@
 """What a search may try: kinds of rule bases, each a sequence from small to large.
 
-Both kinds begin with one rule, a line. A grid grows by one term at a time, beside those that have
-learnt already (``trials`` knows on which input); an input that asks for no terms gets none.
-Scattered rules stand on the clusters of k-means, half as many again each time.
+All kinds begin with one rule, a line. A grid grows by one term at a time, beside those that have
+learnt already (``trials`` knows on which input); an input that asks for no terms gets none. Of a
+tree, one leaf at a time is split (``splits``). Scattered rules stand on the clusters of k-means,
+half as many again each time.
 """
 
 from collections.abc import Sequence
@@ -13,35 +14,22 @@ import numpy as np
 from sklearn.cluster import KMeans
 
 from ..antecedent import TreeAntecedent
-from ..antecedent.tree import CRISP, LEAST_WIDTH
 from ..learning.data import StandardisedData
 from ..membership import Membership
 from .clusters import clustered_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
+from .splits import Split
 from .tuning import Tuned
 
 KINDS = ("grid", "tree", "scattered")
 _MORE_CLUSTERS = 1.5
 # Digits that rounding leaves alone where units change.
 _DIGITS = 9
-# Cuts that are looked at are so many quantiles of a leaf; a new one is as wide as this part of the
-# leaf's deviation; beyond so many inputs their products are not looked at.
-_BINS, _WIDTH, _MOST_CROSSED = 16, 0.25, 200
-
-
-@dataclass(frozen=True)
-class Split:
-    """Two leaves in the place of one, in standardised units."""
-
-    leaf: int
-    input: int
-    cut: float
-    log_width: float
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A structure to be tried: a grid of so many terms per input, so many scattered rules, a tree."""
+    """A structure to be tried: a grid of terms per input, a tree, or so many scattered rules."""
 
     counts: tuple[int, ...]
     n_clusters: int = 0  # of scattered rules
@@ -50,11 +38,14 @@ class Candidate:
     @property
     def kind(self):
         """One of the kinds, or "one rule"."""
-        if self.splits:
-            return "tree"
-        if self.n_clusters:
-            return "scattered"
+        if not self.is_grid:
+            return "scattered" if self.n_clusters else "tree"
         return "one rule" if self.n_rules == 1 else "grid"
+
+    @property
+    def is_grid(self):
+        """Whether rules are all combinations of terms; one rule is."""
+        return not (self.n_clusters or self.splits)
 
     @property
     def n_rules(self):
@@ -71,26 +62,23 @@ class Candidate:
         """In words."""
         if self.n_rules == 1:
             return "one rule"
-        if self.n_clusters:
-            return f"{self.n_clusters} scattered rules"
-        return f"tree of {self.n_rules} rules" if self.splits else f"grid {list(self.counts)}"
+        if self.is_grid:
+            return f"grid {list(self.counts)}"
+        return f"tree of {self.n_rules} rules" if self.splits else f"{self.n_rules} scattered rules"
 
-    def with_more_terms(self, inputs):
-        """The grid with one more term on each of some inputs."""
+    def with_more_terms(self, j):
+        """The grid with one more term on an input."""
         counts = list(self.counts)
-        for j in inputs:
-            counts[j] += 1
+        counts[j] += 1
         return replace(self, counts=tuple(counts))
 
     def with_split(self, split):
         """The tree with one leaf more."""
         return replace(self, splits=(*self.splits, split))
 
-    def with_more_clusters(self, n_steps=1):
-        """Half as many scattered rules again, two at least, so many times."""
-        number = self.n_clusters
-        for _ in range(n_steps):
-            number = max(2, int(np.ceil(_MORE_CLUSTERS * number)))
+    def with_more_clusters(self):
+        """Half as many scattered rules again, two at least."""
+        number = max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters)))
         return replace(self, n_clusters=number)
 
 
@@ -118,13 +106,12 @@ class RuleBases:
     def of(self, candidate: Candidate, rows: StandardisedData, smaller=None):
         """The antecedent of a candidate.
 
-        Clusters are sought in the rows; a grid keeps the terms that a ``smaller`` one has learnt.
+        Clusters are sought in the rows; grids and trees keep what a ``smaller`` one has learnt.
         """
         if candidate.splits:
-            tree = smaller if isinstance(smaller, TreeAntecedent) else TreeAntecedent.build([], np.empty((2, 0)), [[]])
-            for split in candidate.splits[tree.n_nodes :]:
-                tree = tree.split(split.leaf, split.input, split.cut, split.log_width)
-            return tree
+            *before, last = candidate.splits
+            tree = smaller if before else TreeAntecedent.build([], [[], []], [[]])
+            return tree.split(last.leaf, last.input, last.cut, last.log_width)
         if not candidate.n_clusters:
             return grid_antecedent(self.families, candidate.counts, self.spacing, known=smaller)
         clusterer = KMeans(candidate.n_clusters, n_init=1, random_state=self.seed)
@@ -150,12 +137,10 @@ def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):
 
     in deviations from what noise alone would give it.
     """
-    problem, rows = tuned.problem, tuned.problem.rows
+    rows = tuned.problem.rows
     weight = rows.sample_weight
     assert weight is not None  # a search sample has them
-    found = [residual for _, residual, _ in problem.residuals(tuned.evaluation)]
-    residual = np.concatenate(found, axis=1).T
-    residual -= np.average(residual, axis=0, weights=weight)
+    residual = tuned.residual - np.average(tuned.residual, axis=0, weights=weight)
     variance = np.average(residual**2, axis=0, weights=weight)
     varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
     basis = np.column_stack([np.ones(rows.n_rows), varying])
@@ -179,62 +164,3 @@ def _shares(column, centers):
     log_truth = 4.0 * np.log(OVERLAP) * ((column[:, None] - centers) / distance) ** 2
     shares = np.exp(log_truth - log_truth.max(axis=1, keepdims=True))
     return shares / shares.sum(axis=1, keepdims=True)
-
-
-def best_splits(tuned: Tuned, inputs, n_most):
-    """Those that the residual of a model asks for most, best first; one of every leaf and input.
-
-    At a cut, with p the part of the leaf below it, b the functions 1 and z_i about the leaf's own
-    centre, and r the residual, the statistic is the sum over b of
-
-        (sum s w (h - p) b r)^2 / sum s w (h - p)^2 b^2 ,    h one below the cut and zero above,
-
-    in deviations from what noise alone would give it.
-    """
-    problem, rows = tuned.problem, tuned.problem.rows
-    weight = rows.sample_weight
-    found = [residual for _, residual, _ in problem.residuals(tuned.evaluation)]
-    residual = np.concatenate(found, axis=1).T
-    variance = np.average(residual**2, axis=0, weights=weight)
-    varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
-    if varying.shape[1] > _MOST_CROSSED:
-        varying = varying[:, :0]
-    strengths = tuned.evaluation.antecedent.strengths(rows.X.T)
-    splits = []
-    for leaf, strength in enumerate(strengths):
-        own = weight * strength
-        total = own.sum()
-        basis = np.column_stack([np.ones(rows.n_rows), varying - own @ varying / total])
-        along = (own[:, None] * basis)[:, :, None] * residual[:, None, :]
-        squares = own[:, None] * basis**2
-        values = np.column_stack([along.reshape(rows.n_rows, -1), squares, own])
-        for j in inputs:
-            order = np.argsort(rows.X[:, j], kind="stable")
-            column = rows.X[order, j]
-            upto = np.cumsum(own[order])
-            # Where the next value is another one, about evenly by weight.
-            ends = np.unique(np.searchsorted(upto, np.arange(1, _BINS) / _BINS * total))
-            ends = np.unique(np.searchsorted(column, column[np.minimum(ends, column.size - 1)], side="right"))
-            ends = ends[(ends > 0) & (ends < column.size)]
-            if not ends.size:
-                continue
-            starts = np.concatenate([[0], ends])
-            sums = np.add.reduceat(values[order], starts, axis=0).cumsum(axis=0)
-            whole, below = sums[-1], sums[:-1]
-            part = (below[:, -1:] / total).clip(0.0, 1.0)
-            n_basis, n_out = basis.shape[1], residual.shape[1]
-            n = n_basis * n_out
-            difference = (below[:, :n] - part * whole[:n]).reshape(-1, n_basis, n_out)
-            low, all_ = below[:, n : n + n_basis], whole[n : n + n_basis]
-            norm = low * (1.0 - part) ** 2 + (all_ - low) * part**2
-            square = difference**2 / np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
-            statistic = (square.sum(axis=(1, 2)) - n) / np.sqrt(2.0 * n)
-            best = int(statistic.argmax())
-            cut = 0.5 * (column[ends[best] - 1] + column[ends[best]])
-            spread = np.sqrt(np.average((rows.X[:, j] - np.average(rows.X[:, j], weights=own)) ** 2, weights=own))
-            width = max(_WIDTH * spread, LEAST_WIDTH)
-            if column[ends[best] - 1] == column[0] and column[ends[best]] == column[-1]:
-                width = 0.5 * (column[-1] - column[0]) / CRISP
-            splits.append((statistic[best], Split(leaf, int(j), float(cut), float(np.log(width)))))
-    splits.sort(key=lambda pair: -float(f"{pair[0]:.6g}"))
-    return [split for _, split in splits[:n_most]]

@@ -16,6 +16,9 @@ import numpy as np
 
 from .candidates import Candidate
 
+# Of a squared error of the standardised target.
+_ROUNDING = float(np.finfo(float).eps)
+
 
 @dataclass(frozen=True, eq=False)
 class Judged:
@@ -60,11 +63,12 @@ class Judges:
         return float(np.average(squares, weights=self.weight))
 
     def prefer(self, candidate: Judged, than: Judged) -> bool:
-        """Whether a larger candidate leaves less, by more than one standard error."""
+        """Whether a larger candidate leaves less, by more than one standard error, or rounding."""
         gain = than.squares - candidate.squares
         mean = self.mean(gain)
         excess = np.bincount(self.group, self.weight * (gain - mean))
-        return bool(mean > np.sqrt(np.sum(excess**2)) / np.sum(self.weight))
+        error = np.sqrt(np.sum(excess**2)) / np.sum(self.weight)
+        return bool(mean > max(error, _ROUNDING))
 
 
 def best_of(judged, judges: Judges) -> Judged:

@@ -46,11 +46,19 @@ def splits(rows: StandardisedData):
     n_rows, groups = rows.n_rows, rows.groups
     if groups is not None and np.unique(groups).size > 1:
         n_folds = min(_FOLDS, np.unique(groups).size)
-        return list(GroupKFold(n_folds).split(rows.X, groups=groups))
+        folds = GroupKFold(n_folds).split(rows.X, groups=groups)
+        return [(grow, _in_range(rows, grow, judge)) for grow, judge in folds]
     every, n_folds = np.arange(n_rows), min(_FOLDS, n_rows)
     if n_rows == 1:
         return [(every, every)]
     if n_rows >= _PLENTY:
-        return [(every[1::2], every[::2])]
+        return [(every[1::2], _in_range(rows, every[1::2], every[::2]))]
     folds = [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
-    return folds[: int(np.ceil(n_folds * _ENOUGH / n_rows))]
+    return [(grow, _in_range(rows, grow, judge)) for grow, judge in folds[: int(np.ceil(n_folds * _ENOUGH / n_rows))]]
+
+
+def _in_range(rows, grow, judge):
+    """Those within the box of the rows to grow on."""
+    X = rows.X[grow]
+    inside = ((rows.X[judge] >= X.min(axis=0)) & (rows.X[judge] <= X.max(axis=0))).all(axis=1)
+    return judge[inside] if 2*inside.sum() >= inside.size else judge

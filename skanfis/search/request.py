@@ -14,7 +14,7 @@ from .._validation import warn_user
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..learning.data import StandardisedData
 from ..learning.evidence import FREE
-from ..membership import Membership
+from ..membership import Gaussian, Membership
 from ..model import TSKModel
 from .candidates import KINDS
 from .clusters import clustered_antecedent
@@ -81,13 +81,24 @@ class StructureRequest:
         """Where to start from, for these rows."""
         self._check_combination()
         if self.is_searched:
-            kinds = KINDS if self.partition == "auto" else (self.partition,)
-            return StructureSearch(rows, self._plan(rows), self.simplicity).run(kinds)
+            return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
         if isinstance(self.partition, TSKModel):
             antecedent = imported_antecedent(self.partition, rows)
             names = self.partition.term_names
             return replace(self._tuned(antecedent, rows), term_names=names)
         return self._tuned(self._antecedent(rows), rows)
+
+    def _kinds(self):
+        """What is searched. A tree has sides of cuts, and no terms of a family that was given."""
+        has_family = any(family is not Gaussian for family in self.families)
+        if self.partition == "tree" and has_family:
+            raise ValueError(
+                "mf is of grids and scattered rules, and partition='tree' has sides of cuts, which "
+                "are sigmoids: leave mf at 'gaussian', or use another partition."
+            )
+        if self.partition != "auto":
+            return (self.partition,)
+        return [kind for kind in KINDS if kind != "tree" or not has_family]
 
     def _plan(self, rows):
         given: dict[str, Any] = {**self.weights}

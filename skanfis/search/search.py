@@ -2,8 +2,7 @@
 
 Every kind is a sequence from small to large (``candidates``). It is grown on all rows and, beside,
 anew without those that judge it (``judging``), all in step, while the error expected of new rows
-falls. Where a step gains nothing, two at once are tried: a product of two inputs needs terms on
-both before any helps.
+falls, and a step further: a product of two inputs needs terms on both before any helps.
 """
 
 from collections.abc import Sequence
@@ -18,8 +17,9 @@ from .judging import dealt_rows, splits
 from .start import Start, started
 from .trials import Plan, Trials
 
-# Where one step from the best gains nothing, two at once may; then the sequence ends.
-_MOST_STEPS = 2
+# Steps beyond the best of a kind, after which its sequence ends: a product of two inputs needs
+# terms on both before any helps.
+_FURTHER = 2
 
 
 class StructureSearch:
@@ -57,22 +57,21 @@ class StructureSearch:
         return started(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
 
     def _grow(self, kind, one_rule):
-        """Judge a kind from small to large."""
-        best, in_folds, n_steps = one_rule, [self.trials.one_rule] * len(self.folds), 1
-        while n_steps <= _MOST_STEPS:
-            larger = self.trials.larger(kind, best.candidate, n_steps)
-            each = (
-                larger if fold is self.trials else fold.larger(kind, one, n_steps)
+        """Judge a kind from small to large, some steps further than the best."""
+        best, n_further = one_rule, 0
+        candidate, in_folds = self.trials.one_rule, [self.trials.one_rule] * len(self.folds)
+        while n_further < _FURTHER:
+            candidate = self.trials.larger(kind, candidate)
+            in_folds = [
+                candidate if fold is self.trials else fold.larger(kind, one)
                 for fold, one in zip(self.folds, in_folds, strict=True)
-            )
-            grown = [one for one in each if one is not None]
-            if larger is None or len(grown) < len(self.folds):
+            ]
+            if candidate is None or None in in_folds:
                 return
-            now = self._judge(larger, grown)
-            self.judged.append(now)
-            n_steps += 1
-            if self.judges.prefer(now, best):
-                best, in_folds, n_steps = now, grown, 1
+            self.judged.append(self._judge(candidate, in_folds))
+            n_further += 1
+            if self.judges.prefer(self.judged[-1], best):
+                best, n_further = self.judged[-1], 0
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""
@@ -109,7 +108,7 @@ class StructureSearch:
                 "structure": one.candidate.describe(),
                 "kind": one.candidate.kind,
                 "rules": one.candidate.n_rules,
-                "n_mfs": None if one.candidate.n_clusters else list(one.candidate.counts),
+                "n_mfs": list(one.candidate.counts) if one.candidate.is_grid else None,
                 "reading_cost": one.cost,
                 "expected_error": float(np.sqrt(one.squared_error)),
                 "chosen": one is found,

@@ -10,7 +10,6 @@ A candidate sees as many rows as its parameters need, and not more.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement
 
 import numpy as np
 
@@ -22,9 +21,10 @@ from ..learning.premise import Premise
 from ..membership import Membership
 from ..model import TSKModel
 from ..policies import TargetRange
-from .candidates import Candidate, RuleBases, best_splits, term_scores
+from .candidates import Candidate, RuleBases, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
+from .splits import best_splits
 from .tuning import FIRST_STEPS, Tuned, tune
 
 # Rows that a candidate sees for each of its parameters, and at least.
@@ -35,10 +35,8 @@ _STEPS_TO_PROMISE = 1
 _MOST_OPERATIONS = 1e9
 # Turns of weights and premises of a candidate.
 _TURNS = 2
-# Of the inputs of which the residual says most, so many are tried.
+# Of the inputs, or splits, that the residual asks for most, so many are tried.
 _TRIED = 4
-# And of these, so many trained.
-_TRAINED = 3
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
 _SIGNIFICANT = 2.0
 
@@ -117,31 +115,28 @@ class Trials:
             self._parts[n_rows] = replace(part, inputs=unit_scale(part.X))
         return self._parts[n_rows]
 
-    def larger(self, kind, candidate, n_steps=1) -> Candidate | None:
-        """The next of a kind, or the one so many steps on; None where there are not the rows."""
-        if kind == "tree":
-            for _ in range(n_steps - 1):
-                candidate = self.larger(kind, candidate)
-                if candidate is None:
-                    return None
+    def larger(self, kind, candidate) -> Candidate | None:
+        """The next of a kind; None where there are not the rows."""
+        if kind == "scattered":
+            grown = [candidate.with_more_clusters()] if self.scattered_inputs.size else []
+        elif kind == "tree":
             splits = best_splits(self.tuned(candidate), self.plan.inputs, _TRIED)
             grown = [candidate.with_split(split) for split in splits]
-        elif kind == "scattered":
-            grown = [candidate.with_more_clusters(n_steps)] if self.scattered_inputs.size else []
         else:
-            tried = combinations_with_replacement(self._asking(candidate), n_steps)
-            grown = [candidate.with_more_terms(inputs) for inputs in tried]
-        grown = [one for one in grown if self._is_small(one)]
+            grown = [candidate.with_more_terms(j) for j in self._asking(candidate)]
         # Weights go on from those of the smaller one.
         smaller = self.tuned(candidate)
-        promising = [(one, self._train(one, smaller, 0, _STEPS_TO_PROMISE)) for one in grown]
+        promising = [
+            (one, self._train(one, smaller, 0, _STEPS_TO_PROMISE))
+            for one in grown
+            if self._is_small(one)
+        ]
         if not promising:
             return None
         # Of columns that are alike, rounding is not to choose: six digits.
-        promising.sort(key=lambda pair: float(f"{self.expected(pair[1]):.6g}"))
-        leading = promising[:_TRAINED]
-        self._begun.update(leading)
-        return min(leading, key=lambda pair: float(f"{self.expected(self.tuned(pair[0])):.6g}"))[0]
+        best, begun = min(promising, key=lambda pair: float(f"{self.expected(pair[1]):.6g}"))
+        self._begun[best] = begun
+        return best
 
     def _asking(self, candidate):
         """The inputs of whose terms the residual says most."""

@@ -88,6 +88,12 @@ class Tuned:
         return self.problem.solved_again(self.evaluation)
 
     @cached_property
+    def residual(self):
+        """Of the standardised target, (n_rows, n_outputs)."""
+        found = [residual for _, residual, _ in self.problem.residuals(self.evaluation)]
+        return np.concatenate(found, axis=1).T
+
+    @cached_property
     def expected_error(self):
         """Mean squared error to be expected on new rows, of the standardised target.
 

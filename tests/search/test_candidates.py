@@ -38,7 +38,7 @@ def scores_of(rows, count=2, counts=None):
 class TestCandidate:
     def test_kinds_are_told_in_words(self):
         one = Candidate((1, 1, 1))
-        grid = one.with_more_terms([2]).with_more_terms([0]).with_more_terms([2])
+        grid = one.with_more_terms(2).with_more_terms(0).with_more_terms(2)
         scattered = one.with_more_clusters()
         assert [c.kind for c in (one, grid, scattered)] == ["one rule", "grid", "scattered"]
         assert [c.n_rules for c in (one, grid, scattered)] == [1, 6, 2]

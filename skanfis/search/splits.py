@@ -1,0 +1,97 @@
+r"""Which leaf of a tree to split, on which input and where: what the residual of a model asks for.
+
+Of a leaf and an input, cuts are looked at between values next to the leaf's quantiles. With p the
+part of the leaf below the cut, h one there and zero above, s w the weight of the rows times the
+strength of the leaf, b the functions 1 and z_i about the centre of the leaf, and r the residual,
+the statistic is the sum over b of
+
+    (sum s w (h - p) b r)^2 / sum s w (h - p)^2 b^2 ,
+
+in deviations from what noise alone would give it: how much a value and slopes that differ between
+the two sides would explain. The slopes by other inputs are in it, so that a product of two inputs
+shows at the first cut of one of them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..antecedent.tree import CRISP, LEAST_WIDTH
+from .tuning import Tuned
+
+# Cuts that are looked at are next to so many quantiles of a leaf.
+_QUANTILES = 8
+# A new cut is as wide as this part of the leaf's deviation.
+_WIDTH = 0.5
+# Beyond so many inputs, slopes are not looked at: the work goes with their square.
+_MOST_CROSSED = 200
+_TINY = np.finfo(float).tiny
+
+
+@dataclass(frozen=True)
+class Split:
+    """Two leaves in the place of one, in standardised units."""
+
+    leaf: int
+    input: int
+    cut: float
+    log_width: float
+
+
+def best_splits(tuned: Tuned, inputs, n_most):
+    """Those that the residual asks for most, best first; one of every leaf and input."""
+    rows, residual = tuned.problem.rows, tuned.residual
+    variance = np.average(residual**2, axis=0, weights=rows.sample_weight)
+    varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
+    if varying.shape[1] > _MOST_CROSSED:
+        varying = varying[:, :0]
+    found = []
+    for leaf, strength in enumerate(tuned.evaluation.antecedent.strengths(rows.X.T)):
+        own = rows.sample_weight * strength
+        center = np.average(varying, axis=0, weights=own)
+        basis = np.column_stack([np.ones(rows.n_rows), varying - center])
+        along = own[:, None, None] * basis[:, :, None] * residual[:, None]
+        sums = np.column_stack([own, own[:, None] * basis**2, along.reshape(rows.n_rows, -1)])
+        for j in inputs:
+            cuts, statistics = _scored(rows.X[:, j], sums, basis.shape[1], variance)
+            if cuts.size:
+                best = int(statistics.argmax())
+                log_width = np.log(_width(rows.X[:, j], own, cuts[best]))
+                split = Split(leaf, int(j), float(cuts[best]), float(log_width))
+                found.append((statistics[best], split))
+    # Of columns that are alike, rounding is not to choose: six digits.
+    found.sort(key=lambda pair: -float(f"{pair[0]:.6g}"))
+    return [split for _, split in found[:n_most]]
+
+
+def _scored(column, sums, n_basis, variance):
+    """Cuts of an input, and the statistic at each; ``sums`` are what is summed over rows."""
+    order = np.argsort(column, kind="stable")
+    column, upto = column[order], np.cumsum(sums[order, 0])
+    wanted = np.arange(1, _QUANTILES) / _QUANTILES * upto[-1]
+    places = np.minimum(np.searchsorted(upto, wanted), column.size - 1)
+    ends = np.unique(np.searchsorted(column, column[places], side="right"))
+    ends = ends[ends < column.size]
+    if not ends.size:
+        return ends, ends
+    below = np.add.reduceat(sums[order], np.append(0, ends), axis=0).cumsum(axis=0)
+    below, whole = below[:-1], below[-1]
+    part = below[:, :1] / whole[0]
+    mass = slice(1, 1 + n_basis)
+    norm = (1.0 - 2.0 * part) * below[:, mass] + part**2 * whole[mass]
+    along = below[:, 1 + n_basis :] - part * whole[1 + n_basis :]
+    squares = along.reshape(ends.size, n_basis, -1) ** 2
+    squares /= np.maximum(norm[:, :, None] * variance, _TINY)
+    n_free = n_basis * variance.size
+    statistics = (squares.sum(axis=(1, 2)) - n_free) / np.sqrt(2.0 * n_free)
+    return 0.5 * (column[ends - 1] + column[ends]), statistics
+
+
+def _width(column, own, cut):
+    """At the start; of an input that has two values, next to nothing."""
+    below, above = column[column < cut], column[column > cut]
+    if np.ptp(below) == 0.0 == np.ptp(above):
+        return 0.5 * (above[0] - below[0]) / CRISP
+    center = np.average(column, weights=own)
+    spread = np.sqrt(np.average((column - center) ** 2, weights=own))
+    return max(_WIDTH * spread, LEAST_WIDTH)

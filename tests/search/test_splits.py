@@ -1,0 +1,104 @@
+"""Which leaf a tree splits, where: the statistic row by row, and planted splits found."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis.antecedent import TreeAntecedent
+from skanfis.antecedent.tree import CRISP, LEAST_WIDTH
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.premise import Premise
+from skanfis.search import tuning
+from skanfis.search.sample import search_sample
+from skanfis.search.splits import _scored, best_splits
+
+pytestmark = pytest.mark.theory
+
+NOTHING = TreeAntecedent.build([], [[], []], [[]])
+
+
+def model_of(X, y, antecedent=NOTHING, weight=None):
+    """A tree with its consequents, before its cuts move."""
+    rows = search_sample(StandardisedData.of(X, y.reshape(len(X), -1), weight), 20_000)
+    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    premise = Premise.of(antecedent, *rows.inputs.box)
+    return tuning.tune(problem, premise, ["slope"], rows.sample_weight.sum(), turns=0)
+
+
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_the_statistic_is_the_formula_at_every_cut(rng, n_outputs):
+    X = np.round(rng.uniform(-1.0, 1.0, (150, 3)), 1)
+    y = np.abs(X[:, [0]]) * X[:, [1]] + 0.3 * rng.normal(size=(150, n_outputs))
+    tree = NOTHING.split(0, 2, 0.2, -1.0)
+    tuned = model_of(X, y, tree, rng.integers(1, 5, 150).astype(float))
+    rows = tuned.problem.rows
+    residual = tuned.residual
+    strengths = tree.strengths(rows.X.T)
+    design = np.column_stack([np.ones(rows.n_rows), rows.X])
+    predicted = np.einsum(
+        "rn,nb,rbo->no", strengths, design, tuned.evaluation.coefficients.reshape(2, 4, -1)
+    )
+    assert_allclose(residual, rows.y - predicted, atol=1e-9)
+    variance = np.average(residual**2, axis=0, weights=rows.sample_weight)
+    best = {}
+    for leaf, strength in enumerate(strengths):
+        own = rows.sample_weight * strength
+        b = np.column_stack([design[:, 0], rows.X - np.average(rows.X, axis=0, weights=own)])
+        along = (own[:, None, None] * b[:, :, None] * residual[:, None]).reshape(rows.n_rows, -1)
+        sums = np.column_stack([own, own[:, None] * b**2, along])
+        for j in range(3):
+            cuts, found = _scored(rows.X[:, j], sums, 4, variance)
+            expected = []
+            for cut in cuts:
+                assert not np.isin(cut, rows.X[:, j])
+                h = rows.X[:, j] < cut
+                function = (h - np.average(h, weights=own))[:, None] * b
+                squares = (own * function.T @ residual) ** 2
+                squares /= (own @ function**2)[:, None] * variance
+                expected.append((squares.sum() - 4 * n_outputs) / np.sqrt(8 * n_outputs))
+            assert_allclose(found, expected, rtol=1e-9)
+            best[leaf, j] = max(expected)
+    splits = best_splits(tuned, range(3), 6)
+    order = sorted(best, key=best.get, reverse=True)
+    assert [(split.leaf, split.input) for split in splits] == order
+
+
+@pytest.mark.parametrize(
+    ("function", "asked"),
+    [
+        (lambda X: np.tanh(5.0 * X[:, 3]), {3}),
+        (lambda X: X[:, 0] * X[:, 2], {0, 2}),
+        (lambda X: np.where(X[:, 1] > 0.3, X[:, 4], 0.0), {1, 4}),
+    ],
+    ids=["saturation", "product", "switch"],
+)
+def test_a_planted_split_comes_first(rng, function, asked):
+    X = rng.uniform(-1.0, 1.0, (800, 6))
+    y = function(X) + X @ rng.normal(size=6) + 0.1 * rng.normal(size=800)
+    first, *_ = best_splits(model_of(X, y), range(6), 1)
+    assert first.input in asked
+
+
+def test_cuts_are_as_wide_as_half_of_the_leaf_and_crisp_between_two_values(rng):
+    X = np.column_stack(
+        [rng.normal(size=400), rng.integers(0, 2, 400), 1e-3 * rng.normal(size=400)]
+    )
+    X[::40, 2] = 50.0  # all other values are next to each other
+    tuned = model_of(X, X[:, 0] ** 2 + X[:, 1] * X[:, 0], NOTHING.split(0, 0, 1.0, -3.0))
+    column = tuned.problem.rows.X.T
+    own = tuned.problem.rows.sample_weight * tuned.evaluation.antecedent.strengths(column)
+    for split in best_splits(tuned, range(3), 6):
+        if split.input == 1:
+            expected = 0.5 * np.ptp(column[1]) / CRISP
+            assert_allclose(split.cut, 0.5 * (column[1].min() + column[1].max()))
+        else:
+            z, w = column[split.input], own[split.leaf]
+            spread = np.sqrt(np.cov(z, aweights=w, ddof=0))
+            expected = max(0.5 * spread, LEAST_WIDTH)
+        assert_allclose(np.exp(split.log_width), expected)
+
+
+def test_an_input_that_is_constant_is_not_split(rng):
+    X = np.column_stack([rng.normal(size=50), np.ones(50)])
+    assert {split.input for split in best_splits(model_of(X, X[:, 0] ** 2), range(2), 5)} == {0}
