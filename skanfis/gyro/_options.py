@@ -46,8 +46,8 @@ Calibrate a gyro from its logs: learn the error of its indicated rate (indicated
 what is known on board, its output, its temperature and how fast that changes, and the time since
 power-on. The result is checked on whole runs, devices or rate levels that the model has not seen.
 
-Written to a folder: the model (compensator.json), a report with tables and pictures for any browser
-(report.html), and the rules as text (rules.txt).
+Written to a folder: the model (compensator.json and .joblib), a report with tables and pictures for
+any browser (report.html), and the rules as text (rules.txt).
 """
 _EPILOG = """\
 examples:
