@@ -31,7 +31,7 @@ from .metrics import rms
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
-_MOST_ROWS = 100_000  # evenly chosen, for the rules, the noise and the model
+_MOST_ROWS = 20_000  # evenly chosen, for the rules, the noise and the model
 _CONFIDENCE = 0.95  # of every interval in the report
 _MANY_FLAGGED = 0.2  # of the rows
 _MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter

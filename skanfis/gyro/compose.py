@@ -273,7 +273,10 @@ class Polynomial:
     def predict(self, X):
         """What the polynomial gives."""
         z = np.clip(np.asarray(X, dtype=float), self.minimum_, self.maximum_) - self.center
-        return np.prod((z / self.scale)[:, None] ** self.powers, axis=2) @ self.coefficients
+        terms = np.tile(self.coefficients, (len(z), 1))
+        for column, powers in zip((z / self.scale).T, self.powers.T, strict=True):
+            terms *= column[:, None] ** powers
+        return terms.sum(axis=1)
 
     def bounds(self, box):
         """Limits of what it gives in a box (n_inputs, 2): no term exceeds |c| max |z|^powers."""
