@@ -122,13 +122,15 @@ def frozen(model, rule):
     scaler, features, line = (step for _, step in model.steps)
     if features.degree == 1:
         return _line(model, rule)
-    held = rule.model
+    # Beyond the box it is held: there the tangent of a cubic leads far away soon.
+    policy = rule.model.out_of_bounds
+    held = rule.model.with_out_of_bounds("clip" if policy == "linear" else policy)
     powers = np.vstack([np.zeros(scaler.mean_.size, dtype=int), features.powers_])
     coefficients = np.append(line.intercept_, line.coef_)
     box = held.minimum, held.maximum
     names = np.array(held.input_names, dtype=object)
     base = Polynomial(*box, scaler.mean_, scaler.scale_, powers, coefficients, names)
-    return joined(base, rule)
+    return joined(base, replace(rule, model=held))
 
 
 def _line(pipeline, rule):

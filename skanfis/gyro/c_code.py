@@ -369,9 +369,7 @@ def _policy_lines(whole):
     """What is answered out of range."""
     model, law = whole.rules.model, whole.law
     if whole.is_cubic:
-        is_silent = model.out_of_bounds in SILENT
-        held = model if is_silent else model.with_out_of_bounds("clip")
-        return [policy_line(held, "Outside this range")]
+        return [policy_line(model, "Outside this range")]
     past = past_phase(law.out_of_bounds, "output")
     return [
         f"Beyond a phase of {law.max_phase:g} rad {past}.",

@@ -334,7 +334,7 @@ def _sure(results):
     lines[1][2] = _interval(budget.scatter_low, budget.scatter_high, results.shown)
     head = ["part", f"standard deviation [{results.symbol}]", "95 % interval", "meaning"]
     caption = "Of one compensated row in range, in a group that the model has not seen"
-    added = hasattr(calibration.compensator.estimator, "residual_")
+    added = calibration.compensator.predicts == "rate"
     what = "addition to the arcsine law" if added else "compensation"
     proven = [
         (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}"),
