@@ -81,7 +81,7 @@ def make_parser():
         group.add_argument(name, help=told, **settings)
 
     group = parser.add_argument_group("reading the log")
-    told = "text with a header, such as CSV, or Parquet: one log, or one file per run"
+    told = "text with a header, as CSV or .lvm, .mat, .xlsx or Parquet: one log, or a file per run"
     add("logs", told, nargs="+", metavar="LOG")
     told = f"the column of {', '.join(PARTS)}; what is not named is guessed by names and units"
     add("--columns", told, metavar="PART=NAME", **several)

@@ -337,11 +337,13 @@ def _law_code(dialect, whole):
 def _header(whole, dialect, price, units, notes):
     law, part, model = whole.law, whole.part, whole.rules.model
     units, (low, high) = units or {}, whole.box
-    what = f"A polynomial of the third degree with {len(law.powers)} terms" if whole.is_cubic else (
-        f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
-        f"{model.order}"
-    )  # fmt: skip
-    output = "error" if whole.is_cubic else "rate"
+    rules = f", and {model.n_rules} rules of order {model.order}"
+    if model.n_rules == 1:
+        rules = ", and a line" if model.order else ", and a constant"
+    what, output = "The rate of an open-loop gyro: arcsine law", "rate"
+    if whole.is_cubic:
+        what, output = f"A polynomial of the third degree with {len(law.powers)} terms", "error"
+    what += rules if model.coefficients.any() else ""
     lines = [
         *map(remark, notes),
         f"{what}; {dialect.std.upper()}, {dialect.real}.",
@@ -361,7 +363,8 @@ def _header(whole, dialect, price, units, notes):
         lines.append(f"What the rules add to the law is held between {low:.9g} and {high:.9g}.")
     if whole.limits is not None:
         lines.append("The output is held between {:.9g} and {:.9g}.".format(*whole.limits))
-    title = "A cubic" if whole.is_cubic else "An arcsine law and Takagi-Sugeno-Kang fuzzy rules"
+    title = "A cubic" if whole.is_cubic else "An arcsine law"
+    title += " and Takagi-Sugeno-Kang fuzzy rules" if model.n_rules > 1 else ""
     return header_of(title, lines, dialect, len(whole.names), 1)
 
 
