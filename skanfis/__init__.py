@@ -1,15 +1,23 @@
 """ANFIS, the adaptive neuro-fuzzy inference system, as a scikit-learn estimator."""
 
-import os
-import signal
-import sys
+from typing import TYPE_CHECKING
 
-# Ctrl-C while the command is still importing ends it, without a traceback; then it takes over.
-if {"skanfis.gyro", "skanfis-gyro", "skanfis-gyro.exe"} & set(map(os.path.basename, sys.orig_argv)):
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-from .regressor import ANFISRegressor
+if TYPE_CHECKING:
+    from .regressor import ANFISRegressor
 
 __all__ = ["ANFISRegressor", "__version__"]
 
 __version__ = "0.1.0"
+
+
+def __dir__():
+    return __all__
+
+
+def __getattr__(name):
+    # Libraries load when the estimator is asked for: a command can see to Ctrl-C before.
+    if name == "ANFISRegressor":
+        from .regressor import ANFISRegressor
+
+        return ANFISRegressor
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -109,4 +109,4 @@ def test_conda_recipe_has_the_floors_of_pyproject():
     found = yaml.safe_load(recipe)
     assert found["package"] == {"name": "skanfis", "version": skanfis.__version__}
     assert set(PYPROJECT["project"]["dependencies"]) < set(found["requirements"]["run"])
-    assert found["build"]["entry_points"] == ["skanfis-gyro = skanfis.gyro.command:main"]
+    assert found["build"]["entry_points"] == ["skanfis-gyro = skanfis.gyro.__main__:main"]

@@ -1,23 +1,27 @@
 """The gyro application: from a calibration log to a checked compensator."""
 
-from ._checks import check_log
-from ._split import group_by_rate_level
-from .c_code import export_c_physics
-from .compensator import GyroCompensator
-from .compose import ResidualRegressor
-from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay
-from .errors import LogError
-from .features import ThermalRate
-from .log import read_log
-from .metrics import allan_deviation
-from .physics import OpenLoopArcsineRegressor
-from .report import gyro_report
-from .thermal_displays import (
-    CoverageDisplay,
-    HysteresisDisplay,
-    ResidualSurfaceDisplay,
-    ScaleFactorErrorDisplay,
-)
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ._checks import check_log
+    from ._split import group_by_rate_level
+    from .c_code import export_c_physics
+    from .compensator import GyroCompensator
+    from .compose import ResidualRegressor
+    from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay
+    from .errors import LogError
+    from .features import ThermalRate
+    from .log import read_log
+    from .metrics import allan_deviation
+    from .physics import OpenLoopArcsineRegressor
+    from .report import gyro_report
+    from .thermal_displays import (
+        CoverageDisplay,
+        HysteresisDisplay,
+        ResidualSurfaceDisplay,
+        ScaleFactorErrorDisplay,
+    )
 
 __all__ = [
     "AllanDisplay",
@@ -39,3 +43,19 @@ __all__ = [
     "gyro_report",
     "read_log",
 ]
+_HOMES = (
+    "_checks _split c_code compensator compose displays errors features log metrics physics report "
+    "thermal_displays"
+)
+
+
+def __dir__():
+    return __all__
+
+
+def __getattr__(name):
+    # Libraries load when they are needed: the command sees to Ctrl-C before, in __main__.py.
+    for home in _HOMES.split() if name in __all__ else ():
+        if hasattr(module := import_module(f".{home}", __name__), name):
+            return getattr(module, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

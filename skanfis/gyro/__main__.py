@@ -1,8 +1,16 @@
-"""``python -m skanfis.gyro``."""
+"""``python -m skanfis.gyro``, and the script ``skanfis-gyro``."""
 
+import signal
 import sys
 
-from .command import main
+
+def main(arguments=None):
+    """Run the command; returns its exit code. While libraries load, Ctrl-C ends it in silence."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from . import command
+
+    return command.main(arguments)
+
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -16,8 +16,8 @@ from .errors import LogError
 _SAMPLE_ROWS = 100_000
 _RATE = "rate omega w angular velocity speed drehrate"
 _OUTPUT = (
-    "gyro gyroscope fog output out signal raw counts count adc measured meas indicated sensor imu "
-    "dut uut kreisel"
+    "gyro gyr gyroscope fog output out signal raw counts count adc measured meas indicated sensor "
+    "imu dut uut kreisel"
 )
 _TRUTH = (
     "true truth table turntable drehtisch ref reference stage commanded command cmd encoder soll "

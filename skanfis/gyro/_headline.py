@@ -24,15 +24,14 @@ from scipy.stats import chi2
 from ..bounds import bounds, gradient_bounds
 from ..inspection import readability
 from ._columns import RATE_UNITS, evenly_chosen
-from ._frozen import FrozenPolynomial
 from ._simpler import NAMES, NOTHING
-from .compose import FrozenRules
+from .compose import FrozenRules, Polynomial
 from .displays import figures
 from .metrics import rms
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
-_MOST_ROWS = 100_000  # evenly chosen, for the rules, the noise and the model
+_MOST_ROWS = 20_000  # evenly chosen, for the rules, the noise and the model
 _CONFIDENCE = 0.95  # of every interval in the report
 _MANY_FLAGGED = 0.2  # of the rows
 _MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter
@@ -239,13 +238,13 @@ def proven_bounds(calibration):
     recipe, compensator = calibration.recipe, calibration.compensator
     own, given = 1.0 / compensator.scale_factor, {name: ends for name, *ends in recipe.box} or None
     rules, rises = compensator.estimator, None
-    if isinstance(rules, FrozenPolynomial):
+    if isinstance(cubic := getattr(rules, "base_", None), Polynomial):
         X = calibration.X
         box = np.array([(given or {}).get(name, [X[name].min(), X[name].max()]) for name in X])
         rows = X.to_numpy()[((box[:, 0] <= X) & (box[:, 1] >= X)).all(axis=1)]
-        sizes = np.abs(rules.predict(rows))
+        sizes = np.abs(cubic.predict(rows))
         met = max(zip(sizes, rows, strict=True), key=itemgetter(0), default=(np.nan, None))
-        return Proven(rules.bounds(box), met, None, recipe.inputs, box)
+        return Proven(cubic.bounds(box), met, None, recipe.inputs, box)
     rules = getattr(rules, "residual_", rules)
     rules = rules.model if isinstance(rules, FrozenRules) else rules
     found = bounds(rules, given, max_boxes=_MOST_BOXES)

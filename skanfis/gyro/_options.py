@@ -29,12 +29,13 @@ _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIG
 _AT_LEAST = ("reduction_factor",)  # of this more is better
 
 _TARGET = re.compile(
-    r"(rate-)?table(:(float|double|q31|q15))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
+    r"(rate-)?table(:(float|double|q31|q15))?|cubic(:(float|double))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
 )
 
 _OF_TARGETS = (
     "also a simple target, where it is good enough: in C table[:TYPE] over temperature, "
-    "rate-table[:TYPE] over output too (float, double, q31, q15); parameters of one AXIS of a "
+    "rate-table[:TYPE] over output too (float, double, q31, q15), cubic[:TYPE] piecewise over "
+    "temperature (float, double); parameters of one AXIS of a "
     "gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] or ardupilot:AXIS[:INSTANCE]"
 )
 _OF_OUTSIDE = (
@@ -46,8 +47,8 @@ Calibrate a gyro from its logs: learn the error of its indicated rate (indicated
 what is known on board, its output, its temperature and how fast that changes, and the time since
 power-on. The result is checked on whole runs, devices or rate levels that the model has not seen.
 
-Written to a folder: the model (compensator.json), a report with tables and pictures for any browser
-(report.html), and the rules as text (rules.txt).
+Written to a folder: the model (compensator.json and .joblib), a report with tables and pictures for
+any browser (report.html), and the rules as text (rules.txt).
 """
 _EPILOG = """\
 examples:
@@ -81,7 +82,7 @@ def make_parser():
         group.add_argument(name, help=told, **settings)
 
     group = parser.add_argument_group("reading the log")
-    told = "text with a header, such as CSV, or Parquet: one log, or one file per run"
+    told = "text with a header, as CSV or .lvm, .mat, .xlsx or Parquet: one log, or a file per run"
     add("logs", told, nargs="+", metavar="LOG")
     told = f"the column of {', '.join(PARTS)}; what is not named is guessed by names and units"
     add("--columns", told, metavar="PART=NAME", **several)
@@ -157,6 +158,7 @@ def _target(text):
     if not _TARGET.fullmatch(text):
         raise ArgumentTypeError(
             f"{shortened(text)} must be table:TYPE or rate-table:TYPE (float, double, q31, q15), "
+            "cubic:TYPE (float, double), "
             "px4:AXIS:INSTANCE:DEVICE_ID (x, y or z; 0 to 3) or ardupilot:AXIS:INSTANCE (1 to 3); "
             "all but the axis may be left out"
         )

@@ -37,12 +37,14 @@ _PICTURES = {
     "error-by-temperature": (ErrorDisplay, "Error against temperature, before and after."),
     "scale-factor-error": (
         ScaleFactorErrorDisplay,
-        "Scale-factor error against rate, in three bands of temperature.",
+        "Scale-factor error against rate, in three bands of temperature. It is IEEE 528's and "
+        "1780's scale factor error, of the mean over a rate.",
     ),
     "hysteresis": (
         HysteresisDisplay,
-        "Bias against temperature, while warming and while cooling. What depends on the rate is "
-        "taken off, other than in the table. Temperature alone cannot close a loop.",
+        "Bias against temperature, while warming and while cooling. The gap is IEEE 528's "
+        "hysteresis error; what depends on the rate is taken off, other than in the table. "
+        "Temperature alone cannot close a loop.",
     ),
     "residual-surface": (
         ResidualSurfaceDisplay,
@@ -51,7 +53,8 @@ _PICTURES = {
     "held-out-groups": (GroupResidualDisplay, "RMS error of every held-out group."),
     "allan-deviation": (
         AllanDisplay,
-        "Allan deviation of the error, over the runs that are in range from end to end.",
+        "Allan deviation of the error, over the runs that are in range from end to end. It is the "
+        "root of IEEE 952's Allan variance.",
     ),
 }
 _COVERAGE = (

@@ -1,16 +1,24 @@
-"""Compensations that are simpler than rules, held out on the same rows: rules must beat them."""
+"""Compensations that are simpler than rules, held out on the same rows: rules must beat them.
+
+They are written, applied and exported as rules are: each goes with a single rule, whose box,
+coverage and policy are those of the rows that it was fitted to. A constant or a line is what that
+rule gives; beside the arcsine law, or a cubic, it gives that line or zero.
+"""
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 from sklearn.exceptions import ConvergenceWarning
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
+from .. import ANFISRegressor
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
-from ._frozen import frozen, single_rule
 from ._models import make_law, make_law_and_line, make_polynomial
+from .compose import FrozenRules, Polynomial, joined
 
 NOTHING = "no compensation"
 LAW_AND_LINE = "arcsine law and a line"
@@ -89,3 +97,50 @@ def _kinds(inputs, policy="linear"):
         yield "arcsine law", partial(fit, partial(make_law, inputs, 1, policy)), "rate"
         yield LAW_AND_LINE, partial(fit, partial(make_law_and_line, inputs, policy)), "rate"
     yield "cubic polynomial", partial(fit, partial(make_polynomial, 3)), "error"
+
+
+def single_rule(X, policy):
+    """FrozenRules of one rule that gives zero, with what it knows of these rows."""
+    rule = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=1, out_of_bounds=policy))
+    # What it is fitted to does not matter.
+    found = FrozenRules.of(rule.fit(X, np.arange(float(len(X)))), X.shape[1])
+    return _giving(found, 0.0)
+
+
+def frozen(model, rule):
+    """A fitted simple compensation as an estimator that flags rows as the single rule does.
+
+    ``model`` is a number; a Pipeline of a scaler, PolynomialFeatures and a line; the arcsine law;
+    or a ResidualRegressor of that and such a Pipeline.
+    """
+    if isinstance(model, float):
+        return _giving(rule, model)
+    if hasattr(model, "residual_"):
+        return joined(model.base_, _line(model.residual_, rule))
+    if not hasattr(model, "steps"):
+        return joined(model, rule)
+    scaler, features, line = (step for _, step in model.steps)
+    if features.degree == 1:
+        return _line(model, rule)
+    # Beyond the box it is held: there the tangent of a cubic leads far away soon.
+    policy = rule.model.out_of_bounds
+    held = rule.model.with_out_of_bounds("clip" if policy == "linear" else policy)
+    powers = np.vstack([np.zeros(scaler.mean_.size, dtype=int), features.powers_])
+    coefficients = np.append(line.intercept_, line.coef_)
+    box = held.minimum, held.maximum
+    names = np.array(held.input_names, dtype=object)
+    base = Polynomial(*box, scaler.mean_, scaler.scale_, powers, coefficients, names)
+    return joined(base, replace(rule, model=held))
+
+
+def _line(pipeline, rule):
+    scaler, _, line = (step for _, step in pipeline.steps)
+    slopes = line.coef_ / scaler.scale_
+    return _giving(rule, line.intercept_ + slopes @ (rule.model.reference - scaler.mean_), slopes)
+
+
+def _giving(rule, constant, slopes=()):
+    """The single rule with another consequent, of slopes about its reference."""
+    coefficients = np.array([constant, *slopes], dtype=float).reshape(1, -1, 1)
+    model = replace(rule.model, coefficients=coefficients, target=None, posterior=None)
+    return replace(rule, model=model)

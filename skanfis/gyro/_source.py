@@ -23,7 +23,7 @@ _HEAD_BYTES = 2**16
 # Lines above the header that a logger may write, and a few rows.
 _HEAD_RECORDS = 60
 _END_OF_PREAMBLE = "***End_of_Header***"
-_SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars"}
+_SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "", " ": "blanks"}
 _NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
 # A number or a moment, in full; a number with a fraction.
 _VALUE = re.compile(r"[+-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
@@ -83,8 +83,10 @@ class _TextSource:
         for sign, name in _SEPARATORS.items():
             self._separator = sign
             lengths = [len(values) for _, values in islice(self._records(), _HEAD_RECORDS)]
-            if min(lengths[len(lengths) // 3 :], default=0) > 1:
-                self.notes.append(f"columns are separated by {name}")
+            # A comma on the last line goes before blanks, of which any text has some.
+            ends = lengths[len(lengths) // 3 :] if sign != "," else lengths[-1:]
+            if min(ends, default=0) > 1:
+                self.notes += [f"columns are separated by {name}"] if name else []
                 return
         self._separator = ","
 
@@ -112,6 +114,9 @@ class _TextSource:
     def check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut without a word."""
         n_columns = len(self.header)
+        with contextlib.suppress(UnicodeError), open(self.path, encoding=self._encoding) as file:
+            if all(line.count(self._separator) < n_columns for line in file):
+                return
         for line, values in islice(self._records(), self._n_above, None):
             if len(values) > n_columns and "".join(values[n_columns:]).strip():
                 raise LogError(
@@ -136,6 +141,10 @@ class _TextSource:
                             f"{self.path}, line {line}: has {len(values):,} columns; a log has "
                             f"{_MOST_COLUMNS:,} at most."
                         )
+                    # The sign of a comment stands before names, and is none.
+                    first = values[0].lstrip("#%/ ") if values else ""
+                    if first or self._separator == " ":
+                        values[:1] = [first] if first else []
                     if len(values) > 1 or "".join(values).strip():
                         yield line, values
                     line = reader.line_num + 1
@@ -175,7 +184,7 @@ class _TextSource:
                     file.readline()
                 yield from pd.read_csv(
                     file,
-                    sep=self._separator,
+                    sep=r"\s+" if self._separator == " " else self._separator,
                     decimal=self.decimal,
                     skipinitialspace=True,
                     index_col=False,

@@ -12,7 +12,7 @@ from .errors import UsageError
 
 _COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
 # Logs that stay above the one, or reach the other, may be in degF; beyond the last nothing else is.
-_WARM, _HOT, _HOTTEST = 40.0, 86.0, 130.0
+_WARM, _HOT, _HOTTEST = 30.0, 86.0, 130.0
 # Numbers that large count from 1970, in these units.
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
 _STEPS = 1e-4, 600.0  # s, from one row to the next

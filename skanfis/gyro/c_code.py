@@ -1,4 +1,4 @@
-"""The arcsine law and the rules for what it leaves, as one C function.
+"""The arcsine law, or a cubic, and the rules for what it leaves, as one C function.
 
 The rules are written by ``skanfis.export`` under the name NAME_r as a static function of the same
 file; the law is written here. What is asked of an exported function stays: constant tables, no
@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..exceptions import OutOfBoundsWarning
-from ..export.c import CCode, export_c
+from ..export.c import CCode
 from ..export.c.builder import RulesPart, cost_lines, header_of, input_lines, policy_line
 from ..export.c.dialect import (
     LONGEST_NAME,
@@ -29,27 +29,11 @@ from ..export.c.dialect import (
 )
 from ..export.c.self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ..export.c.templates import FINITE_INPUT, rejection
-from ..export.folding import found_by_search
 from ..policies import SILENT
-from ._frozen import FrozenPolynomial
-from .c_polynomial import export_c_polynomial
-from .compose import FrozenRules, ResidualRegressor, law_and_rules
+from .compose import Polynomial, law_and_rules
 from .physics import past_phase
 
 _SUFFIX = "_r"
-SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
-_TAKE = "y[0] is the compensated rate: take it in the place of the raw rate."
-
-# Of inputs of a compensator: units, and how they are made.
-_UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
-_NOTES = {
-    "time": "time is that since power-on: zero at the first sample.",
-    "temperature": "temperature is that of the thermometer that was logged in the calibration.",
-    "temperature_rate": "temperature_rate is low-passed, with a time constant of $lag s. At "
-    "power-on: temperature_rate = 0, previous = temperature. At every sample after that, h [s] "
-    "after the one before: temperature_rate += (1 - exp(-h / $lag)) * ((temperature - previous) / "
-    "h - temperature_rate); then previous = temperature.",
-}
 
 _POLYNOMIAL = """
 static $real $name_polynomial(const $real *c, int n, $real t)
@@ -66,12 +50,29 @@ static $real $name_polynomial(const $real *c, int n, $real t)
 
 _PREDICT = """int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
 {
-    $real z[$n_rules_inputs], left[1], t, amplitude, sagnac, sine, phase, rate;
-    int i, sign = 1, status = $NAME_IN_RANGE;
+    $real z[$n_rules_inputs], left[1], $variables, rate$zero;
+    int i, $counters, status = $NAME_IN_RANGE;
 
 $finite_input
     }
-    for (i = 0; i < $n_law; ++i) {
+$base
+    for (i = 0; i < $n_rules_inputs; ++i) {
+        z[i] = x[$name_rules_input[i]];
+    }
+    status |= $rules_predict(z, left);
+    if ((status & $NAME_NO_OUTPUT) != 0) {
+        return $NAME_REJECT(y, status);
+    }
+    rate += left[0];
+$held    /* Not (a and b): NaN fails every comparison. */
+    if (!(rate >= -$MAX && rate <= $MAX)) {
+        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
+    }
+    y[0] = rate;
+    return status;
+}
+"""
+_LAW = """    for (i = 0; i < $n_law; ++i) {
         const $real v = x[$name_law_input[i]];
         if (v < $name_law_low[i] || v > $name_law_high[i]) {
             status = $NAME_OUT_OF_RANGE;
@@ -102,21 +103,25 @@ $finite_input
         $beyond
 $within    rate = (sign < 0 ? -phase : phase) / sagnac - $name_polynomial($name_bias, $n_bias, t);
 
-    for (i = 0; i < $n_rules_inputs; ++i) {
-        z[i] = x[$name_rules_input[i]];
+"""
+_CUBIC = """    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+        /* Of the nearest point of the box. */
+        u[i] = x[i] < $name_law_low[i] ? $name_law_low[i] : x[i];
+        u[i] = u[i] > $name_law_high[i] ? $name_law_high[i] : u[i];
+        u[i] = (u[i] - $name_center[i]) / $name_scale[i];
     }
-    status |= $rules_predict(z, left);
-    if ((status & $NAME_NO_OUTPUT) != 0) {
-        return $NAME_REJECT(y, status);
+    for (k = 0; k < $n_terms; ++k) {
+        term = $name_coefficients[k];
+        for (i = 0; i < $NAME_N_INPUTS; ++i) {
+            for (j = 0; j < (int)$name_powers[k][i]; ++j) {
+                term *= u[i];
+            }
+        }
+        rate += term;
     }
-    rate += left[0];
-    /* Not (a and b): NaN fails every comparison. */
-    if (!(rate >= -$MAX && rate <= $MAX)) {
-        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
-    }
-    y[0] = rate;
-    return status;
-}
+"""
+_HELD = """    rate = rate < $least ? $least : rate;
+    rate = rate > $most ? $most : rate;
 """
 _BEYOND = {
     "clip": "phase = $max_phase;",
@@ -191,6 +196,7 @@ def export_c_physics(
     longest = LONGEST_NAME - len(_SUFFIX)
     stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
     law, rules = law_and_rules(estimator)
+    is_cubic = isinstance(law, Polynomial)
     policies = {law.out_of_bounds, rules.model.out_of_bounds}
     if policies >= set(SILENT):
         raise ValueError(
@@ -198,14 +204,16 @@ def export_c_physics(
             "leaves y as it is or writes NaN. Set both to one of the two."
         )
     dialect = Dialect(name, dtype, std)
-    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage, saturate)
+    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage, None if is_cubic else saturate)
     whole = _Composition(law, rules, part, dialect.dtype)
+    if is_cubic and saturate is not None:
+        whole.limits = np.ravel(saturate).astype(dialect.dtype)
     code = "".join(
         [
             f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
             part.text(),
             "\n",
-            _law_source(dialect, whole, next(iter(policies & set(SILENT)), None)),
+            _source_of(dialect, whole, next(iter(policies & set(SILENT)), None)),
             self_test(_known_answers(whole), dialect),
         ]
     )
@@ -215,72 +223,36 @@ def export_c_physics(
     return written
 
 
-def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
-    """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
-    if saturate is not None:
-        # A constant's limits are the same: a hair is between them.
-        saturate = (saturate + [-1e-12, 1e-12] * (1.0 + np.abs(saturate)))[None]
-    found, units = found_by_search(compensator.estimator), units_of(compensator)
-    export: Any = export_c_physics
-    if isinstance(found, FrozenPolynomial):
-        export = export_c_polynomial
-    elif not isinstance(found, ResidualRegressor):
-        export, found = export_c, FrozenRules.of(found, len(compensator.inputs)).model
-        units[found.output_names[0]] = "deg/s"
-    assumed = [f"Unit assumed: {text}" for text in compensator.assumed.values()]
-    return export(
-        found,
-        path,
-        std=std,
-        min_coverage=compensator.min_coverage,
-        saturate=saturate,
-        units=units,
-        notes=notes_on(compensator) + assumed,
-    )
-
-
-def notes_on(compensator):
-    """What to do with the output, and how inputs are made, as sentences."""
-    use = SUBTRACT if compensator.predicts == "error" else _TAKE
-    notes = [f"{use} {raw_rate_of(compensator)}"]
-    notes += [note for name, note in _NOTES.items() if name in compensator.inputs]
-    return [note.replace("$lag", f"{compensator.time_constant:g}") for note in notes]
-
-
-def units_of(compensator):
-    """Units of the inputs of a compensator, and of the rate."""
-    return _UNITS | {"output": compensator.output_unit, "rate": "deg/s"}
-
-
-def raw_rate_of(compensator):
-    """What the raw rate is, as a sentence."""
-    factor = compensator.scale_factor
-    divided = "" if factor == 1.0 else f" divided by {factor:.9g}"
-    return f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."
-
-
 class _Composition:
     """Both parts on the inputs of the function, ``names``, and what of the law is rounded.
 
-    Rounded to the type are the law's range, the model of the rules, ``reference`` and
-    ``polynomials``; not the law's coefficients.
+    Rounded to the type are the law's range, the model of the rules, ``reference`` and ``tables``;
+    not the law's coefficients. A Polynomial may stand for the law; ``limits`` hold its sum.
     """
+
+    limits: Any = None
 
     def __init__(self, law, rules, part, dtype):
         self.part, self.dtype = part, dtype
         columns = np.union1d(law.columns_, rules.positions)
         given = getattr(law, "feature_names_in_", None)
         self.names = [f"x{j}" if given is None else given[j] for j in columns]
-        self.law = copy(law)
-        vars(self.law).pop("feature_names_in_", None)  # it takes rows without names
-        self.law.n_features_in_ = columns.size
-        self.law.columns_ = np.searchsorted(columns, law.columns_)
-        self.law.minimum_, self.law.maximum_ = map(self.rounded, (law.minimum_, law.maximum_))
         positions = np.searchsorted(columns, rules.positions)
         self.rules = replace(rules, model=part.model, positions=positions)
+        self.law, self.is_cubic, ends = law, isinstance(law, Polynomial), ("minimum_", "maximum_")
+        box = {key: self.rounded(getattr(law, key)) for key in ends}
+        if self.is_cubic:
+            self.law = replace(law, **box)
+            keys = ("center", "scale", "coefficients")
+            self.tables = {key: self.rounded(getattr(law, key)) for key in keys}
+            return
+        self.law = copy(law)
+        vars(self.law).pop("feature_names_in_", None)  # it takes rows without names
+        vars(self.law).update(box, n_features_in_=columns.size)
+        self.law.columns_ = np.searchsorted(columns, law.columns_)
         self.reference = self.rounded(law.reference_temperature_)
         given = {"amplitude": law.amplitude_, "sagnac": law.sagnac_factor_, "bias": law.bias_}
-        self.polynomials = {key: self.rounded(values) for key, values in given.items()}
+        self.tables = {key: self.rounded(values) for key, values in given.items()}
 
     def rounded(self, values):
         values = np.asarray(values, dtype=float)
@@ -305,59 +277,83 @@ class _Composition:
         return low, high
 
 
-def _law_source(dialect, whole, silent):
+def _source_of(dialect, whole, silent):
     """Tables and functions of the law; ``silent`` is the policy of rows without an answer."""
-    law, number = whole.law, dialect.number
-    inputs, places = law.columns_, whole.rules.positions
-    tables = {"law_low": law.minimum_, "law_high": law.maximum_, **whole.polynomials}
-    parts = ["/* Of the law: where it was fitted, powers of the temperature, columns of x. */\n"]
+    law, places = whole.law, whole.rules.positions
+    tables = {"law_low": law.minimum_, "law_high": law.maximum_, **whole.tables}
+    parts = ["/* Of what the rules are added to: its range, coefficients, and columns of x. */\n"]
     parts += [f"{dialect.table(key, values)}\n" for key, values in tables.items()]
-    for key, columns in (("law_input", inputs), ("rules_input", places)):
-        parts.append(f"{dialect.table(key, columns, index_type(columns))}\n")
-    asin = dialect.write("$ASIN(")
-    parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
+    columns, words = {"rules_input": places}, dict[str, Any]()
+    if whole.is_cubic:
+        parts.append(dialect.table("powers", law.powers, "unsigned char"))
+        base, words = _CUBIC, words | {"variables": "u[$NAME_N_INPUTS], term", "counters": "j, k"}
+        words |= {"zero": " = 0.0R", "n_terms": len(law.powers)}
+    else:
+        columns["law_input"] = law.columns_
+        base, words = _law_code(dialect, whole)
+        words |= {"variables": "t, amplitude, sagnac, sine, phase", "counters": "sign = 1"}
+        words["zero"] = ""
+    for key, values in columns.items():
+        parts.append(f"{dialect.table(key, values, index_type(values))}\n")
+    if not whole.is_cubic:
+        asin = dialect.write("$ASIN(")
+        parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
     parts += [dialect.write(rejection(silent, dialect.std)).lstrip() + "\n"]
-    parts += [dialect.write(_POLYNOMIAL).lstrip()]
+    parts += [] if whole.is_cubic else [dialect.write(_POLYNOMIAL).lstrip()]
+    held = ""
+    if whole.limits is not None:
+        held, ends = _HELD, map(dialect.number, whole.limits)
+        words |= zip(("least", "most"), ends, strict=True)
+    template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
+    for key in ("variables", "counters", "zero"):
+        template = template.replace(f"${key}", words.pop(key))
+    template = template.replace("$base", base).replace("$held", held)
+    words |= {"rules": dialect.name + _SUFFIX, "n_rules_inputs": places.size}
+    return "".join([*parts, dialect.write(template, **words)])
+
+
+def _law_code(dialect, whole):
+    """The template of the law, and its words."""
+    law, number, inputs = whole.law, dialect.number, whole.law.columns_
     temperature = "0.0R"
     if inputs.size > 1:
         lag = f" + {number(law.thermometer_lag_)} * x[{inputs[2]}]" if inputs.size > 2 else ""
         temperature = f"x[{inputs[1]}]{lag} - {number(whole.reference)}"
     # Where there is no answer beyond, the function has returned.
     within = "    }\n    phase = $ASIN(sine);\n" if law.out_of_bounds in SILENT else _WITHIN
-    template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
-    template = template.replace("$temperature", temperature).replace("$within", within)
-    parts += [
-        dialect.write(
-            template.replace("$beyond", _BEYOND[law.out_of_bounds]),
-            rules=dialect.name + _SUFFIX,
-            n_rules_inputs=places.size,
-            n_law=inputs.size,
-            output=inputs[0],
-            offset=number(law.offset_),
-            limit=number(np.sin(law.max_phase)),
-            max_phase=number(law.max_phase),
-            slope=number(1.0 / np.cos(law.max_phase)),
-            **{f"n_{key}": values.size for key, values in whole.polynomials.items()},
-        )
-    ]
-    return "".join(parts)
+    code = _LAW.replace("$temperature", temperature).replace("$within", within)
+    words = {
+        "n_law": inputs.size,
+        "output": inputs[0],
+        "offset": number(law.offset_),
+        "limit": number(np.sin(law.max_phase)),
+        "max_phase": number(law.max_phase),
+        "slope": number(1.0 / np.cos(law.max_phase)),
+        **{f"n_{key}": values.size for key, values in whole.tables.items()},
+    }
+    return code.replace("$beyond", _BEYOND[law.out_of_bounds]), words
 
 
 def _header(whole, dialect, price, units, notes):
     law, part, model = whole.law, whole.part, whole.rules.model
     units, (low, high) = units or {}, whole.box
+    rules = f", and {model.n_rules} rules of order {model.order}"
+    if model.n_rules == 1:
+        rules = ", and a line" if model.order else ", and a constant"
+    what, output = "The rate of an open-loop gyro: arcsine law", "rate"
+    if whole.is_cubic:
+        what, output = f"A polynomial of the third degree with {len(law.powers)} terms", "error"
+    what += rules if model.coefficients.any() else ""
     lines = [
         *map(remark, notes),
-        f"The rate of an open-loop gyro: arcsine law, and {model.n_rules} rules of order "
-        f"{model.order}; {dialect.std.upper()}, {dialect.real}.",
-        *cost_lines(price, "an arcsine, "),
+        f"{what}; {dialect.std.upper()}, {dialect.real}.",
+        *cost_lines(price, "" if whole.is_cubic else "an arcsine, "),
         "",
         *input_lines(whole.names, low, high, units),
         "Outputs y:",
-        f"  [0] rate, in {units.get('rate', 'the unit of the training data')}",
+        f"  [0] {output}, in {units.get('rate', 'the unit of the training data')}",
         "",
-        f"Beyond a phase of {law.max_phase:g} rad {past_phase(law.out_of_bounds, 'output')}.",
-        policy_line(model, "Of the rules alone: outside their range"),
+        *_policy_lines(whole),
         "A row that is not finite gets no output either way, nor does one whose rate is not.",
     ]
     if part.min_coverage is not None:
@@ -365,21 +361,41 @@ def _header(whole, dialect, price, units, notes):
     if part.limits is not None:
         low, high = part.limits[0]
         lines.append(f"What the rules add to the law is held between {low:.9g} and {high:.9g}.")
-    title = "An arcsine law and Takagi-Sugeno-Kang fuzzy rules"
+    if whole.limits is not None:
+        lines.append("The output is held between {:.9g} and {:.9g}.".format(*whole.limits))
+    title = "A cubic" if whole.is_cubic else "An arcsine law"
+    title += " and Takagi-Sugeno-Kang fuzzy rules" if model.n_rules > 1 else ""
     return header_of(title, lines, dialect, len(whole.names), 1)
+
+
+def _policy_lines(whole):
+    """What is answered out of range."""
+    model, law = whole.rules.model, whole.law
+    if whole.is_cubic:
+        return [policy_line(model, "Outside this range")]
+    past = past_phase(law.out_of_bounds, "output")
+    return [
+        f"Beyond a phase of {law.max_phase:g} rad {past}.",
+        policy_line(model, "Of the rules alone: outside their range"),
+    ]
 
 
 def _cost(whole):
     of_rules, itemsize = whole.part.cost, whole.dtype.itemsize
-    sizes = [values.size for values in whole.polynomials.values()]
+    sizes = [values.size for values in whole.tables.values()]
     n_inputs, n_rules_inputs = whole.law.columns_.size, whole.rules.positions.size
-    table_bytes = itemsize * (sum(sizes) + 2 * n_inputs) + n_inputs + n_rules_inputs
+    adds, divisions, table_bytes = sum(sizes) - len(sizes) + 1, 2, n_inputs
+    if whole.is_cubic:
+        powers = whole.law.powers
+        adds, divisions, table_bytes = int(powers.sum()) + len(powers) + 1, n_inputs, powers.size
+    table_bytes += itemsize * (sum(sizes) + 2 * n_inputs) + n_rules_inputs
+    n_held = n_rules_inputs + 1 + n_inputs * whole.is_cubic
     return replace(
         of_rules,
-        multiply_adds=of_rules.multiply_adds + sum(sizes) - len(sizes) + 1,
-        divisions=of_rules.divisions + 2,
+        multiply_adds=of_rules.multiply_adds + adds,
+        divisions=of_rules.divisions + divisions,
         table_bytes=of_rules.table_bytes + table_bytes,
-        stack_bytes=of_rules.stack_bytes + itemsize * (n_rules_inputs + 1),
+        stack_bytes=of_rules.stack_bytes + itemsize * n_held,
     )
 
 
@@ -394,38 +410,51 @@ def _known_answers(whole):
     kind = np.arange(len(points)) % 4
     reach = np.where(kind % 2, 1.0, 2.0)[:, None]
     X = low + (high - low) * (0.5 + reach * (points - 0.5))
-    output = law.columns_[0]
-    swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
-    X[:, output] = np.where(kind == 3, law.offset_ + swing, X[:, output])
+    if not whole.is_cubic:
+        output = law.columns_[0]
+        swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
+        X[:, output] = np.where(kind == 3, law.offset_ + swing, X[:, output])
     X = np.vstack([low, high, X]).astype(whole.dtype).astype(float)
     # NaN past the amplitude.
-    phase, coverage = np.abs(law.phase(X)), rules.coverage(X)
-    sure = ~(np.abs(phase - law.max_phase) < 1e-3)
+    phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (law.phase(X), law.max_phase)
+    phase, coverage = np.abs(phase), rules.coverage(X)
+    sure = ~(np.abs(phase - limit) < 1e-3)
     if part.min_coverage is not None:
         sure &= np.abs(coverage - part.min_coverage) > 1e-3 * part.min_coverage
     chosen = np.flatnonzero(sure)[:ROWS]
-    X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= law.max_phase)[chosen]
+    X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= limit)[chosen]
     silent = beyond & (law.out_of_bounds in SILENT)
     silent |= ~rules.in_bounds(X) & (rules.model.out_of_bounds in SILENT)
     with warnings.catch_warnings():
         # The status tells, row by row.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
-        of_law = copy(law).set_params(out_of_bounds=_answering(law)).predict(X)
+        answering = law if whole.is_cubic else copy(law).set_params(out_of_bounds=_answering(law))
+        of_law = answering.predict(X)
     model, z = rules.model.with_out_of_bounds(_answering(rules.model)), X[:, rules.positions]
     of_rules = model.predict(z)
     if part.limits is not None:
         of_rules = np.clip(of_rules, *part.limits.T.astype(float))
     silent |= ~np.isfinite(of_law.astype(whole.dtype))
-    status = STATUS["OUT_OF_RANGE"] * ~(law.in_bounds(X) & rules.in_bounds(X))
+    inside = ((low <= X) & (high >= X)).all(axis=1) & ~beyond
+    status = STATUS["OUT_OF_RANGE"] * ~inside
     status |= STATUS["NO_OUTPUT"] * silent
     if part.min_coverage is not None:
         status |= STATUS["UNCOVERED"] * (~silent & (coverage < part.min_coverage))
-    y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
-    # What rounding of the sine is magnified by, too.
-    steepest = np.abs(of_law[~silent]).max(initial=0.0)
-    steepest = max(steepest, np.tan(law.max_phase) / np.abs(law.sagnac_factor_[0]))
-    tolerance = TOLERANCE[whole.dtype] * (size_of_sum(model, z, of_rules) + steepest)
+    held = np.array([-np.inf, np.inf]) if whole.limits is None else whole.limits.astype(float)
+    y = np.where(silent, 0.0, np.clip(of_law + of_rules[:, 0], *held))[:, None]
+    tolerance = TOLERANCE[whole.dtype] * (size_of_sum(model, z, of_rules) + _steepest(whole, y))
     return X.astype(whole.dtype), y.astype(whole.dtype), status, tolerance.astype(whole.dtype)
+
+
+def _steepest(whole, y):
+    """What rounding is magnified by: of the sine, or of an input that lies far from zero."""
+    law = whole.law
+    if not whole.is_cubic:
+        return max(np.abs(y).max(), np.tan(law.max_phase) / np.abs(law.sagnac_factor_[0]))
+    ends = np.stack([law.minimum_, law.maximum_])
+    widest = 2.0 + np.abs(ends - law.center).max(axis=0) / law.scale
+    size = np.prod(widest**law.powers, axis=1) @ np.abs(law.coefficients)
+    return size * (1.0 + (np.abs(ends) / law.scale).max())
 
 
 def _answering(part):

@@ -26,10 +26,10 @@ from ._checks import LABELS, RowChecks, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._formulas import rules_text
 from ._headline import errors_and_verdict, proven_bounds
+from ._on_board import export_c_compensator
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._source import open_source
 from ._split import choose_split
-from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator, features
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, write_pdf
@@ -40,7 +40,7 @@ DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
 INCOMPLETE = 5  # a target was refused; all else is written
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
-_FILES = ("compensator.json", "report.html", "rules.txt")
+_FILES = ("compensator.json", "compensator.joblib", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
 _ON_BOARD = ["time", "temperature", "output", "run"]
 _MOST_ROWS = 200_000  # that are held
@@ -56,7 +56,7 @@ def main(arguments=None):
     tell = _progress(options.quiet)
     try:
         if arguments is None:
-            # Also where the package has set it aside, see skanfis/__init__.py.
+            # Which __main__.py has set aside.
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, signal.default_int_handler)
         return (_apply if options.apply else _calibrate)(options, tell)
@@ -224,6 +224,9 @@ def _write(calibration, options, files, folder):
     if options.pdf:
         write_pdf(page, folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
+    # To the last bit the same, at the edge of its range too.
+    same = GyroCompensator.read_json(folder / "compensator.json")
+    joblib.dump(same, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
         export_c_compensator(

@@ -3,7 +3,6 @@
 import json
 import warnings
 from dataclasses import dataclass, field
-from math import comb
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -18,8 +17,14 @@ from ..export.folding import found_by_search
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask, declared_units
-from ._frozen import FrozenPolynomial
-from .compose import FrozenRules, ResidualRegressor, joined, law_and_rules
+from .compose import (
+    FrozenRules,
+    Polynomial,
+    ResidualRegressor,
+    cubic_powers,
+    joined,
+    law_and_rules,
+)
 from .features import ThermalRate
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
 
@@ -201,11 +206,12 @@ class GyroCompensator:
             If the file cannot be written.
         """
         found, law, polynomial = found_by_search(self.estimator), None, None
-        if isinstance(found, FrozenPolynomial):
-            polynomial = {key: getattr(found, key).tolist() for key in _OF_POLYNOMIAL}
         if isinstance(found, ResidualRegressor):
             fitted, rules = law_and_rules(found)
-            law = _law_document(fitted, self.inputs)
+            if isinstance(fitted, Polynomial):
+                polynomial = {key: getattr(fitted, key).tolist() for key in _OF_POLYNOMIAL}
+            else:
+                law = _law_document(fitted, self.inputs)
         else:
             rules = FrozenRules.of(found, len(self.inputs))
         document = {
@@ -305,7 +311,7 @@ def _settings(document):
     if document["law"] is not None:
         estimator = joined(_read_law(document["law"], inputs), estimator)
     if document["polynomial"] is not None:
-        estimator = _read_polynomial(document["polynomial"], estimator, len(inputs))
+        estimator = joined(_read_polynomial(document["polynomial"], estimator, inputs), estimator)
     settings = {key: document[key] for key in _KEYS} | numbers
     return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
 
@@ -357,19 +363,19 @@ def _read_law(document, inputs):
     return law
 
 
-def _read_polynomial(document, rule, n_inputs):
-    """The polynomial that a file's content describes; ValueError where it is none."""
+def _read_polynomial(document, rule, inputs):
+    """The cubic that a file's content describes; ValueError where it is none."""
     if not isinstance(document, dict) or set(document) != set(_OF_POLYNOMIAL):
         raise ValueError(f"its polynomial must be an object of {', '.join(_OF_POLYNOMIAL)}")
-    n = n_inputs
-    is_single = isinstance(rule, FrozenRules) and rule.model.n_rules == 1 and not rule.model.order
-    if not is_single or rule.positions.tolist() != list(range(n)):
-        raise ValueError("a polynomial goes with a single rule of order 0 on all inputs, no law")
-    sizes = dict(zip(_OF_POLYNOMIAL, (n, n, comb(n + 3, 3)), strict=True))
-    lists = {k: _list_of_numbers(document[k], k, n, n, "polynomial") for k, n in sizes.items()}
+    if not isinstance(rule, FrozenRules) or rule.positions.tolist() != list(range(len(inputs))):
+        raise ValueError("a polynomial goes with a rule on all inputs, and no law")
+    powers = cubic_powers(len(inputs))
+    sizes = zip(_OF_POLYNOMIAL, (len(inputs), len(inputs), len(powers)), strict=True)
+    lists = {k: _list_of_numbers(document[k], k, n, n, "polynomial") for k, n in sizes}
     for j, value in enumerate(document["scale"]):
         _divisor(value, f"polynomial.scale[{j}]")
-    return FrozenPolynomial(rule.model, rule.positions, **lists)
+    box, names = (rule.model.minimum, rule.model.maximum), np.array(inputs, dtype=object)
+    return Polynomial(*box, **lists, powers=powers, feature_names_in_=names)
 
 
 def _divisor(value, where):

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.pipeline import Pipeline
+from sklearn.preprocessing import PolynomialFeatures
 from sklearn.utils.validation import (
     check_is_fitted,
     check_scalar,
@@ -246,8 +247,53 @@ class FrozenRules:
         return cls(model, places[0].astype(int))
 
 
+@dataclass(frozen=True, eq=False)
+class Polynomial:
+    """sum_k c_k prod_j z_j^p_kj with z = (x - center) / scale, x held in a box; a fitted base.
+
+    ``powers`` are of shape (n_terms, n_inputs); all columns of X are inputs.
+    """
+
+    minimum_: np.ndarray
+    maximum_: np.ndarray
+    center: np.ndarray
+    scale: np.ndarray
+    powers: np.ndarray
+    coefficients: np.ndarray
+    feature_names_in_: np.ndarray
+    out_of_bounds = "clip"
+
+    @property
+    def columns_(self):
+        """All columns."""
+        return np.arange(self.center.size)
+
+    n_features_in_ = property(lambda self: self.center.size)
+
+    def predict(self, X):
+        """What the polynomial gives."""
+        z = np.clip(np.asarray(X, dtype=float), self.minimum_, self.maximum_) - self.center
+        terms = np.tile(self.coefficients, (len(z), 1))
+        for column, powers in zip((z / self.scale).T, self.powers.T, strict=True):
+            terms *= column[:, None] ** powers
+        return terms.sum(axis=1)
+
+    def bounds(self, box):
+        """Limits of what it gives in a box (n_inputs, 2): no term exceeds |c| max |z|^powers."""
+        near = np.clip(box.T, self.minimum_, self.maximum_)
+        sizes = np.abs(near - self.center).max(axis=0) / self.scale
+        varies = self.powers.any(axis=1)
+        most = np.prod(sizes**self.powers, axis=1) @ np.abs(self.coefficients * varies)
+        return self.coefficients @ ~varies + np.array([-1.0, 1.0]) * (1.0 + 1e-12) * most
+
+
+def cubic_powers(n_inputs):
+    """Of all terms up to the third degree, in the order of scikit-learn."""
+    return PolynomialFeatures(3).fit(np.zeros((1, n_inputs))).powers_
+
+
 def law_and_rules(estimator):
-    """Both parts of a fitted composition: OpenLoopArcsineRegressor, FrozenRules."""
+    """Both parts of a fitted composition: the law, or a Polynomial in its place; FrozenRules."""
     found = found_by_search(estimator)
     if not isinstance(found, ResidualRegressor):
         raise TypeError(
@@ -256,12 +302,13 @@ def law_and_rules(estimator):
         )
     check_is_fitted(found)
     law = found.base_
-    if not isinstance(law, OpenLoopArcsineRegressor):
+    if not isinstance(law, OpenLoopArcsineRegressor | Polynomial):
         raise TypeError(
             f"base must be an OpenLoopArcsineRegressor, whose law can be written; it is {law!r}. "
             "The law chooses its columns by its own parameters, and needs no Pipeline."
         )
-    check_parameters(law)
+    if isinstance(law, OpenLoopArcsineRegressor):
+        check_parameters(law)
     rules = FrozenRules.of(found.residual_, law.n_features_in_)
     if rules.model.n_outputs != 1:
         raise ValueError(f"residual has {rules.model.n_outputs} outputs; the rate is one.")

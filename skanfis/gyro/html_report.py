@@ -24,10 +24,10 @@ from ._headline import (
     proven_bounds,
     readability_of,
 )
+from ._on_board import notes_on, units_of
 from ._options import ReportOptions
 from ._results import Results
 from ._simpler import NAMES, NOTHING
-from .c_code import notes_on, units_of
 from .compose import FrozenRules
 from .displays import figures, signs
 from .metrics import rms
@@ -334,7 +334,7 @@ def _sure(results):
     lines[1][2] = _interval(budget.scatter_low, budget.scatter_high, results.shown)
     head = ["part", f"standard deviation [{results.symbol}]", "95 % interval", "meaning"]
     caption = "Of one compensated row in range, in a group that the model has not seen"
-    added = hasattr(calibration.compensator.estimator, "residual_")
+    added = calibration.compensator.predicts == "rate"
     what = "addition to the arcsine law" if added else "compensation"
     proven = [
         (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}"),

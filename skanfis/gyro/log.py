@@ -23,7 +23,7 @@ from ._source import NO_VALUE, Clock, as_numbers, open_source
 from ._units import settle_by_all
 from .errors import LogError, shortened
 
-_ROWS = 200_000  # of a piece, which is all that is held beside the log itself
+_ROWS = 100_000  # of a piece, which is all that is held beside the log itself
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
@@ -276,7 +276,8 @@ class LogFile:
                 self.notes.append(f"the time is read in s, its form is {found.form}")
         clock = self._clock if part == "time" else None
         numbers = clock.seconds(column) if clock else numbers
-        bad = np.isnan(numbers) & (column.notna() & ~column.isin(NO_VALUE)).to_numpy()
+        bad = np.isnan(numbers)
+        bad[bad] = (column[bad].notna() & ~column[bad].isin(NO_VALUE)).to_numpy()
         if bad.any():
             row = int(bad.argmax())
             kind = "no time like those before" if clock else "not a number"
@@ -322,8 +323,10 @@ class RunFinder:
             run = piece.get("run", nothing)
         else:
             run = self._split(piece["time"].to_numpy(), file)
-        code, own = pd.MultiIndex.from_arrays([piece.get("device", nothing), run]).factorize()
-        places = [self._codes.setdefault((file, *key), len(self._codes)) for key in own]
+        (own, devices), (code, runs) = map(pd.factorize, (piece.get("device", nothing), run))
+        code, keys = pd.factorize(own * len(runs) + code)
+        own = [(file, devices[key // len(runs)], str(runs[key % len(runs)])) for key in keys]
+        places = [self._codes.setdefault(key, len(self._codes)) for key in own]
         return np.array(places)[code]
 
     def _split(self, time, file):
@@ -338,7 +341,7 @@ class RunFinder:
         self._is_split |= bool(starts.any())
         numbers = number + np.cumsum(starts)
         self._open[file] = begin, time[-1], numbers[-1]
-        return numbers.astype(str).astype(object)
+        return numbers
 
     @property
     def note(self):

@@ -149,27 +149,29 @@ def _cells(table, side, figures, units, kind, draws):
     step = max(1, -(-len(table) // _MOST_ROWS))
     thinned = [unit[::step] for unit in units]
     rows = _columns(table, side)
-    samples = [
-        _columns(table.iloc[np.concatenate([thinned[i] for i in draw])], side) for draw in draws
-    ]
-    cells = []
-    for figure in figures:
-        ends = (np.nan, np.nan)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            value, note = _or_nan(figure.value, rows)
+    own = [figure for figure in figures if figure.combine is None]
+    spreads = []
+    with np.errstate(divide="ignore", invalid="ignore"):
+        for draw in draws:
+            sample = _columns(table.iloc[np.concatenate([thinned[i] for i in draw])], side)
+            spreads.append([_or_nan(figure.of, sample)[0] for figure in own])
+        of_own = dict(zip((figure.name for figure in own), np.transpose(spreads), strict=False))
+        cells = []
+        for figure in figures:
+            ends, (value, note) = (np.nan, np.nan), _or_nan(figure.value, rows)
             if draws and not note:
-                ends, note = _interval(figure, rows, samples, draws, kind)
-        cells.append((value, *ends, note))
+                ends, note = _interval(figure, rows, of_own, draws, kind)
+            cells.append((value, *ends, note))
     return cells
 
 
-def _interval(figure, rows, samples, draws, kind):
+def _interval(figure, rows, spreads, draws, kind):
     """Ends of the interval, and why it has none."""
     nothing = (np.nan, np.nan)
     if figure.name in metrics.LARGEST_VALUES:
         return nothing, "largest value: no interval"
     if figure.combine is None:
-        spread = np.array([_or_nan(figure.of, sample)[0] for sample in samples])
+        spread = spreads[figure.name]
     elif kind != "runs":
         return nothing, f"no interval: fewer than {_FEWEST_RUNS} runs"
     else:

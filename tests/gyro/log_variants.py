@@ -180,7 +180,7 @@ def _is_settled(log, units, told, source):
     heat = log["temperature"]
     factor, offset = UNITS["temperature"][units["temperature"]]
     low, high = heat.min() * factor + offset, heat.max() * factor + offset
-    sure = told["temperature"] or low > 150.0 or high > 130.0 or (low <= 40.0 and high < 86.0)
+    sure = told["temperature"] or low > 150.0 or high > 130.0 or (low <= 30.0 and high < 86.0)
     # degF that look like degC are in no log here.
     if not told["temperature"] and units["temperature"] == "degF":
         sure = high > 130.0

@@ -6,6 +6,7 @@ import shutil
 import sys
 from itertools import pairwise
 
+import joblib
 import numpy as np
 import pandas as pd
 import pytest
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.usefixtures("given_weights", "coarse_report")
 RENAMED = ["--columns", "time=t_ms", "temperature=T", "output=counts", "rate=table"]
 UNITS = ["--units", "time=ms", "temperature=K", "output=counts"]
 FACTOR = -27_000.0
-FILES = ["compensator.json", "report.html", "rules.txt"]
+FILES = ["compensator.joblib", "compensator.json", "report.html", "rules.txt"]
 
 
 def simulated(**options):
@@ -93,6 +94,9 @@ def test_it_writes_what_it_says_and_the_compensator_knows_units(calibrated, log)
     assert compensator.inputs == ("time", "temperature", "temperature_rate", "output")
     compensated = compensator.apply(log.assign(output=FACTOR * log["output"]))
     assert (compensated["rate_compensated"] - log["rate"]).std() < 0.01
+    same = joblib.load(calibrated / "out" / "compensator.joblib")
+    again = same.apply(log.assign(output=FACTOR * log["output"]))
+    pd.testing.assert_frame_equal(again, compensated, check_exact=True)
 
 
 def test_what_is_refused_once_there_is_a_compensator(calibrated, tmp_path, log, capsys):

@@ -164,6 +164,14 @@ def test_the_formula_of_what_is_simpler_can_be_computed(calibration, name):
     np.testing.assert_allclose(names["rate"], expected, atol=1e-6)
 
 
+def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(calibration, no_drawing):
+    cubic = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="cubic")
+    text = " ".join(Outline(report_page(cubic, TITLE)).text)
+    assert "and the value at the edge is held" in text
+    assert "largest compensation, proven" in text
+    assert "addition to the arcsine law" not in text
+
+
 def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
     log = make_ofog(n_devices=1, n_runs=3, duration=600.0, rates=[0.0], random_state=0)
     calibration = calibration_of(log, inputs=("temperature",), terms=(2,), outside="nan")

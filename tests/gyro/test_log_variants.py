@@ -15,6 +15,7 @@ from skanfis.gyro._models import make_polynomial
 from skanfis.gyro.errors import UsageError
 from skanfis.gyro.log import read
 
+from . import instrument_logs
 from .log_variants import clean_logs, variant
 
 N_VARIANTS = int(os.environ.get("LOG_VARIANTS", "40"))
@@ -66,10 +67,15 @@ def outcome(case, logs, folder):
     return "read", ""
 
 
-def test_a_log_in_many_forms(logs, tmp_path):
+@pytest.mark.parametrize(
+    ("make", "n_variants"),
+    [(variant, N_VARIANTS), (instrument_logs.variant, max(N_VARIANTS // 5, 18))],
+    ids=["by parts", "by instruments"],
+)
+def test_a_log_in_many_forms(logs, tmp_path, make, n_variants):
     told, counts = [], {}
-    for number in range(N_VARIANTS):
-        case = variant(number, logs)
+    for number in range(n_variants):
+        case = make(number, logs)
         result, why = outcome(case, logs, tmp_path)
         key = (case.is_determined, result)
         counts[key] = counts.get(key, 0) + 1
@@ -77,7 +83,7 @@ def test_a_log_in_many_forms(logs, tmp_path):
             told.append(f"{number} {case.source}, {key}: {why}\n    {case.story}")
     report = f"{counts}\n" + "\n".join(told)
     n_determined = sum(n for (is_determined, _), n in counts.items() if is_determined)
-    assert n_determined > 0.4 * N_VARIANTS
+    assert n_determined > 0.4 * n_variants
     assert counts.get((True, "read"), 0) >= FEWEST_READ * n_determined, report
     assert not any(result == "wrong" for _, result in counts), report
     assert set(counts) <= {(True, "read"), (True, "refused"), (True, "asked"), (False, "asked")}, (

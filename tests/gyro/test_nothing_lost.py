@@ -16,7 +16,7 @@ pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, LogError, read_log
-from skanfis.gyro._frozen import frozen, single_rule
+from skanfis.gyro._simpler import frozen, single_rule
 from skanfis.gyro.command import _staged, main
 
 

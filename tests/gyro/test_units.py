@@ -63,6 +63,22 @@ def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offset
     assert f"({truth['rate'].min() * scales[3]:.4g} to" in found.assumed["rate"]
 
 
+@pytest.mark.parametrize(("low", "high", "is_asked"), [(32.0, 80.0, True), (-4.0, 80.0, False)])
+def test_degrees_fahrenheit_that_look_like_celsius(tmp_path, truth, low, high, is_asked):
+    # Of a log that is as warm as a room in degF alone it is asked; else what was assumed is said.
+    heat = truth["temperature"]
+    scale = (high - low) / np.ptp(heat)
+    scales, offsets = (1, scale, 1, 1), (0, low - scale * heat.min(), 0, 0)
+    if is_asked:
+        with pytest.raises(UsageError, match="--units temperature=degC or --units temperature="):
+            reading(tmp_path, truth, NAMES, scales, offsets)
+        return
+    found = reading(tmp_path, truth, NAMES, scales, offsets)
+    assert found.units["temperature"] == "degC"
+    told = "taken as degC (-4 to 80; degF? give --units temperature=degF)"
+    assert told in found.assumed["temperature"]
+
+
 def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, truth):
     turn = np.pi / 180
     with pytest.raises(UsageError) as caught:

@@ -13,7 +13,7 @@ from ...bounds.enclosure import Enclosure
 from ...bounds.terms import EPS, ROUNDINGS, product, size, square
 from ...exceptions import OutOfBoundsWarning
 from ...export.folding import found_by_search
-from ..compose import FrozenRules, ResidualRegressor
+from ..compose import FrozenRules, Polynomial, ResidualRegressor
 from ..physics import OpenLoopArcsineRegressor
 
 
@@ -88,7 +88,7 @@ def _parts_of(estimator):
         return [*_parts_of(found.base_), *_parts_of(found.residual_)]
     if isinstance(found, OpenLoopArcsineRegressor):
         return [_Law(found)]
-    if hasattr(found, "powers"):
+    if isinstance(found, Polynomial):
         return [_Polynomial(found)]
     return [_Rules(FrozenRules.of(found, getattr(found, "n_features_in_", None)))]
 

@@ -6,16 +6,17 @@ from typing import Any
 import numpy as np
 
 from ...export.c.dialect import write_files
-from ..c_code import SUBTRACT, raw_rate_of, units_of
+from .._on_board import SUBTRACT, raw_rate_of, units_of
 from ..metrics import rms
 from .autopilots import NOTES, Cubic
 from .error_model import ErrorModel
 from .piecewise import difference
-from .tables import NAMES, Table
+from .tables import Spline, Table
 
 FILES = {
     "table": ("gyro_table.h", "gyro_table.c"),
     "rate-table": ("gyro_rate_table.h", "gyro_rate_table.c"),
+    "cubic": ("gyro_cubic.h", "gyro_cubic.c"),
     "px4": ("px4.params",),
     "ardupilot": ("ardupilot.parm",),
 }
@@ -49,8 +50,10 @@ def _write(calibration, text, folder):
             "another target."
         )
     make: Any = partial(Cubic, autopilot=name)
-    if name.endswith("table"):
-        make = partial(Table, type_name=(details or ["float"])[0])
+    is_code = name not in NOTES
+    if is_code:
+        kind = Spline if name == "cubic" else Table
+        make = partial(kind, type_name=(details or ["float"])[0])
     error = ErrorModel(compensator, compensator.estimator, X)
     made = make(error)
     low, high = difference(error, made.piecewise)
@@ -72,9 +75,9 @@ def _write(calibration, text, folder):
         f"RMS on rows held out, and the model {model_rms:.4g}"
     )
     notes = [f"In the place of the model in compensator.json: {worth}.", _THERMOMETER]
-    if name.endswith("table"):
+    if is_code:
         use = f"{SUBTRACT} {raw_rate_of(compensator)}"
-        write_files(made.code([use, *notes], units_of(compensator)), folder / NAMES[len(axes)])
+        write_files(made.code([use, *notes], units_of(compensator)), folder / FILES[name][0][:-2])
     else:
         written = made.text([NOTES[name], *notes], *details)
         (folder / FILES[name][0]).write_text(written, encoding="ascii", newline="\n")

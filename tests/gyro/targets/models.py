@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
-from skanfis.gyro._frozen import frozen, single_rule
 from skanfis.gyro._models import make_polynomial
+from skanfis.gyro._simpler import frozen, single_rule
 from skanfis.gyro.targets.error_model import ErrorModel
 
 from ...quick import quick

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from skanfis.gyro.targets.piecewise import difference
-from skanfis.gyro.targets.tables import TYPES, Table
+from skanfis.gyro.targets.tables import TYPES, Spline, Table
 
 from ...export.c_compiler import SANITIZE, STRICT, gcc, needs_compiler, run
 from .models import ENDS, error_of, error_over_temperature
@@ -38,6 +38,8 @@ int main(void)
 
 
 def made(kind, type_name, n_cells=8):
+    if kind == "cubic":
+        return error_over_temperature(), Spline(error_over_temperature(), type_name, n_cells)
     error = error_of("rules") if kind == "rate-table" else error_over_temperature()
     return error, Table(error, type_name, n_cells)
 
@@ -74,8 +76,15 @@ def scales_of(header):
 
 
 @needs_compiler
-@pytest.mark.parametrize("type_name", TYPES)
-@pytest.mark.parametrize("kind", ["table", "rate-table"])
+@pytest.mark.parametrize(
+    ("kind", "type_name"),
+    [
+        *(("table", name) for name in TYPES),
+        *(("rate-table", name) for name in TYPES),
+        ("cubic", "float"),
+        ("cubic", "double"),
+    ],
+)
 def test_what_c_says_is_within_the_certain_difference(kind, type_name, tmp_path):
     error, table = made(kind, type_name)
     code, real = table.code(["A note */ with stars * 2."], UNITS), REALS[type_name]
@@ -118,6 +127,19 @@ def test_a_table_is_the_interpolation_between_values_of_the_error(kind):
     points = np.random.default_rng(6).uniform(*ENDS[: len(axes)].T, (500, len(axes)))
     wanted = RegularGridInterpolator(axes, values)(points)
     np.testing.assert_allclose(table.piecewise(points), wanted, atol=1e-12)
+
+
+def test_a_piecewise_cubic_is_a_cubic_where_the_error_is_and_nearer_than_lines_elsewhere():
+    cubic = error_over_temperature("polynomial")
+    points = np.random.default_rng(6).uniform(*ENDS[:1].T, (500, 1))
+    found = Spline(cubic, "double", 4).piecewise
+    np.testing.assert_allclose(found(points), cubic(points), rtol=0, atol=1e-13)
+    largest = {}
+    for kind in ("cubic", "table"):
+        error, target = made(kind, "double", 16)
+        low, high = difference(error, target.piecewise)
+        largest[kind] = max(-low, high)
+    assert largest["cubic"] < 0.1 * largest["table"]
 
 
 @needs_compiler

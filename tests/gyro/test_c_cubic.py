@@ -1,14 +1,13 @@
-"""A polynomial as C, compiled and run, answers what Python answers, with the same flags."""
+"""A cubic in the place of the law as C, compiled, answers what Python answers, with its flags."""
 
 import numpy as np
 import pandas as pd
 import pytest
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import GyroCompensator
-from skanfis.gyro._frozen import frozen, single_rule
+from skanfis.gyro import GyroCompensator, export_c_physics
 from skanfis.gyro._models import make_polynomial
-from skanfis.gyro.c_polynomial import export_c_polynomial
+from skanfis.gyro._simpler import frozen, single_rule
 
 from ..export.c_compiler import SANITIZE, UNTOUCHED, evaluate_all, needs_compiler
 
@@ -35,7 +34,7 @@ def test_answers_as_python(tmp_path, policy, dtype, std, tolerance):
     reach = rng.choice([1.0, 1.5], 3000)[:, None]
     rows = low + (high - low) * (0.5 + reach * rng.uniform(-0.5, 0.5, (3000, 4)))
     rows = rows.astype(np.float32 if dtype == "float" else float)
-    code = export_c_polynomial(estimator, tmp_path / "gyro", dtype=dtype, std=std)
+    code = export_c_physics(estimator, tmp_path / "gyro", dtype=dtype, std=std)
     flags = SANITIZE if policy == "linear" else []
     [(y, status)] = evaluate_all([code], rows, tmp_path, std, [1], flags)
     compensator = GyroCompensator(estimator, INPUTS)
@@ -51,7 +50,7 @@ def test_answers_as_python(tmp_path, policy, dtype, std, tolerance):
     size = np.abs(error[answered]).max()
     np.testing.assert_allclose(y[answered, 0] / size, error[answered] / size, atol=tolerance)
     assert np.isnan(y[~answered]).all()
-    assert "A polynomial of degree 3 with 35 terms" in code.header
+    assert "A polynomial of the third degree with 35 terms" in code.header
 
 
 @needs_compiler
@@ -62,9 +61,7 @@ def test_it_is_held_and_rows_that_are_not_finite_get_no_output(tmp_path):
         make_polynomial(3).fit(X, log["output"] - log["rate"]), single_rule(X, "clip")
     )
     said = {"units": {"temperature": "degC"}, "notes": ["Subtract y[0]."]}
-    code = export_c_polynomial(
-        estimator, tmp_path / "gyro", std="c99", saturate=[-0.01, 0.02], **said
-    )
+    code = export_c_physics(estimator, tmp_path / "gyro", std="c99", saturate=[-0.01, 0.02], **said)
     assert " * Subtract y[0].\n" in code.header
     assert "[0] temperature [degC]: " in code.header
     rows = np.vstack([X.to_numpy(), [[np.nan, 0.0], [20.0, np.inf]]])

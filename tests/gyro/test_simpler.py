@@ -7,8 +7,9 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
-from skanfis.gyro._frozen import FrozenPolynomial, frozen, single_rule
 from skanfis.gyro._models import make_law, make_law_and_line, make_polynomial
+from skanfis.gyro._simpler import frozen, single_rule
+from skanfis.gyro.compose import Polynomial
 
 INPUTS = ("time", "temperature", "output")
 KINDS = ("constant", "line", "cubic", "law", "law and line")
@@ -81,16 +82,15 @@ def test_bounds_of_a_polynomial_hold_and_are_exact_for_one_input(log):
     estimator = frozen(model, single_rule(X, "linear"))
     box = np.stack([X.min() - 5.0, X.max() + 5.0], axis=1)
     values = estimator.predict(np.random.default_rng(0).uniform(*box.T, (20_000, len(INPUTS))))
-    low, high = estimator.bounds(box)
+    low, high = estimator.base_.bounds(box)
     assert low <= values.min() < values.max() <= high
     # Of z^3 + 2 z^2 on [-1, 2]: exact at the far end.
-    rule = single_rule(X[["temperature"]], "clip")
-    low, high = rule.model.minimum[0], rule.model.maximum[0]
+    low, high = np.array([-20.0]), np.array([70.0])
     third = (high - low) / 3.0
-    one = FrozenPolynomial(rule.model, rule.positions, np.array([low + third]), np.array([third]),
-                           np.array([0.0, 0.0, 2.0, 1.0]))  # fmt: skip
-    np.testing.assert_allclose(one.bounds(np.array([[low, high]])), [-16.0, 16.0], atol=1e-9)
-    assert one.predict([[high]])[0] == pytest.approx(16.0)
+    powers, names = np.arange(4)[:, None], np.array(["temperature"], dtype=object)
+    one = Polynomial(low, high, low + third, third, powers, np.array([0.0, 0.0, 2.0, 1.0]), names)
+    np.testing.assert_allclose(one.bounds(np.array([[-20.0, 70.0]])), [-16.0, 16.0], atol=1e-9)
+    assert one.predict([high])[0] == pytest.approx(16.0)
 
 
 @pytest.mark.parametrize(
