@@ -68,6 +68,19 @@ def in_user_units(coefficients, inputs, targets, slopes, order):
     return found
 
 
+def with_common_slopes(coefficients, masses, common, inputs):
+    """Coefficients on [1, z] in which slopes that are common are one, their mean, to the last bit.
+
+    ``common`` are inputs and rules, as ``Penalty.common``; ``inputs`` those of the slopes.
+    """
+    found = coefficients.reshape(masses.size, 1 + len(inputs), -1).copy()
+    place = {int(j): 1 + k for k, j in enumerate(inputs)}
+    for j, rules in common:
+        own = list(rules), place[j]
+        found[own] = np.average(found[own], axis=0, weights=masses[own[0]])
+    return found.reshape(coefficients.shape)
+
+
 def rule_masses(gram, n_rules):
     """Part of the data's weight on which each rule fires, from the Gram matrix of the design."""
     n_basis = gram.shape[0] // n_rules

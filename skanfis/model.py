@@ -133,6 +133,19 @@ class TSKModel:
         return textbook
 
     @property
+    def common_slopes(self) -> np.ndarray:
+        """Where a rule has the slope that most rules have in common, (n_rules, n_inputs)."""
+        found = np.zeros((self.n_rules, self.n_inputs), dtype=bool)
+        for j, slopes in enumerate(self.coefficients[:, 1:].transpose(1, 0, 2)):
+            values, which, counts = np.unique(
+                slopes, axis=0, return_inverse=True, return_counts=True
+            )
+            most = counts.argmax()
+            if counts[most] > 1 and values[most].any():
+                found[:, j] = which.ravel() == most
+        return found
+
+    @property
     def output_limits(self) -> np.ndarray:
         """Lowest and highest output that the model gives, (2, n_outputs); infinite if not held."""
         if self.target is None:

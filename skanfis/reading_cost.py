@@ -6,15 +6,15 @@ from .antecedent import Antecedent
 def reading_cost(antecedent: Antecedent, n_slopes: int, n_outputs: int = 1) -> int:
     """Numerals that a person reads in the rules' sentences.
 
-    A named term counts as one each time a rule says it; so do, of every output, the rule's own
-    value and each of its slopes. How many rows a rule stands for, its share, its error and its
-    number are not counted.
+    A named term counts as one each time a rule says it; so do, of every output, the value of every
+    rule and each slope, one that several rules have in common once. How many rows a rule stands
+    for, its share, its error and its number are not counted.
 
     Parameters
     ----------
     antecedent : Antecedent
     n_slopes : int
-        Of each rule.
+        Of all rules, those in common once.
     n_outputs : int, default=1
 
     Returns
@@ -22,4 +22,4 @@ def reading_cost(antecedent: Antecedent, n_slopes: int, n_outputs: int = 1) -> i
     int
     """
     n_conditions = int((antecedent.rule_terms >= 0).sum())
-    return n_conditions + antecedent.n_rules * n_outputs * (1 + n_slopes)
+    return n_conditions + n_outputs * (antecedent.n_rules + n_slopes)

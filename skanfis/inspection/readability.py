@@ -108,9 +108,11 @@ class Readability:
     @property
     def reading_cost(self) -> int:
         """Numerals that a person reads in the rules' sentences; see the class."""
-        slopes = self.model.coefficients[:, 1:]
-        n_slopes = int(np.count_nonzero(slopes.any(axis=(0, 2))))
-        return reading_cost(self.model.antecedent, n_slopes, self.model.n_outputs)
+        model = self.model
+        n_slopes = int(np.count_nonzero(model.coefficients[:, 1:].any(axis=2)))
+        is_common = model.common_slopes
+        n_slopes -= int(is_common.sum() - is_common.any(axis=0).sum())
+        return reading_cost(model.antecedent, n_slopes, model.n_outputs)
 
     @property
     def summary(self) -> Any:

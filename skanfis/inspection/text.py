@@ -98,8 +98,9 @@ def export_text(
     reference = rounded_reference(model) if about == "mean" else 0.0 * model.reference
     frame = rules_frame(model, reference)
     chosen = weightiest(frame, max_shown)
-    consequents = _consequent_texts(model, frame, reference, precision)
+    consequents, common = _consequent_texts(model, frame, reference, precision)
     parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
+    parts += [f"Every rule adds, to {name}: {text}" for name, text in common.items()]
     for r, premise in zip(chosen.index, premise_texts(chosen), strict=True):
         heading = f"Rule {r}"
         if has_training_data(model):
@@ -150,7 +151,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = 4) -> st
     reference = rounded_reference(model)
     frame = rules_frame(model, reference)
     chosen = weightiest(frame, max_shown)
-    consequents = _consequent_texts(model, frame, reference, precision)
+    consequents, common = _consequent_texts(model, frame, reference, precision)
     cells: dict = {}
     if has_training_data(model):
         notes = np.where(chosen["data", "rows"] < 0.5, " (no row)", "")
@@ -166,6 +167,10 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = 4) -> st
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}"
     parts = [f"<div>{counts}</div>", table]
+    parts += [
+        f"<div>every rule adds, to {escape(name)}: {escape(text)}</div>"
+        for name, text in common.items()
+    ]
     if len(chosen) < model.n_rules:
         parts.append(f"<div>and {_left_out(model, chosen)}</div>")
     found = readability_in_training(estimator, model)
@@ -175,20 +180,26 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = 4) -> st
 
 
 def _consequent_texts(model, frame, reference, precision):
-    """By output and rule "a + b * (x - x0) + ..."."""
-    texts = {}
+    """By output and rule "a + b * (x - x0) + ..."; by output what all rules have in common."""
+    texts, common = {}, {}
+    is_common = np.pad(model.common_slopes, ((0, 0), (1, 0)))
+    first = is_common.argmax(axis=0), np.arange(1 + model.n_inputs)
     for output in model.output_names:
         values = frame[f"then {output}"].to_numpy(copy=True)
         # Slopes that move the output by less than the last digit written.
         change = np.abs(values[:, 1:]) * (model.maximum - model.minimum)
         scale = max(np.abs(values[:, 0]).max(), change.max(initial=0.0))
         values[:, 1:][change < 10.0 ** -(precision + 2) * scale] = 0.0
+        line = np.where(is_common.any(axis=0), values[first], 0.0)
+        if line.any():
+            common[output] = _formula(line, model.input_names, reference, precision)
+        values[is_common] = 0.0
         texts[output] = [_formula(row, model.input_names, reference, precision) for row in values]
-    return texts
+    return texts, common
 
 
 def _formula(coefficients, input_names, reference, precision):
-    text = number(coefficients[0], precision)
+    text = number(coefficients[0], precision) if coefficients[0] else ""
     for name, slope, origin in zip(input_names, coefficients[1:], reference, strict=True):
         if slope == 0.0:
             continue
@@ -198,7 +209,7 @@ def _formula(coefficients, input_names, reference, precision):
             factor = f"({factor} {'-' if origin > 0.0 else '+'} {abs(origin):.15g})"
         sign = "-" if slope < 0.0 else "+"
         text += f" {sign} {number(abs(slope), precision)} * {factor}"
-    return text
+    return text.removeprefix(" + ").removeprefix(" ") or number(0.0, precision)
 
 
 def _legend(model, precision):

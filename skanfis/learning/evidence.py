@@ -244,7 +244,7 @@ def laplace(
         prior,
         factor,
         curvature if has_premises else np.empty(0),
-        matrix.shape[0],
+        matrix.shape[0] - penalty.n_held,
     )
 
 

@@ -44,6 +44,8 @@ from .departures import Departures
 
 # What comes first in a row of weights; after these, those on all slopes and on all components.
 WEIGHTS = ("agreement", "stiffness")
+# On what slopes that are common differ by: what is left of it is beyond what anyone reads.
+_HELD = 1e6
 # Penalties whose weights are kept.
 _MOST_KNOWN = 8
 
@@ -60,6 +62,13 @@ class Penalty:
     # where there is none. Those of some rows hold for others, where other inputs are constant.
     pulls: dict[tuple[int, ...], float] = field(default_factory=dict)
     slope_pulls: dict[int, float] = field(default_factory=dict)
+    # Inputs, and the rules that have one slope by each.
+    common: tuple[tuple[int, tuple[int, ...]], ...] = ()
+
+    @property
+    def n_held(self):
+        """How many coefficients less there are: of every common slope, one is left."""
+        return sum(len(rules) - 1 for _, rules in self.common)
 
     @property
     def rho(self):
@@ -156,6 +165,10 @@ class CommonLine:
         self._part = np.concatenate(
             [np.arange(len(self.slopes)), len(self.slopes) + self.departures.component]
         )
+        self.n_rules, self._n_basis = n_rules, n_basis
+        # Slopes per unit of z out of local ones, in units of a typical extent; where each stands.
+        self._per_unit = extent.mean(axis=0) / local.spread
+        self._function = {j: k for k, j in enumerate(slopes) if j is not None}
         self._known: dict[int, tuple[Penalty, np.ndarray]] = {}
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
@@ -174,10 +187,24 @@ class CommonLine:
         else:
             rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
             matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
+        for j, rules in penalty.common:
+            contrasts = self.contrasts(j, np.array(rules))
+            matrix += _HELD * contrasts.T @ contrasts
         if self._to_none.size:
             # What is constant has no slope to learn, but one that is held.
             matrix += penalty.rho * self._to_none.T @ self._to_none
         return matrix
+
+    def of_slopes(self, j, rules):
+        """Slopes by an input of some rules out of u, per unit of z times a typical extent."""
+        k = self._function[j]
+        found = np.zeros((rules.size, self.height.size))
+        found[np.arange(rules.size), rules * self._n_basis + 1 + k] = self._per_unit[rules, k]
+        return found
+
+    def contrasts(self, j, rules):
+        """What they differ by, in orthonormal contrasts."""
+        return linalg.helmert(rules.size) @ self.of_slopes(j, rules)
 
     def weights(self, penalty: Penalty):
         """All weights of a penalty, in a row; not to be changed."""

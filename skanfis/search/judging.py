@@ -44,21 +44,25 @@ def splits(rows: StandardisedData):
     Where there is but one fold, what is grown for it serves as the sequence of all rows.
     """
     n_rows, groups = rows.n_rows, rows.groups
-    if groups is not None and np.unique(groups).size > 1:
-        n_folds = min(_FOLDS, np.unique(groups).size)
-        folds = GroupKFold(n_folds).split(rows.X, groups=groups)
-        return [(grow, _in_range(rows, grow, judge)) for grow, judge in folds]
     every, n_folds = np.arange(n_rows), min(_FOLDS, n_rows)
     if n_rows == 1:
         return [(every, every)]
-    if n_rows >= _PLENTY:
-        return [(every[1::2], _in_range(rows, every[1::2], every[::2]))]
-    folds = [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
-    return [(grow, _in_range(rows, grow, judge)) for grow, judge in folds[: int(np.ceil(n_folds * _ENOUGH / n_rows))]]
+    if groups is not None and np.unique(groups).size > 1:
+        n_folds = min(_FOLDS, np.unique(groups).size)
+        folds = list(GroupKFold(n_folds).split(rows.X, groups=groups))
+    elif n_rows >= _PLENTY:
+        folds = [(every[1::2], every[::2])]
+    else:
+        folds = [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
+        folds = folds[: int(np.ceil(n_folds * _ENOUGH / n_rows))]
+    return [(grow, _in_range(rows.X, grow, judge)) for grow, judge in folds]
 
 
-def _in_range(rows, grow, judge):
-    """Those within the box of the rows to grow on."""
-    X = rows.X[grow]
-    inside = ((rows.X[judge] >= X.min(axis=0)) & (rows.X[judge] <= X.max(axis=0))).all(axis=1)
-    return judge[inside] if 2*inside.sum() >= inside.size else judge
+def _in_range(X, grow, judge):
+    """Those of the rows to judge that are within the range of the others, where most of them are.
+
+    The model of all rows has seen their like; to this fold they are beyond the data.
+    """
+    low, high = X[grow].min(axis=0), X[grow].max(axis=0)
+    inside = ((X[judge] >= low) & (X[judge] <= high)).all(axis=1)
+    return judge[inside] if 2 * np.count_nonzero(inside) >= judge.size else judge

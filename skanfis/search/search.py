@@ -10,12 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..learning.data import StandardisedData
-from ..reading_cost import reading_cost
-from .candidates import KINDS, Candidate
+from .candidates import KINDS
 from .choice import Judged, Judges, best_of, chosen, tolerated
 from .judging import dealt_rows, splits
 from .start import Start, started
 from .trials import Plan, Trials
+from .tuning import cost_of
 
 # Steps beyond the best of a kind, after which its sequence ends: a product of two inputs needs
 # terms on both before any helps.
@@ -84,7 +84,7 @@ class StructureSearch:
         factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
         squares *= factor
         error = self.judges.mean(squares)
-        return Judged(candidate, squares, error, self._cost(candidate))
+        return Judged(candidate, squares, error, cost_of(self.trials.tuned(candidate)))
 
     def _variance(self):
         """Squared error of the mean on the rows that judge."""
@@ -96,10 +96,6 @@ class StructureSearch:
             for fold, rest in zip(self.folds, self.rest, strict=True)
         ]
         return self.judges.mean(np.concatenate(squares))
-
-    def _cost(self, candidate: Candidate):
-        antecedent = self.trials.begun(candidate).problem.antecedent
-        return reading_cost(antecedent, self.plan.n_basis - 1, self.trials.rows.y.shape[1])
 
     def _report(self, found):
         """Every candidate in words and numbers, best first."""

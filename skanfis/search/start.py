@@ -17,7 +17,6 @@ from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..model import TSKModel
-from ..reading_cost import reading_cost
 from .choice import tolerated
 from .sample import effective_weight, search_sample
 from .trials import Plan
@@ -27,10 +26,12 @@ from .tuning import (
     MOST_COLUMNS,
     MOST_TURNS,
     Tuned,
+    cost_of,
     scaled,
     settled,
     tune,
     tune_unbounded,
+    with_common_slopes,
     with_most_agreement,
 )
 
@@ -95,6 +96,7 @@ def tuned_start(
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_free = freed, True
+    best = with_common_slopes(best, free)
     left, error = 1.0, best.expected_error
     if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))
@@ -111,7 +113,7 @@ def _as_given(tuned: Tuned):
         "kind": "scattered" if counts is None else "grid",
         "rules": n_rules,
         "n_mfs": None,
-        "reading_cost": reading_cost(problem.antecedent, problem.n_basis - 1, problem.n_outputs),
+        "reading_cost": cost_of(tuned),
         "expected_error": float(np.sqrt(tuned.expected_error)),
         "chosen": True,
     }

@@ -25,7 +25,7 @@ from .candidates import Candidate, RuleBases, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
 from .splits import best_splits
-from .tuning import FIRST_STEPS, Tuned, tune
+from .tuning import FIRST_STEPS, Tuned, tune, with_common_slopes
 
 # Rows that a candidate sees for each of its parameters, and at least.
 _ROWS_EACH, _FEWEST_ROWS = 40, 1000
@@ -160,15 +160,12 @@ class Trials:
         n_rows, n = self.rows_for(candidate).n_rows, self.n_parameters(candidate)
         return (n_rows + 10.0 * n) * n**2
 
-    def begun(self, candidate: Candidate) -> Tuned:
-        """A candidate of the sequence before its premises move."""
-        return self._begun[candidate]
-
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
         if candidate not in self._found:
             begun = self._begun[candidate]
-            self._found[candidate] = self._train(candidate, begun=begun)
+            found = self._train(candidate, begun=begun)
+            self._found[candidate] = with_common_slopes(found, self.plan.free)
         return self._found[candidate]
 
     def expected(self, tuned: Tuned) -> float:

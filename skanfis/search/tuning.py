@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..learning.common_slopes import common_slopes
 from ..learning.evidence import (
     PRIOR_DISPLACEMENT,
     Laplace,
@@ -28,6 +29,7 @@ from ..learning.objective import Evaluation, SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..learning.varpro import varpro
+from ..reading_cost import reading_cost
 
 # In the middle of what data of every kind ask for; from there the first steps find their way.
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
@@ -252,6 +254,15 @@ def _improved(
     return posterior
 
 
+def cost_of(tuned: Tuned) -> int:
+    """To read the rules."""
+    problem, common = tuned.problem, tuned.penalty.common
+    antecedent = problem.antecedent
+    n_common = sum(len(rules) for _, rules in common)
+    n_own = antecedent.n_rules * (problem.n_basis - 1) - n_common
+    return reading_cost(antecedent, n_own + len(common), problem.n_outputs)
+
+
 def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, left: float) -> Tuned:
     """The same with as much agreement as keeps the squared error within ``left`` of itself.
 
@@ -273,6 +284,29 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
         else:
             agreement = float(np.sqrt(best.penalty.agreement * agreement))
     return best if best is tuned else replace(best, agreement_is_raised=True)
+
+
+def with_common_slopes(tuned: Tuned, free) -> Tuned:
+    """The same with one slope for as many rules as the evidence allows, by every input."""
+    problem = tuned.problem
+    if not tuned.displacement.size or "alpha" not in free or problem.n_columns > MOST_COLUMNS:
+        return tuned
+    found = common_slopes(tuned.posterior, tuned.solved.normal.coefficients)
+    penalty = replace(tuned.penalty, common=found)
+    again = problem.with_penalty(penalty)
+    n_rows, n_rules = tuned.posterior.n_rows, problem.antecedent.n_rules
+    posterior = laplace(
+        tuned.evaluation.normal,
+        problem.common_line,
+        tuned.evaluation.mean_squared_error,
+        penalty,
+        n_rows,
+        n_rules,
+        tuned.displacement,
+        tuned.posterior.curvature,
+        tuned.posterior.n_outputs,
+    )
+    return replace(tuned, problem=again, posterior=posterior)
 
 
 def _with_penalty(tuned: Tuned, penalty: Penalty) -> Tuned:

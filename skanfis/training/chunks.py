@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..blocks import fitting_rows, row_blocks
-from ..consequent import LocalBasis, basis, in_user_units
+from ..consequent import LocalBasis, basis, in_user_units, with_common_slopes
 from ..learning.covariance import posterior_of
 from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
 from ..learning.firing import FIRES, inverse_factor
@@ -383,9 +383,10 @@ def solve(sums: RowSums, given, first=None) -> Solved:
             found["slope_pulls"] = dict(first["slope_pulls"])
         given = found | given
     free = [key for key in _FREE if key not in given]
-    problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
+    first_penalty = replace(FIRST_PENALTY, common=_common(sums.base))
+    problem = _ProblemOfSums(sums, replace(first_penalty, **given, stiffness=0.0))
     if free:
-        premise = Premise(antecedent, none, none, none, ())
+        premise = Premise(antecedent, none, none, none, none.astype(int), ())
         tuned = tune(problem, premise, free, sums.effective_weight, turns=0, first_steps=ARRIVING)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
@@ -399,13 +400,26 @@ def solve(sums: RowSums, given, first=None) -> Solved:
     )
 
 
+def _common(model):
+    """The slopes that rules of a model have in common, as ``Penalty.common``."""
+    return tuple(
+        (j, tuple(np.flatnonzero(rules).tolist()))
+        for j, rules in enumerate(model.common_slopes.T)
+        if rules.any()
+    )
+
+
 def _model(sums, problem, evaluation):
     """The model in the user's units."""
     inputs, targets, slopes = sums.inputs, sums.targets, sums.consequent_inputs
     order = 1 if slopes.size else 0
+    common, masses = problem.penalty.common, evaluation.masses
+    coefficients = evaluation.coefficients
+    if common:
+        coefficients = with_common_slopes(coefficients, masses, common, slopes)
     return replace(
         sums.base,
-        coefficients=in_user_units(evaluation.coefficients, inputs, targets, slopes, order),
+        coefficients=in_user_units(coefficients, inputs, targets, slopes, order),
         reference=inputs.offset,
         spread=inputs.scale,
         minimum=inputs.minimum,

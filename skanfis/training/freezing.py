@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..consequent import in_user_units
+from ..consequent import in_user_units, with_common_slopes
 from ..learning import SolverResult
 from ..learning.data import StandardisedData
 from ..learning.firing import RuleFiring, rule_support
@@ -68,11 +68,16 @@ class ModelBuilder:
         rows, trained = self.rows, evaluation.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
         firing = self.firing(evaluation) if firing is None else firing
+        slopes, masses = self.request.consequent_inputs, evaluation.masses
+        coefficients = evaluation.coefficients
+        if start.penalty.common:
+            common = start.penalty.common
+            coefficients = with_common_slopes(coefficients, masses, common, slopes)
         support = rule_support(rows, trained, self.n_coefficients, firing)
         model = TSKModel(
             antecedent=trained.change_units(offset, scale),
             initial_antecedent=start.antecedent.change_units(offset, scale),
-            coefficients=self.in_user_units(evaluation.coefficients),
+            coefficients=self.in_user_units(coefficients),
             reference=offset,
             spread=scale,
             minimum=rows.inputs.minimum,

@@ -1,0 +1,79 @@
+r"""Slopes that are common to several rules: those of which the evidence asks no more.
+
+With M and P of ``evidence``, the consequents of an output have the posterior N(m, V), V = sigma^2 /
+n M^-1, and before the data N(0, V0), V0 = sigma^2 / n P^-1. That some rules have one slope by an
+input says C u = 0, C contrasts of their slopes. By the ratio of Savage and Dickey (Dickey 1971),
+what it takes from the evidence is
+
+    -2 log p(C u = 0 | data) / p(C u = 0)  =  (C m)' (C V C')^-1 C m + log |C V C'| - log |C V0 C'|
+
+at a given sigma. So one factorisation tells of every input and of every set of rules. What is found
+is conditioned on before the next is asked for.
+"""
+
+import numpy as np
+from scipy import linalg
+
+from .evidence import Laplace
+
+# What a slope of its own must be worth of the evidence, in -2 log p: as much as a parameter costs
+# by Akaike's criterion.
+_WORTH = 2.0
+
+
+def common_slopes(posterior: Laplace, coefficients):
+    """Inputs and the rules that have one slope by each, as ``Penalty.common`` has them.
+
+    ``coefficients`` are the local ones, (n_columns, n_outputs).
+    """
+    line, unit = posterior.line, posterior.noise_variance / posterior.n_rows
+    identity = np.eye(len(coefficients))
+    before, after = (
+        unit * half.T @ half
+        for half in (factor.half_solve(identity) for factor in (posterior.prior, posterior.factor))
+    )
+    state = [coefficients.copy(), after, before]
+    found = []
+    every = np.arange(line.n_rules)
+    order = [_loss(state, line.contrasts(j, every)) for j in line.slopes]
+    for k in np.argsort(order, kind="stable"):
+        j, rules = line.slopes[k], every
+        while rules.size > 1:
+            contrasts = line.contrasts(j, rules)
+            if _loss(state, contrasts) < _WORTH * contrasts.shape[0] * coefficients.shape[1]:
+                found.append((j, tuple(rules.tolist())))
+                state = _given(state, contrasts)
+                break
+            rules = np.delete(rules, _farthest(state, line.of_slopes(j, rules)))
+    return tuple(sorted(found))
+
+
+def _loss(state, contrasts):
+    """What it takes from the evidence that these are zero, in -2 log p."""
+    mean, after, before = state
+    root, of_prior = (linalg.cholesky(contrasts @ one @ contrasts.T) for one in (after, before))
+    misfit = linalg.solve_triangular(root, contrasts @ mean, trans="T")
+    change = np.log(np.diag(root) / np.diag(of_prior)).sum()
+    return float(np.sum(misfit**2) + 2.0 * mean.shape[1] * change)
+
+
+def _given(state, contrasts):
+    """Mean and covariances given that these are zero."""
+    mean, *covariances = state
+    gains = [
+        linalg.solve(contrasts @ one @ contrasts.T, contrasts @ one, assume_a="pos").T
+        for one in covariances
+    ]
+    return [
+        mean - gains[0] @ (contrasts @ mean),
+        *(one - gain @ (contrasts @ one) for one, gain in zip(covariances, gains, strict=True)),
+    ]
+
+
+def _farthest(state, slopes):
+    """The rule whose slope is farthest from the mean of the others, in its deviations."""
+    mean, after, _ = state
+    values, variances = slopes @ mean, np.einsum("ri,ij,rj->r", slopes, after, slopes)
+    weights = 1.0 / np.maximum(variances, np.finfo(float).tiny)
+    center = np.average(values, axis=0, weights=weights)
+    return int(np.argmax(np.sum((values - center) ** 2, axis=1) * weights))
