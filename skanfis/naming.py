@@ -1,9 +1,17 @@
-"""What terms are called: linguistic names for a grid, places for rules with terms of their own."""
+r"""What terms are called: linguistic names for a grid, places for rules with terms of their own.
+
+A side of a cut at c over a width h is "> c ± h log 9": so far from the cut it is 0.9 true. One that
+parts two values, with no row between, needs no width: "> c", or the value itself where they are 0
+and 1.
+"""
 
 from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
+
+from .antecedent.tree import CRISP
+from .membership import SigmoidFalling, SigmoidRising
 
 __all__ = ["LINGUISTIC", "default_output_names", "default_term_names", "given_term_names"]
 
@@ -21,8 +29,18 @@ LINGUISTIC = {
 _MOST_DIGITS = 17
 
 
-def default_term_names(antecedent):
-    """Names, unique on each input: of a grid by the order of its terms, else "near 21.3"."""
+_SIGNS = {SigmoidRising: "> ", SigmoidFalling: "< "}
+# A side is 0.9 true this many widths from its cut; digits that are written of that length.
+_MOSTLY_TRUE, _DIGITS_OF_WIDTH = np.log(9.0), 2
+# As rounding leaves the cut between two values.
+_ROUNDING = 1e-6
+
+
+def default_term_names(antecedent, minimum, maximum):
+    """Names: of a grid by the order of its terms, else "near 21.3", unique on each input.
+
+    Of a side "> 6.8 ± 0.3"; ``minimum`` and ``maximum`` of each input's data.
+    """
     inputs, places = antecedent.term_inputs, antecedent.term_places
     names = np.empty(inputs.size, dtype=object)
     for j in np.unique(inputs):
@@ -32,7 +50,47 @@ def default_term_names(antecedent):
             names[own] = LINGUISTIC.get(own.size, numbered)
         else:
             names[own] = _near(places[own])
+    start = 0
+    for group in antecedent.groups:
+        if group.family in _SIGNS:
+            for j in np.unique(group.inputs):
+                own = np.flatnonzero(group.inputs == j)
+                names[start + own] = _sides(
+                    _SIGNS[group.family],
+                    group.theta[0, own],
+                    group.theta[1, own],
+                    minimum[j],
+                    maximum[j],
+                )
+        start += group.n_terms
     return tuple(names)
+
+
+def is_crisp(cut, width, low, high):
+    """Whether a cut parts the two values that an input has."""
+    return (width * CRISP < high - low) & (abs(2.0 * cut - low - high) <= _ROUNDING * (high - low))
+
+
+def _sides(sign, cuts, log_widths, low, high):
+    """Of one input and one direction: the cut to the digits that matter over its width.
+
+    Equal sides, of nodes on different paths, have one name.
+    """
+    widths = np.exp(log_widths)
+    sides = list(zip(cuts, widths, is_crisp(cuts, widths, low, high), strict=True))
+    for digits in range(_DIGITS_OF_WIDTH, _MOST_DIGITS + 1):
+        names = []
+        for cut, width, alone in sides:
+            half = 0.5 * (high - low) if alone else width * _MOSTLY_TRUE
+            last = digits - 1 - int(np.floor(np.log10(half)))
+            size = int(np.floor(np.log10(abs(cut)))) if cut else -last
+            text = sign + _plain(cut, min(max(size + 1 + last, 1), _MOST_DIGITS))
+            if alone and (low, high) == (0.0, 1.0):
+                text = "1" if sign == "> " else "0"
+            names.append(text if alone else f"{text} ± {_plain(half, digits)}")
+        if len(set(names)) == len(set(sides)):
+            break
+    return names
 
 
 def default_output_names(n_outputs):
@@ -40,9 +98,10 @@ def default_output_names(n_outputs):
     return ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
 
 
-def given_term_names(antecedent, input_names, names):
+def given_term_names(model, names):
     """The user's names, one per term, of every input or by input; ValueError if they do not fit."""
-    found = list(default_term_names(antecedent))
+    antecedent, input_names = model.antecedent, model.input_names
+    found = list(default_term_names(antecedent, model.minimum, model.maximum))
     if isinstance(names, Mapping):
         unknown = [key for key in names if key not in input_names]
         if unknown:

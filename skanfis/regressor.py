@@ -71,7 +71,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     n_mfs : "auto", int, or array-like of shape (n_features,), default="auto"
         Number of membership functions (terms) per input: a grid, with a rule for every combination
         of terms; 1 leaves the input to the consequents alone. "auto" leaves it to ``partition``.
-    partition : {"auto", "grid", "scattered"}, clusterer or model, default="auto"
+    partition : {"auto", "grid", "tree", "scattered"}, clusterer or model, default="auto"
         Where the rules come from, if ``n_mfs`` is "auto". "grid": grids that grow term by term;
         "scattered": rules with terms of their own, around clusters; "auto": both are searched. A
         scikit-learn clusterer: a rule per cluster of standardised inputs and target. A fitted
@@ -683,7 +683,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         self : ANFISRegressor
         """
         model = self._fitted_model()
-        renamed = given_term_names(model.antecedent, model.input_names, names)
+        renamed = given_term_names(model, names)
         self.model_ = replace(model, term_names=renamed)
         return self
 

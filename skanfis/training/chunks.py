@@ -385,7 +385,7 @@ def solve(sums: RowSums, given, first=None) -> Solved:
     free = [key for key in _FREE if key not in given]
     problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
     if free:
-        premise = Premise(antecedent, none, none, none, ())
+        premise = Premise(antecedent, none, none, none, none.astype(int), ())
         tuned = tune(problem, premise, free, sums.effective_weight, turns=0, first_steps=ARRIVING)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
