@@ -68,7 +68,9 @@ def default_term_names(antecedent, minimum, maximum):
 
 def is_crisp(cut, width, low, high):
     """Whether a cut parts the two values that an input has."""
-    return (width * CRISP < high - low) & (abs(2.0 * cut - low - high) <= _ROUNDING * (high - low))
+    size = high - low
+    is_between = abs(2.0 * cut - low - high) <= _ROUNDING * size
+    return is_between & (abs(2.0 * CRISP * width - size) <= _ROUNDING * size)
 
 
 def _sides(sign, cuts, log_widths, low, high):

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
+from skanfis.antecedent.tree import CRISP
 from skanfis.membership import Gaussian
 from skanfis.naming import default_term_names, given_term_names
 
@@ -78,3 +79,42 @@ def test_given_names_replace_the_default():
 def test_names_that_do_not_fit_are_refused(names, error, message):
     with pytest.raises(error, match=message):
         given_term_names(model(grid(2, 3)), names)
+
+
+def tree(*cuts):
+    """A chain of cuts (input, cut, half the length over which it turns)."""
+    found = TreeAntecedent.build([], np.empty((2, 0)), [[]])
+    for j, cut, half in cuts:
+        found = found.split(found.n_rules - 1, j, cut, np.log(half / np.log(9.0)))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("cut", "half", "name"),
+    [
+        (6.8, 0.3, "6.8 ± 0.3"),
+        (6.8123, 0.3149, "6.81 ± 0.31"),
+        (-0.0125, 0.129, "-0.01 ± 0.13"),
+        (0.0, 0.129, "0 ± 0.13"),
+        (1000660.0, 131.8, "1000660 ± 130"),
+        (2.5e-7, 1e-8, "2.5e-07 ± 1e-08"),
+    ],
+)
+def test_a_side_has_the_digits_that_matter_over_its_width(cut, half, name):
+    box = np.array([[-2e6], [2e6]])
+    assert default_term_names(tree((0, cut, half)), *box) == (f"> {name}", f"< {name}")
+
+
+def test_cuts_that_differ_are_told_apart_and_equal_ones_are_not():
+    names = default_term_names(tree((0, 1.001, 0.3), (1, 2.0, 0.3), (0, 1.002, 0.3)), *BOX)
+    assert names[:3] == ("> 1.001 ± 0.3", "> 2 ± 0.3", "> 1.002 ± 0.3")
+    names = default_term_names(tree((0, 1.0, 0.3), (1, 2.0, 0.3), (0, 1.0, 0.3)), *BOX)
+    assert names[3:] == ("< 1 ± 0.3", "< 2 ± 0.3", "< 1 ± 0.3")
+
+
+def test_a_cut_between_two_values_has_no_width():
+    box = np.array([[0.0, 2.0, 0.0], [1.0, 5.0, 1.0]])
+    crisp = 0.5 / CRISP * np.log(9.0)
+    found = tree((0, 0.5, crisp), (1, 3.5, 3.0 * crisp), (2, 0.4, 0.1))
+    assert default_term_names(found, *box)[:3] == ("1", "> 3.5", "> 0.4 ± 0.1")
+    assert default_term_names(found, *box)[3:] == ("0", "< 3.5", "< 0.4 ± 0.1")
