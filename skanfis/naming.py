@@ -70,7 +70,7 @@ def is_crisp(cut, width, low, high):
     """Whether a cut parts the two values that an input has."""
     size = high - low
     is_between = abs(2.0 * cut - low - high) <= _ROUNDING * size
-    return is_between & (abs(2.0 * CRISP * width - size) <= _ROUNDING * size)
+    return is_between & (2.0 * CRISP * width <= (1.0 + _ROUNDING) * size)
 
 
 def _sides(sign, cuts, log_widths, low, high):

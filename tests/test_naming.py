@@ -101,7 +101,7 @@ def tree(*cuts):
     ],
 )
 def test_a_side_has_the_digits_that_matter_over_its_width(cut, half, name):
-    box = np.array([[-2e6], [2e6]])
+    box = np.array([[-2e6], [3e6]])
     assert default_term_names(tree((0, cut, half)), *box) == (f"> {name}", f"< {name}")
 
 

@@ -29,7 +29,8 @@ class TreeDisplay:
 
     A branch is the thicker the more rows take it. With ``kind="plane"`` it is the prediction over
     the two inputs that are cut: lines where they are, pale bands where a cut turns, between 0.1 and
-    0.9 true, values where there is room for them. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
+    0.9 true, values where there is room for them. ``ax_`` and ``figure_`` are matplotlib's, once
+    drawn.
 
     Parameters
     ----------
@@ -87,8 +88,12 @@ class TreeDisplay:
         if kind == "plane" and inputs.size != 2:
             names = ", ".join(repr(model.input_names[j]) for j in inputs)
             raise ValueError(f"kind='plane' is of two inputs; this tree cuts {names}.")
-        output = _position(output, model.output_names, "output")
-        return cls(model=model, output=output, kind=kind).plot(ax=ax)
+        place = _position(output, model.output_names, "output")
+        return cls(model=model, output=place, kind=kind).plot(ax=ax)
+
+    @property
+    def _tree(self) -> Any:
+        return self.model.antecedent
 
     @property
     def values(self) -> np.ndarray:
@@ -121,7 +126,7 @@ class TreeDisplay:
         return np.array(said, dtype=object).reshape(2, -1).T
 
     def _draw_tree(self, ax):
-        model, (order, ends) = self.model, self.model.antecedent.walk
+        model, (order, ends) = self.model, self._tree.walk
         n_rules, words = model.n_rules, self._conditions()[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
@@ -179,7 +184,7 @@ class TreeDisplay:
         name = as_label(model.output_names[self.output])
         ax.figure.colorbar(colours, ax=ax, label=name)
         drawn: set[int] = set()
-        for value, path in zip(self.values, model.antecedent.paths, strict=True):
+        for value, path in zip(self.values, self._tree.paths, strict=True):
             self._outline(ax, value, path, both, drawn)
         first, second = (as_label(model.input_names[j]) for j in both)
         ax.set(xlabel=first, ylabel=second, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -190,7 +195,7 @@ class TreeDisplay:
         """The cuts on the way to a leaf, each as long as the place that it cuts, and its value."""
         low, high = self.model.minimum[both].copy(), self.model.maximum[both].copy()
         room = _ROOM * (high - low)
-        nodes = self.model.antecedent.groups[0]
+        nodes = self._tree.groups[0]
         for node, is_above in path:
             (cut, width), k = nodes.theta[:, node], int(nodes.inputs[node] == both[1])
             if node not in drawn:

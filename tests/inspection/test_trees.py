@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from skanfis.inspection import TreeDisplay, export_text, rules_html
 
-from ..export.rule_bases import MODELS, build, a_tree
+from ..export.rule_bases import MODELS, a_tree, build
 from ..quick import quick
 
 plt = pytest.importorskip("matplotlib.pyplot")
