@@ -148,6 +148,14 @@ class TestAnswers:
 
 
 class TestFits:
+    def test_families_are_of_grids_and_scattered_rules(self, kind):
+        if kind == "tree":
+            for mf in ("bell", ["gaussian", "bell", "gaussian"]):
+                with pytest.raises(ValueError, match=r"mf=.* means nothing to partition='tree'"):
+                    searched(kind, mf=mf).fit(X, Y)
+        else:
+            assert_is(searched(kind, mf="bell").fit(X, Y), kind)
+
     @pytest.mark.parametrize("order", [0, 1])
     def test_orders_and_several_outputs(self, kind, order):
         estimator = searched(kind, order=order, max_rules=6).fit(X, two())
@@ -315,6 +323,8 @@ class TestFiles:
     def test_fis(self, kind, tmp_path):
         write_fis(fitted(kind), tmp_path / "model.fis")
         read = read_fis(tmp_path / "model.fis")
+        came_back = RuleTableAntecedent if kind == "tree" else KINDS[kind]
+        assert type(read.antecedent) is came_back
         assert_allclose(read.predict(X), fitted(kind).model_.predict(X), atol=1e-9)
         rules = export_fis(fitted(kind)).partition("[Rules]")[2].split("\n")
         assert len([line for line in rules if line]) == fitted(kind).n_rules_

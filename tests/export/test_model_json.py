@@ -14,7 +14,7 @@ from skanfis.export import export_json, read_json, write_json
 from skanfis.export.json_reader import parse_json
 from skanfis.model import TSKModel
 
-from .rule_bases import EVERY_PAIR, MODELS, narrow_target, rows_of
+from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
@@ -206,6 +206,13 @@ def test_files_of_the_first_version_are_read():
 def test_refuses_text_that_is_no_such_json(text, message):
     with pytest.raises(ValueError, match=message):
         parse_json(text)
+
+
+def test_a_rule_table_that_a_tree_leaves_comes_back():
+    antecedent, _ = A_TREE.antecedent.without_rules([1])
+    # Its rules have two terms of the first input, at places that others have for other inputs.
+    left = build(antecedent)
+    assert_same(parse_json(export_json(left)), left)
 
 
 @pytest.mark.parametrize("given", [export_json(A_GRID), '{"a": 1}', b"{}", Path('{"a": 1}')])
