@@ -83,8 +83,8 @@ class RuleTableAntecedent(Antecedent):
             keys = [key for key in order if made[key][0] is family]
             theta = np.column_stack([made[key][1] for key in keys])
             groups.append(TermGroup(family, np.array([j for j, _ in keys]), theta))
-        used = sorted({j for j, _ in order})
-        table = [[order.index((j, r[j])) if j in r else -1 for j in used] for r in rules]
+        place, used = {key: k for k, key in enumerate(order)}, sorted({j for j, _ in order})
+        table = [[place[j, rule[j]] if j in rule else -1 for j in used] for rule in rules]
         return RuleTableAntecedent(tuple(groups), np.array(table)), [terms for _, terms in order]
 
     def normalise(self, log_mu):
