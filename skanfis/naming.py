@@ -76,23 +76,31 @@ def is_crisp(cut, width, low, high):
 def _sides(sign, cuts, log_widths, low, high):
     """Of one input and one direction: the cut to the digits that matter over its width.
 
-    Equal sides, of nodes on different paths, have one name.
+    More tell cuts apart that would look the same; equal ones, on different paths, have one name.
     """
     widths = np.exp(log_widths)
     sides = list(zip(cuts, widths, is_crisp(cuts, widths, low, high), strict=True))
+    names: dict[tuple, str] = {}
     for digits in range(_DIGITS_OF_WIDTH, _MOST_DIGITS + 1):
-        names = []
-        for cut, width, alone in sides:
-            half = 0.5 * (high - low) if alone else width * _MOSTLY_TRUE
-            last = digits - 1 - int(np.floor(np.log10(half)))
-            size = int(np.floor(np.log10(abs(cut)))) if cut else -last
-            text = sign + _plain(cut, min(max(size + 1 + last, 1), _MOST_DIGITS))
-            if alone and (low, high) == (0.0, 1.0):
-                text = "1" if sign == "> " else "0"
-            names.append(text if alone else f"{text} ± {_plain(half, digits)}")
-        if len(set(names)) == len(set(sides)):
+        written = {side: sign + _side(*side, low, high, digits) for side in sides}
+        taken = Counter(written.values())
+        for side, text in written.items():
+            if side not in names and (taken[text] == 1 or digits == _MOST_DIGITS):
+                names[side] = text
+        if len(names) == len(written):
             break
-    return names
+    if (low, high) == (0.0, 1.0):
+        names |= {side: "1" if sign == "> " else "0" for side in sides if side[2]}
+    return [names[side] for side in sides]
+
+
+def _side(cut, width, alone, low, high, digits):
+    """Write "6.8 ± 0.3", or the cut alone."""
+    half = 0.5 * (high - low) if alone else width * _MOSTLY_TRUE
+    last = digits - 1 - int(np.floor(np.log10(half)))
+    size = int(np.floor(np.log10(abs(cut)))) if cut else -last
+    text = _plain(cut, min(max(size + 1 + last, 1), _MOST_DIGITS))
+    return text if alone else f"{text} ± {_plain(half, digits)}"
 
 
 def default_output_names(n_outputs):
