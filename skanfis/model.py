@@ -20,7 +20,7 @@ from typing import Self
 
 import numpy as np
 
-from .antecedent import Antecedent
+from .antecedent import Antecedent, RuleTableAntecedent
 from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names
 from .policies import (
@@ -96,7 +96,9 @@ class TSKModel:
 
     def __post_init__(self):
         if not self.term_names:
-            object.__setattr__(self, "term_names", default_term_names(self.antecedent))
+            object.__setattr__(
+                self, "term_names", default_term_names(self.antecedent, self.minimum, self.maximum)
+            )
         if not self.output_names:
             object.__setattr__(self, "output_names", default_output_names(self.n_outputs))
 
@@ -282,6 +284,23 @@ class TSKModel:
     def describe_out_of_bounds(self, X) -> str:
         """Say which inputs leave the box of the training data, in how many rows, and how far."""
         return describe_out_of_bounds(X, self.minimum, self.maximum, self.input_names)
+
+    def as_rule_table(self) -> Self:
+        """Return the same model as rules with one term on an input, such as .fis files hold.
+
+        Of two cuts of an input on one path of a tree, a product of two sigmoids says on which
+        sides; three on a path are a ValueError. The memberships before training, and the
+        posterior, stay behind.
+        """
+        if not isinstance(self.antecedent, RuleTableAntecedent):
+            return self
+        table, made = self.antecedent.with_one_term_each(self.input_names)
+        if type(self.antecedent) is RuleTableAntecedent and max(map(len, made), default=1) == 1:
+            return self
+        names = tuple(" and ".join(self.term_names[t] for t in terms) for terms in made)
+        return replace(
+            self, antecedent=table, initial_antecedent=table, term_names=names, posterior=None
+        )
 
     @property
     def policy(self) -> str:

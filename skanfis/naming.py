@@ -1,9 +1,17 @@
-"""What terms are called: linguistic names for a grid, places for rules with terms of their own."""
+r"""What terms are called: linguistic names for a grid, places for rules with terms of their own.
+
+A side of a cut at c over a width h is "> c ± h log 9": so far from the cut it is 0.9 true. One that
+parts two values, with no row between, needs no width: "> c", or the value itself where they are 0
+and 1.
+"""
 
 from collections import Counter
 from collections.abc import Mapping
 
 import numpy as np
+
+from .antecedent.tree import CRISP
+from .membership import SigmoidFalling, SigmoidRising
 
 __all__ = ["LINGUISTIC", "default_output_names", "default_term_names", "given_term_names"]
 
@@ -21,8 +29,18 @@ LINGUISTIC = {
 _MOST_DIGITS = 17
 
 
-def default_term_names(antecedent):
-    """Names, unique on each input: of a grid by the order of its terms, else "near 21.3"."""
+_SIGNS = {SigmoidRising: "> ", SigmoidFalling: "< "}
+# A side is 0.9 true this many widths from its cut; digits that are written of that length.
+_MOSTLY_TRUE, _DIGITS_OF_WIDTH = np.log(9.0), 2
+# As rounding leaves the cut between two values.
+_ROUNDING = 1e-6
+
+
+def default_term_names(antecedent, minimum, maximum):
+    """Names: of a grid by the order of its terms, else "near 21.3", unique on each input.
+
+    Of a side "> 6.8 ± 0.3"; ``minimum`` and ``maximum`` of each input's data.
+    """
     inputs, places = antecedent.term_inputs, antecedent.term_places
     names = np.empty(inputs.size, dtype=object)
     for j in np.unique(inputs):
@@ -32,7 +50,57 @@ def default_term_names(antecedent):
             names[own] = LINGUISTIC.get(own.size, numbered)
         else:
             names[own] = _near(places[own])
+    start = 0
+    for group in antecedent.groups:
+        if group.family in _SIGNS:
+            for j in np.unique(group.inputs):
+                own = np.flatnonzero(group.inputs == j)
+                names[start + own] = _sides(
+                    _SIGNS[group.family],
+                    group.theta[0, own],
+                    group.theta[1, own],
+                    minimum[j],
+                    maximum[j],
+                )
+        start += group.n_terms
     return tuple(names)
+
+
+def is_crisp(cut, width, low, high):
+    """Whether a cut parts the two values that an input has."""
+    size = high - low
+    is_between = abs(2.0 * cut - low - high) <= _ROUNDING * size
+    return is_between & (2.0 * CRISP * width <= (1.0 + _ROUNDING) * size)
+
+
+def _sides(sign, cuts, log_widths, low, high):
+    """Of one input and one direction: the cut to the digits that matter over its width.
+
+    More tell cuts apart that would look the same; equal ones, on different paths, have one name.
+    """
+    widths = np.exp(log_widths)
+    sides = list(zip(cuts, widths, is_crisp(cuts, widths, low, high), strict=True))
+    names: dict[tuple, str] = {}
+    for digits in range(_DIGITS_OF_WIDTH, _MOST_DIGITS + 1):
+        written = {side: sign + _side(*side, low, high, digits) for side in sides}
+        taken = Counter(written.values())
+        for side, text in written.items():
+            if side not in names and (taken[text] == 1 or digits == _MOST_DIGITS):
+                names[side] = text
+        if len(names) == len(written):
+            break
+    if (low, high) == (0.0, 1.0):
+        names |= {side: "1" if sign == "> " else "0" for side in sides if side[2]}
+    return [names[side] for side in sides]
+
+
+def _side(cut, width, alone, low, high, digits):
+    """Write "6.8 ± 0.3", or the cut alone."""
+    half = 0.5 * (high - low) if alone else width * _MOSTLY_TRUE
+    last = digits - 1 - int(np.floor(np.log10(half)))
+    size = int(np.floor(np.log10(abs(cut)))) if cut else -last
+    text = _plain(cut, min(max(size + 1 + last, 1), _MOST_DIGITS))
+    return text if alone else f"{text} ± {_plain(half, digits)}"
 
 
 def default_output_names(n_outputs):
@@ -40,9 +108,10 @@ def default_output_names(n_outputs):
     return ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
 
 
-def given_term_names(antecedent, input_names, names):
+def given_term_names(model, names):
     """The user's names, one per term, of every input or by input; ValueError if they do not fit."""
-    found = list(default_term_names(antecedent))
+    antecedent, input_names = model.antecedent, model.input_names
+    found = list(default_term_names(antecedent, model.minimum, model.maximum))
     if isinstance(names, Mapping):
         unknown = [key for key in names if key not in input_names]
         if unknown:

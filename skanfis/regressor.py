@@ -71,12 +71,13 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     n_mfs : "auto", int, or array-like of shape (n_features,), default="auto"
         Number of membership functions (terms) per input: a grid, with a rule for every combination
         of terms; 1 leaves the input to the consequents alone. "auto" leaves it to ``partition``.
-    partition : {"auto", "grid", "scattered"}, clusterer or model, default="auto"
+    partition : {"auto", "grid", "tree", "scattered"}, clusterer or model, default="auto"
         Where the rules come from, if ``n_mfs`` is "auto". "grid": grids that grow term by term;
-        "scattered": rules with terms of their own, around clusters; "auto": both are searched. A
-        scikit-learn clusterer: a rule per cluster of standardised inputs and target. A fitted
-        ANFISRegressor or its ``model_``: training starts from its rules; with ``solver="lse"``
-        only the consequents are learnt, with ``max_iter=0`` nothing is.
+        "tree": cuts of the inputs, one after the other (:doc:`/trees`); "scattered": rules with
+        terms of their own, around clusters; "auto": all are searched. A scikit-learn clusterer: a
+        rule per cluster of standardised inputs and target. A fitted ANFISRegressor or its
+        ``model_``: training starts from its rules; with ``solver="lse"`` only the consequents are
+        learnt, with ``max_iter=0`` nothing is.
     simplicity : float, default=0.05
         Part of the error, from 0 to 1, that is given up for a model that is read sooner; of weak
         signals at most ``(1 + simplicity)**2 - 1`` of the variance explained. Of candidates within,
@@ -87,7 +88,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
         Family of the membership functions, for all inputs or one each: "gaussian", "bell",
         "triangular", "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",
-        "sigmoid_difference", "sigmoid_product", or a class of one's own. Not used with a model.
+        "sigmoid_difference", "sigmoid_product", or a class of one's own. Not used with a model;
+        ValueError with "tree".
     premise_features, consequent_features : array-like of str, int or bool, default=None
         Columns of X in the rules' IF parts, and in their THEN parts, by name, position or mask;
         None is all.
@@ -683,7 +685,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         self : ANFISRegressor
         """
         model = self._fitted_model()
-        renamed = given_term_names(model.antecedent, model.input_names, names)
+        renamed = given_term_names(model, names)
         self.model_ = replace(model, term_names=renamed)
         return self
 

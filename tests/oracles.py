@@ -9,7 +9,13 @@ from itertools import product
 
 import numpy as np
 
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from skanfis.antecedent import (
+    GridAntecedent,
+    RuleTableAntecedent,
+    ScatteredAntecedent,
+    TermGroup,
+    TreeAntecedent,
+)
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import Bell, Gaussian
 from skanfis.support import RuleSupport
@@ -80,9 +86,16 @@ def textbook_membership(function, x, numbers):
         # To the right of the center from the other end: 1 - s(u) = s(-u) keeps its digits there.
         right = sigmoid(-fall) - sigmoid(-rise)
         return np.where(x < numbers["center"], sigmoid(rise) - sigmoid(fall), right)
-    if function == "sigmoid_product":
+    signs = {"sigmoid_product": (1, -1), "sigmoids_rising": (1, 1)}
+    signs |= {"sigmoids_falling": (-1, -1), "sigmoids_apart": (-1, 1)}
+    if function in signs:
         first, second = numbers["center"] - numbers["width"], numbers["center"] + numbers["width"]
-        return sigmoid((x - first) / numbers["left"]) * sigmoid(-(x - second) / numbers["right"])
+        at_left = sigmoid(signs[function][0] * (x - first) / numbers["left"])
+        return at_left * sigmoid(signs[function][1] * (x - second) / numbers["right"])
+    if function == "sigmoid_rising":
+        return sigmoid((x - numbers["center"]) / numbers["width"])
+    if function == "sigmoid_falling":
+        return sigmoid((numbers["center"] - x) / numbers["width"])
     a, b, c, d = corners(function, numbers)
     if function in ("triangular", "trapezoidal"):
         return np.clip(np.minimum((x - a) / (b - a), (d - x) / (d - c)), 0, 1)
@@ -359,6 +372,15 @@ def random_table(rng, n_rules=5, inputs=3):
     table = rng.integers(0, 3, (n_rules, inputs)) + 3 * np.arange(inputs)
     table[0, -1] = table[1, 0] = -1
     return RuleTableAntecedent(tuple(groups), table)
+
+
+def random_tree(rng, n_rules=6, inputs=(0, 1, 2)):
+    """A tree that has grown anywhere, some of its cuts sharp."""
+    tree = TreeAntecedent.build([], np.empty((2, 0)), [[]])
+    while tree.n_rules < n_rules:
+        log_width = np.log(rng.uniform(0.05, 0.8))
+        tree = tree.split(rng.integers(tree.n_rules), rng.choice(inputs), rng.normal(), log_width)
+    return tree
 
 
 def random_support(rng, n_rules, n_inputs):

@@ -399,7 +399,7 @@ def test_more_rules_than_memory(n_inputs, settings, said):
         ("mf", "triangel", "'gaussian'"),
         ("mf", None, "'gaussian'"),
         ("solver", "adam", "'varpro'"),
-        ("partition", "tree", "'grid'"),
+        ("partition", "forest", "'grid'"),
         ("partition", 3, "'fit_predict'"),
         ("out_of_bounds", "wrap", "'clip'"),
         ("order", 2, "[0, 1]"),

@@ -8,12 +8,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor, model
-from skanfis.antecedent import GridAntecedent
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS, TargetRange
 
 from . import oracles
+from .export import rule_bases
 
 NAMES = ("time", "temperature", "rate")
 
@@ -69,6 +70,7 @@ def scattered(family=Gaussian, inputs=(0, 1, 2)):
 
 MODELS = {
     "grid": build(grid()),
+    "tree": build(oracles.random_tree(np.random.default_rng(1)), n_outputs=2),
     "input without terms": build(grid((Gaussian, Bell), (3, 2), (0, 2)), n_outputs=2),
     "order 0": build(grid(), order=0),
     "order 0, outputs": build(scattered(Bell), order=0, n_outputs=3),
@@ -253,3 +255,33 @@ def test_no_row_however_far_is_answered_beyond_the_limits():
     anywhere = estimator.model_.predict(g.standard_t(0.5, (2000, 3)))
     assert anywhere.min() >= limits[0]
     assert anywhere.max() <= limits[1]
+
+
+class TestAsRuleTable:
+    """A tree as rules listed one by one, with one term on an input."""
+
+    def test_it_predicts_the_same(self, rng):
+        for n_outputs in (1, 2):
+            tree = rule_bases.MODELS[f"tree, order 1, {n_outputs} outputs"]
+            table, rows = tree.as_rule_table(), rule_bases.rows_of(tree, 1.3, 500)
+            assert type(table.antecedent) is RuleTableAntecedent
+            full_scale = np.abs(tree.predict(rows)).max()
+            assert_allclose(table.predict(rows), tree.predict(rows), atol=1e-12 * full_scale)
+            assert_allclose(table.gradient(rows), tree.gradient(rows), rtol=1e-7, atol=1e-7)
+
+    def test_its_terms_say_both_sides(self):
+        tree = rule_bases.MODELS["tree, order 1, 1 outputs"]
+        names = tree.as_rule_table().term_names
+        assert "> 999580 ± 400 and < 1000360 ± 530" in names
+        assert "> 0.003 ± 0.0011" in names
+        assert tree.as_rule_table().posterior is None
+
+    def test_what_has_one_term_each_is_left_as_it_is(self):
+        for name in ("grid", "scattered", "rule table", "one rule"):
+            model = rule_bases.MODELS[f"{name}, order 1, 1 outputs"]
+            assert model.as_rule_table() is model
+
+    def test_three_cuts_of_an_input_on_a_path_are_refused_by_name(self):
+        found = rule_bases.a_tree().split(0, 0, 1.4, -2.0)
+        with pytest.raises(ValueError, match=r"Rule 0 has 3 terms of 'time' \(at"):
+            rule_bases.build(found).as_rule_table()

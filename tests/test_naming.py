@@ -1,19 +1,30 @@
 """Names of terms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
+from skanfis.antecedent.tree import CRISP
 from skanfis.membership import Gaussian
 from skanfis.naming import default_term_names, given_term_names
 
 from . import oracles
 
+BOX = np.array([[-10.0] * 3, [10.0] * 3])
 INPUTS = ["time", "temperature", "rate"]
 
 
 def grid(*counts):
     return oracles.random_grid(np.random.default_rng(0), [Gaussian] * len(counts), counts)
+
+
+def model(antecedent):
+    """What given names are held against."""
+    return SimpleNamespace(
+        antecedent=antecedent, input_names=INPUTS, minimum=BOX[0], maximum=BOX[1]
+    )
 
 
 def scattered(centers):
@@ -23,13 +34,13 @@ def scattered(centers):
 
 
 def test_terms_of_a_grid_are_named_by_their_order():
-    assert default_term_names(grid(2, 3)) == ("low", "high", "low", "medium", "high")
-    assert default_term_names(grid(6)) == ("NL", "NM", "NS", "PS", "PM", "PL")
-    assert default_term_names(grid(9))[:2] == ("level 1", "level 2")
+    assert default_term_names(grid(2, 3), *BOX) == ("low", "high", "low", "medium", "high")
+    assert default_term_names(grid(6), *BOX) == ("NL", "NM", "NS", "PS", "PM", "PL")
+    assert default_term_names(grid(9), *BOX)[:2] == ("level 1", "level 2")
 
 
 def test_other_terms_are_named_by_where_they_stand():
-    found = default_term_names(scattered([[21.34, 1e9 + 1], [-3.0, 1e9 + 2]]))
+    found = default_term_names(scattered([[21.34, 1e9 + 1], [-3.0, 1e9 + 2]]), *BOX)
     assert found == ("near 21.3", "near 1000000001", "near -3", "near 1000000002")
 
 
@@ -38,21 +49,21 @@ def test_other_terms_are_named_by_where_they_stand():
     [(2213.4, "2210"), (-0.0123456, "-0.0123"), (0.0, "0"), (1e12, "1e+12"), (3e-7, "3e-07")],
 )
 def test_places_are_written_as_a_person_would(place, name):
-    assert default_term_names(scattered([[place]])) == (f"near {name}",)
+    assert default_term_names(scattered([[place]]), *BOX) == (f"near {name}",)
 
 
 def test_terms_at_one_place_are_told_apart():
-    assert default_term_names(scattered([[1.0], [1.0]])) == ("near 1", "near 1 (2)")
+    assert default_term_names(scattered([[1.0], [1.0]]), *BOX) == ("near 1", "near 1 (2)")
 
 
 def test_without_terms_there_are_no_names():
-    assert default_term_names(GridAntecedent((), counts=())) == ()
+    assert default_term_names(GridAntecedent((), counts=()), *BOX) == ()
 
 
 def test_given_names_replace_the_default():
     mine = {"temperature": ["cold", "mild", "hot"]}
-    assert given_term_names(grid(2, 3), INPUTS, mine) == ("low", "high", "cold", "mild", "hot")
-    assert given_term_names(grid(2, 2), INPUTS, ["S", "L"]) == ("S", "L", "S", "L")
+    assert given_term_names(model(grid(2, 3)), mine) == ("low", "high", "cold", "mild", "hot")
+    assert given_term_names(model(grid(2, 2)), ["S", "L"]) == ("S", "L", "S", "L")
 
 
 @pytest.mark.parametrize(
@@ -67,4 +78,43 @@ def test_given_names_replace_the_default():
 )
 def test_names_that_do_not_fit_are_refused(names, error, message):
     with pytest.raises(error, match=message):
-        given_term_names(grid(2, 3), INPUTS, names)
+        given_term_names(model(grid(2, 3)), names)
+
+
+def tree(*cuts):
+    """A chain of cuts (input, cut, half the length over which it turns)."""
+    found = TreeAntecedent.build([], np.empty((2, 0)), [[]])
+    for j, cut, half in cuts:
+        found = found.split(found.n_rules - 1, j, cut, np.log(half / np.log(9.0)))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("cut", "half", "name"),
+    [
+        (6.8, 0.3, "6.8 ± 0.3"),
+        (6.8123, 0.3149, "6.81 ± 0.31"),
+        (-0.0125, 0.129, "-0.01 ± 0.13"),
+        (0.0, 0.129, "0 ± 0.13"),
+        (1000660.0, 131.8, "1000660 ± 130"),
+        (2.5e-7, 1e-8, "2.5e-07 ± 1e-08"),
+    ],
+)
+def test_a_side_has_the_digits_that_matter_over_its_width(cut, half, name):
+    box = np.array([[-2e6], [3e6]])
+    assert default_term_names(tree((0, cut, half)), *box) == (f"> {name}", f"< {name}")
+
+
+def test_cuts_that_differ_are_told_apart_and_equal_ones_are_not():
+    names = default_term_names(tree((0, 1.001, 0.3), (1, 2.0, 0.3), (0, 1.002, 0.3)), *BOX)
+    assert names[:3] == ("> 1.001 ± 0.3", "> 2 ± 0.3", "> 1.002 ± 0.3")
+    names = default_term_names(tree((0, 1.0, 0.3), (1, 2.0, 0.3), (0, 1.0, 0.3)), *BOX)
+    assert names[3:] == ("< 1 ± 0.3", "< 2 ± 0.3", "< 1 ± 0.3")
+
+
+def test_a_cut_between_two_values_has_no_width():
+    box = np.array([[0.0, 2.0, 0.0], [1.0, 5.0, 1.0]])
+    crisp = 0.5 / CRISP * np.log(9.0)
+    found = tree((0, 0.5, crisp), (1, 3.5, 3.0 * crisp), (2, 0.4, 0.1))
+    assert default_term_names(found, *box)[:3] == ("1", "> 3.5", "> 0.4 ± 0.1")
+    assert default_term_names(found, *box)[3:] == ("0", "< 3.5", "< 0.4 ± 0.1")

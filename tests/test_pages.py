@@ -19,6 +19,7 @@ WITH_PROMPTS = {
     "how_sure": 15,
     "reading_rules": 15,
     "training": 20,
+    "trees": 9,
 }
 if not (DOCS / f"{PAGES[0]}.rst").is_file():
     pytest.skip("the documentation is not here", allow_module_level=True)

@@ -5,7 +5,20 @@ from functools import cached_property
 
 import numpy as np
 
-from .base import Antecedent, softmax_in_place
+from ..membership import PRODUCTS, SIDES
+from .base import Antecedent, TermGroup, softmax_in_place
+
+
+def _one_term(terms):
+    """Family and theta of the product of some terms; None where it is none that is known."""
+    if len(terms) == 1:
+        return terms[0]
+    (first, low), (second, high), *others = sorted(terms, key=lambda one: one[1][0])
+    if others or not {first, second} <= set(SIDES.values()) or low[0] == high[0]:
+        return None
+    half = 0.5 * (high[0] - low[0])
+    theta = np.array([low[0] + half, np.log(half), low[1], high[1]])
+    return PRODUCTS[first.side, second.side], theta
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +48,44 @@ class RuleTableAntecedent(Antecedent):
         rules, places = np.nonzero(self.table >= 0)
         contains[rules, self.table[rules, places]] = 1.0
         return contains
+
+    def with_one_term_each(self, input_names):
+        """The same rules, each with one term of an input at the most; of what each term is made.
+
+        Two sides of an input are a product of two sigmoids. What no term says, three of them, is a
+        ValueError.
+        """
+        own = [
+            (int(j), group.family, theta)
+            for group in self.groups
+            for j, theta in zip(group.inputs, group.theta.T, strict=True)
+        ]
+        rules: list[dict[int, tuple[int, ...]]] = []
+        for row in self.table:
+            rules.append({})
+            for t in sorted(row[row >= 0].tolist()):
+                j = own[t][0]
+                rules[-1][j] = (*rules[-1].get(j, ()), t)
+        made: dict[tuple, tuple] = {}
+        for r, rule in enumerate(rules):
+            for j, terms in rule.items():
+                found = _one_term([own[t][1:] for t in terms])
+                if found is None:
+                    places = ", ".join(f"{own[t][2][0]:g}" for t in terms)
+                    raise ValueError(
+                        f"Rule {r} has {len(terms)} terms of {input_names[j]!r} (at {places}); one "
+                        "term stands for two sides of different cuts, and for no more."
+                    )
+                made[j, terms] = found
+        order = sorted(made, key=lambda key: (made[key][0].name, *key))
+        groups = []
+        for family in dict.fromkeys(made[key][0] for key in order):
+            keys = [key for key in order if made[key][0] is family]
+            theta = np.column_stack([made[key][1] for key in keys])
+            groups.append(TermGroup(family, np.array([j for j, _ in keys]), theta))
+        place, used = {key: k for k, key in enumerate(order)}, sorted({j for j, _ in order})
+        table = [[place[j, rule[j]] if j in rule else -1 for j in used] for rule in rules]
+        return RuleTableAntecedent(tuple(groups), np.array(table)), [terms for _, terms in order]
 
     def normalise(self, log_mu):
         strengths = self._contains @ log_mu

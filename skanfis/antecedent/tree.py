@@ -69,6 +69,21 @@ class TreeAntecedent(RuleTableAntecedent):
         n = self.n_nodes
         return [[(int(t) % n, bool(t < n)) for t in row if t >= 0] for row in self.table]
 
+    @property
+    def walk(self):
+        """Nodes, each after those above it in the tree; what is above and below the cut of each.
+
+        That is leaf r, or n_rules + k for the k-th of these nodes: arrays (n_nodes,), (n_nodes, 2).
+        """
+        depth, ends = np.zeros(self.n_nodes, dtype=int), np.zeros((self.n_nodes, 2), dtype=int)
+        for r, path in enumerate(self.paths):
+            after = [*(self.n_rules + node for node, _ in path[1:]), r]
+            for place, ((node, is_above), end) in enumerate(zip(path, after, strict=False)):
+                depth[node], ends[node, 0 if is_above else 1] = place, end
+        order = np.argsort(depth, kind="stable")
+        rank = np.concatenate([np.arange(self.n_rules), self.n_rules + np.argsort(order)])
+        return order, rank[ends[order]]
+
     def split(self, leaf, j, cut, log_width):
         """The tree in which two leaves stand for one: above the cut, in its place, and below."""
         paths, node = self.paths, self.n_nodes

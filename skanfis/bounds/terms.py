@@ -17,11 +17,12 @@ import numpy as np
 
 from ..antecedent import Antecedent, TermGroup
 from ..membership import (
+    PRODUCTS,
+    SIDES,
     Bell,
     Gaussian,
     PiShaped,
     SigmoidDifference,
-    SigmoidProduct,
     SShaped,
     Trapezoidal,
     Triangular,
@@ -34,7 +35,8 @@ EPS = float(np.finfo(float).eps)
 # Roundings of a membership, a share, a rule's output or its slope, in EPS, with room to spare: of
 # a dozen operations one after another, beside those of sums, which are counted.
 ROUNDINGS = 32.0
-_LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, SigmoidProduct)
+_SIDES, _PRODUCTS = tuple(SIDES.values()), tuple(PRODUCTS.values())
+_LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, *_PRODUCTS, *_SIDES)
 _ONE_SIDED = (SShaped, ZShaped)
 _BY_SIDES = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
 # Where the logarithm of a floored flank is steepest: of the straight one as the foot is reached;
@@ -72,10 +74,12 @@ def ranges(group: TermGroup, low, high):
     at_hi, by_hi = family.log_value_and_gradient(hi, theta)
     # Memberships depend on x - location: the slope is minus the derivative by the location.
     slope = -by_hi[0], -by_lo[0]
-    if family is SigmoidProduct:
+    if family in _PRODUCTS:
         # Its top is not at its place: it lies below its tangents at the ends.
         rising, falling = np.maximum(slope[1], 0.0), np.maximum(-slope[0], 0.0)
         top = np.minimum(at_lo + rising * (hi - lo), at_hi + falling * (hi - lo))
+    elif family in _SIDES:
+        top = np.maximum(at_lo, at_hi)
     else:
         top = family.log_value(np.clip(place, lo, hi), theta)
     if family in _BY_SIDES:
@@ -93,7 +97,7 @@ def _plateau(group):
     """The distance from each term's place to its shoulders, (n_terms, 1); else zero."""
     if group.family in (Trapezoidal, PiShaped, TwoSidedGaussian):
         return 0.5 * np.exp(group.theta[3])[:, None]
-    if group.family in (SigmoidDifference, SigmoidProduct):
+    if group.family in (SigmoidDifference, *_PRODUCTS):
         return np.exp(group.theta[1])[:, None]
     return 0.0
 
@@ -169,13 +173,17 @@ def _curvature(group, lo, hi):
         low = np.minimum(np.where(on_left, left, 0.0), np.where(on_right, right, 0.0))
         high = np.maximum(np.where(on_left, left, -np.inf), np.where(on_right, right, -np.inf))
         return low, np.where(on_top, 0.0, high)
-    if family in (SigmoidDifference, SigmoidProduct):
+    if family in (SigmoidDifference, *_PRODUCTS):
         left = np.exp(-theta[2])
-        right = np.exp(-theta[3]) if family is SigmoidProduct else left
+        right = np.exp(-theta[3]) if family in _PRODUCTS else left
         width = np.exp(theta[1])
         rise = _sigmoid_curve((lo - theta[0] + width) * left, (hi - theta[0] + width) * left)
         fall = _sigmoid_curve((theta[0] + width - hi) * right, (theta[0] + width - lo) * right)
         return tuple(-a * left**2 - b * right**2 for a, b in zip(rise, fall, strict=True))
+    if family in _SIDES:
+        per_width = np.exp(-theta[1])
+        bend = _sigmoid_curve((lo - theta[0]) * per_width, (hi - theta[0]) * per_width)
+        return tuple(-a * per_width**2 for a in bend)
     if family is Bell:
         return _bell_curve(theta, lo, hi)
     nothing = np.full(lo.shape, np.nan)

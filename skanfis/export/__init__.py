@@ -1,6 +1,6 @@
 """Carrying a trained model away: other formats, other languages."""
 
-from ..membership import MEMBERSHIPS
+from ..membership import FAMILIES
 from .c import CCode, CCost, export_c
 from .fis import export_fis, read_fis, write_fis
 from .folding import fold, fold_with_rows
@@ -27,11 +27,12 @@ __all__ = [
 #: loaded. ``skops.io.load(path, trusted=TRUSTED_TYPES)``; what stands beside them in a pipeline
 #: is scikit-learn's own, which skops knows.
 TRUSTED_TYPES = [
-    *(f"{family.__module__}.{family.__name__}" for family in MEMBERSHIPS.values()),
+    *(f"{family.__module__}.{family.__name__}" for family in FAMILIES.values()),
     "skanfis.antecedent.base.TermGroup",
     "skanfis.antecedent.grid.GridAntecedent",
     "skanfis.antecedent.rule_table.RuleTableAntecedent",
     "skanfis.antecedent.scattered.ScatteredAntecedent",
+    "skanfis.antecedent.tree.TreeAntecedent",
     "skanfis.cluster.fuzzy_cmeans.FuzzyCMeans",
     "skanfis.cluster.subtractive.SubtractiveClustering",
     "skanfis.bounds.constraints.FixedPoint",

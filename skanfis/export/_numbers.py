@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..membership import MEMBERSHIPS, Membership
+from ..antecedent import TreeAntecedent
+from ..membership import FAMILIES, PRODUCTS, Membership
 
 # As in ``membership.profiles`` and ``membership.bell``.
 FLOOR = 1e-10
@@ -59,10 +60,21 @@ def _sigmoid_difference(theta):
     return [location, np.exp(-log_flank), v, np.log(-np.expm1(-2.0 * v))]
 
 
-def _sigmoid_product(theta):
-    location, log_width, *log_flanks = theta
-    flanks = [np.exp(-log_flank) for log_flank in log_flanks]
-    return [location, *flanks, *(np.exp(log_width - log_flank) for log_flank in log_flanks)]
+def _sigmoid_product(first, second):
+    """Of a sigmoid at the left and one at the right; the signs of their slopes."""
+
+    def constants(theta):
+        location, log_width, *log_flanks = theta
+        left, right = (np.exp(-log_flank) for log_flank in log_flanks)
+        width = np.exp(log_width)
+        slopes = [first * left, -second * right]
+        return [location, *slopes, *(width * slope for slope in slopes)]
+
+    return constants
+
+
+def _side(sign):
+    return lambda theta: [theta[0], sign * np.exp(-theta[1])]
 
 
 _BY_NAME = {
@@ -75,11 +87,13 @@ _BY_NAME = {
     "s_shaped": _one_foot(-1.0),
     "z_shaped": _one_foot(1.0),
     "sigmoid_difference": _sigmoid_difference,
-    "sigmoid_product": _sigmoid_product,
+    **{one.name: _sigmoid_product(*signs) for signs, one in PRODUCTS.items()},
+    "sigmoid_rising": _side(1.0),
+    "sigmoid_falling": _side(-1.0),
 }
 
 # By the class, since another class may go by the same name.
-_CONSTANTS_OF = {MEMBERSHIPS[name]: constants for name, constants in _BY_NAME.items()}
+_CONSTANTS_OF = {FAMILIES[name]: constants for name, constants in _BY_NAME.items()}
 
 
 class TermTable(NamedTuple):
@@ -114,6 +128,11 @@ class Numbers:
         # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
         rule_terms, n_terms = model.antecedent.rule_terms, model.antecedent.n_terms
         self.rule_terms = np.where(rule_terms < 0, n_terms, rule_terms)
+        # Of a tree, its nodes from the root on: their constants, inputs, and what is below each.
+        self.nodes = None
+        if isinstance(model.antecedent, TreeAntecedent):
+            order, ends = model.antecedent.walk
+            self.nodes = self.terms[0].constants[order], self.term_inputs[order], ends
         # Coefficients (n_rules, n_outputs, 1 + n_slopes) about an offset, and inputs with slopes.
         offset, coefficients, self.slope_inputs = _consequents(model, reference)
         self.offset = _rounded(offset, dtype, "a typical output")

@@ -369,10 +369,14 @@ def _with_raw_inputs(model, columns, order):
         input_names=tuple(str(columns[j].name) for j in order),
         posterior=posterior and posterior.change_units(model.antecedent, scale, order),
     )
-    if model.term_names == default_term_names(model.antecedent):
+    if model.term_names == _default_names(model):
         # Scattered terms are called by where they stand, which is elsewhere in other units.
-        return replace(folded, term_names=default_term_names(folded.antecedent))
+        return replace(folded, term_names=_default_names(folded))
     return folded
+
+
+def _default_names(model):
+    return default_term_names(model.antecedent, model.minimum, model.maximum)
 
 
 def _with_raw_target(model, label, transformer):

@@ -11,8 +11,14 @@ from math import inf, prod
 
 import numpy as np
 
-from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
-from ..membership import MEMBERSHIPS
+from ..antecedent import (
+    Antecedent,
+    GridAntecedent,
+    RuleTableAntecedent,
+    ScatteredAntecedent,
+    TreeAntecedent,
+)
+from ..membership import FAMILIES
 from ..model import TSKModel
 from ..policies import OUT_OF_BOUNDS, TargetRange
 from ..posterior import MOST_PARAMETERS, Posterior
@@ -28,11 +34,13 @@ from .limits import (
 )
 
 FORMAT = "skanfis-model"
-VERSION = 1
+# The first knew no trees.
+VERSION = 2
 KINDS: dict[type[Antecedent], str] = {
     GridAntecedent: "grid",
     ScatteredAntecedent: "scattered",
     RuleTableAntecedent: "table",
+    TreeAntecedent: "tree",
 }
 _LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 # Of weights, each of which is a part of the whole.
@@ -114,7 +122,7 @@ def model_of(document):
         raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
     if version > VERSION:
         raise ValueError(
-            f"the file is of version {shown(version)}, this skanfis reads version {VERSION}: "
+            f"the file is of version {shown(version)}, this skanfis reads versions 1 to {VERSION}: "
             "upgrade skanfis to read it."
         )
     file = _members({"posterior": None} | document, _FILE, "the file")
@@ -222,9 +230,9 @@ def _terms(terms, n_inputs):
     for t, item in enumerate(terms):
         where = f"terms[{t}]"
         function = item.get("function") if isinstance(item, dict) else None
-        family = MEMBERSHIPS.get(function) if isinstance(function, str) else None
+        family = FAMILIES.get(function) if isinstance(function, str) else None
         if family is None:
-            raise ValueError(f'{where} has no "function" among {", ".join(MEMBERSHIPS)}.')
+            raise ValueError(f'{where} has no "function" among {", ".join(FAMILIES)}.')
         theta = {
             key_of(one): number
             if one.kind == "location"
@@ -316,7 +324,7 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     consequents = np.zeros((n_columns, n_columns))
     for i, row in enumerate(triangle):
         consequents[i, : i + 1] = numbers(row, f"posterior.consequents[{i}]", (i + 1,))
-    n_rows = n_parameters if found["premises"] else 0
+    n_rows = np.unique(antecedent.tied).size if found["premises"] else 0
     n_pinned = len(_list(_list(found["pinned"], "posterior.pinned")[0], "posterior.pinned[0]", 0))
     if n_pinned > n_columns + n_rows:
         raise ValueError(f"posterior.pinned has {n_pinned} rows, more than columns.")
@@ -342,15 +350,54 @@ def _rule_base(kind, groups, table):
     elif kind == "scattered":
         antecedent = ScatteredAntecedent(groups, n_premise_inputs=table.shape[1])
         fits = 0 < table.size == inputs.size
+    elif kind == "tree":
+        antecedent, fits = _tree(groups, table), True
     else:
         antecedent, fits = RuleTableAntecedent(groups, table), True
     if not fits or not np.array_equal(antecedent.rule_terms, table):
         raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
-    # Each place in a rule is one input's, and no input has two.
-    owns = [np.unique(inputs[column[column >= 0]]) for column in table.T]
-    if any(own.size > 1 for own in owns):
+    if kind == "scattered" and (inputs[table] != inputs[table[0]]).any():
         raise ValueError("the terms at one place of the rules are of different inputs.")
-    seen = np.concatenate(owns) if owns else np.empty(0)
-    if np.unique(seen).size < seen.size:
-        raise ValueError("rules have two terms of one input.")
+    for r, row in enumerate(table):
+        terms = row[row >= 0]
+        if np.unique(terms).size < terms.size:
+            raise ValueError(f"rules[{r}].terms: {terms.tolist()} has a term twice.")
     return antecedent
+
+
+def _tree(groups, table):
+    """The tree whose leaves these are; ValueError where they are none."""
+    families = [group.family.name for group in groups]
+    if families != ["sigmoid_rising", "sigmoid_falling"]:
+        raise ValueError(
+            'terms: those of a "tree" are sigmoid_rising first, above each cut, then as many '
+            "sigmoid_falling, below it."
+        )
+    above, below = groups
+    if above.n_terms != below.n_terms:
+        raise ValueError(f"terms: {above.n_terms} sides above a cut, and {below.n_terms} below.")
+    is_same = (above.inputs == below.inputs) & (above.theta == below.theta).all(axis=0)
+    _check_all(is_same, "terms[{}]: the side below has another input, cut or width.")
+    tree = TreeAntecedent(groups, table)
+    paths, seen = tree.paths, set()
+    pending = [(list(range(len(paths))), 0)]
+    while pending:
+        leaves, depth = pending.pop()
+        nodes = {paths[r][depth][0] if depth < len(paths[r]) else None for r in leaves}
+        if nodes == {None} and len(leaves) == 1:
+            continue
+        node = nodes.pop()
+        if nodes or node is None or node in seen:
+            raise ValueError(
+                f"rules[{leaves[0]}].terms: the paths are no tree: each cut stands at one place, "
+                "and all paths that come to a place go on by one cut, or one of them ends there."
+            )
+        seen.add(node)
+        for side in (True, False):
+            own = [r for r in leaves if paths[r][depth][1] is side]
+            if not own:
+                raise ValueError(f"rules: none goes on {'above' if side else 'below'} cut {node}.")
+            pending.append((own, depth + 1))
+    if len(seen) < tree.n_nodes:
+        raise ValueError(f"terms: {tree.n_nodes - len(seen)} cuts are on no path.")
+    return tree

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..membership import MEMBERSHIPS
+from ..membership import FAMILIES
 from ..model import TSKModel
 from .folding import fold
 from .json_reader import FORMAT, INPUT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
@@ -156,7 +156,7 @@ def _terms(model):
     names = iter(model.term_names)
     before = model.initial_antecedent.groups
     for group, initial in zip(model.antecedent.groups, before, strict=True):
-        if group.family not in MEMBERSHIPS.values():
+        if group.family not in FAMILIES.values():
             raise ValueError(f"the membership {group.family.name!r} is not one of skanfis' own.")
         keys = [key_of(parameter) for parameter in group.family.parameters]
         thetas = zip(

@@ -9,7 +9,7 @@ from functools import partialmethod
 
 import numpy as np
 
-from ..membership import MEMBERSHIPS
+from ..membership import FAMILIES, PRODUCTS
 from ..options import policy_of
 from ._numbers import FLOOR, SMALLEST_LOG_SQUARE, Numbers
 
@@ -335,6 +335,11 @@ def _sigmoids(x, center, per_left, per_right, at_left, at_right, log_gain=0.0):
     )
 
 
+def _side(x, p):
+    u = (x - p[0]) * p[1]
+    return lambda: _log_sigmoid(u), lambda: (-u).sigmoid() * p[1]
+
+
 _BY_NAME = {
     "gaussian": _gaussian,
     "bell": _bell,
@@ -345,6 +350,8 @@ _BY_NAME = {
     "s_shaped": _one_foot,
     "z_shaped": _one_foot,
     "sigmoid_difference": lambda x, p: _sigmoids(x, p[0], p[1], p[1], p[2], p[2], p[3]),
-    "sigmoid_product": lambda x, p: _sigmoids(x, *p),
+    **{one.name: lambda x, p: _sigmoids(x, *p) for one in PRODUCTS.values()},
+    "sigmoid_rising": _side,
+    "sigmoid_falling": _side,
 }
-_FORMULAS = {MEMBERSHIPS[name]: formula for name, formula in _BY_NAME.items()}
+_FORMULAS = {FAMILIES[name]: formula for name, formula in _BY_NAME.items()}

@@ -5,12 +5,14 @@ from .readability import Readability, readability
 from .rules import explain, memberships_table, rules_table
 from .structures import StructureDisplay
 from .text import export_text, rules_html
+from .trees import TreeDisplay
 
 __all__ = [
     "MembershipDisplay",
     "Readability",
     "ResponseSurfaceDisplay",
     "StructureDisplay",
+    "TreeDisplay",
     "explain",
     "export_text",
     "memberships_table",

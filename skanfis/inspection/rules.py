@@ -44,14 +44,19 @@ def rules_frame(model, reference):
 
 
 def premise_texts(frame):
-    """Say "temperature is low AND rate is high"; "anything" of a rule that asks nothing."""
+    """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" of a rule that asks nothing."""
     if "if" not in frame:
         return ["anything"] * len(frame)
     return [
-        " AND ".join(f"{name} is {term}" for name, term in rule.items() if isinstance(term, str))
+        " AND ".join(condition(*one) for one in rule.items() if isinstance(one[1], str))
         or "anything"
         for rule in frame["if"].to_dict("records")
     ]
+
+
+def condition(name, term):
+    """Say "temperature is low" or "rate > 6.8 ± 0.3"."""
+    return f"{name} {term}" if term.startswith(("<", ">")) else f"{name} is {term}"
 
 
 def weightiest(frame, max_shown):

@@ -13,6 +13,7 @@ from .displays import _pyplot
 
 # Colours that the colour-blind can tell apart, and a marker for each kind.
 _KINDS = {"one rule": ("0.3", "s"), "grid": ("#0072b2", "o"), "scattered": ("#d55e00", "^")}
+_KINDS["tree"] = ("#009e73", "D")
 # Errors that differ by more than this factor are drawn on a logarithmic scale.
 _FAR_APART = 5.0
 

@@ -4,13 +4,24 @@ from .base import GREATEST_CROSSING, LEAST_TRUTH, Membership, Parameter
 from .bell import Bell
 from .flanked import PiShaped, SShaped, Trapezoidal, Triangular, TwoSidedGaussian, ZShaped
 from .gaussian import Gaussian
-from .sigmoid import SigmoidDifference, SigmoidFalling, SigmoidProduct, SigmoidRising
+from .sigmoid import (
+    BothFalling,
+    BothRising,
+    FallingRising,
+    SigmoidDifference,
+    SigmoidFalling,
+    SigmoidProduct,
+    SigmoidRising,
+)
 
 __all__ = [
+    "FAMILIES",
     "GREATEST_CROSSING",
     "LEAST_TRUTH",
     "MEMBERSHIPS",
     "NAMES_IN_MATLAB",
+    "PRODUCTS",
+    "SIDES",
     "Bell",
     "Gaussian",
     "Membership",
@@ -44,6 +55,14 @@ MEMBERSHIPS: dict[str, type[Membership]] = {
         SigmoidProduct,
     )
 }
+
+# Above and below a cut, and products of two of these: what the paths of a tree say of an input.
+SIDES = {side.side: side for side in (SigmoidRising, SigmoidFalling)}
+PRODUCTS = {
+    product.signs: product for product in (SigmoidProduct, BothRising, BothFalling, FallingRising)
+}
+# All of them: those of a tree are not for whole inputs.
+FAMILIES = MEMBERSHIPS | {one.name: one for one in (*SIDES.values(), *PRODUCTS.values())}
 
 # What MATLAB's Fuzzy Logic Toolbox calls them: named in errors, and in the pages on files.
 NAMES_IN_MATLAB = {

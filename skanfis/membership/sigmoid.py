@@ -89,39 +89,41 @@ class SigmoidProduct(Membership):
         Parameter("left", "log_width"),
         Parameter("right", "log_width"),
     )
+    signs: ClassVar[tuple[float, float]] = (1.0, -1.0)  # whether each rises or falls, from the left
 
-    @staticmethod
-    def value(x, theta):
+    @classmethod
+    def value(cls, x, theta):
         center, log_width, log_left, log_right = theta[:, :, None]
         width = np.exp(log_width)
-        rise = (x - center + width) * np.exp(-log_left)
-        fall = (center + width - x) * np.exp(-log_right)
-        return 1.0 / ((1.0 + np.exp(-rise)) * (1.0 + np.exp(-fall)))
+        first = cls.signs[0] * (x - center + width) * np.exp(-log_left)
+        second = cls.signs[1] * (x - center - width) * np.exp(-log_right)
+        return 1.0 / ((1.0 + np.exp(-first)) * (1.0 + np.exp(-second)))
 
-    @staticmethod
-    def log_value(x, theta):
+    @classmethod
+    def log_value(cls, x, theta):
         center, log_width, log_left, log_right = theta[:, :, None]
         offset, width = x - center, np.exp(log_width)
-        rise, fall = (width + offset) * np.exp(-log_left), (width - offset) * np.exp(-log_right)
-        return _log_sigmoid(rise) + _log_sigmoid(fall)
+        first = (offset + width) * (cls.signs[0] * np.exp(-log_left))
+        second = (offset - width) * (cls.signs[1] * np.exp(-log_right))
+        return _log_sigmoid(first) + _log_sigmoid(second)
 
-    @staticmethod
-    def log_value_and_gradient(x, theta):
+    @classmethod
+    def log_value_and_gradient(cls, x, theta):
         center, log_width, log_left, log_right = theta[:, :, None]
         offset, width = x - center, np.exp(log_width)
-        inverse_left, inverse_right = np.exp(-log_left), np.exp(-log_right)
-        rise, fall = (width + offset) * inverse_left, (width - offset) * inverse_right
-        log_rise, log_fall = _log_sigmoid(rise), _log_sigmoid(fall)
+        per_left, per_right = cls.signs[0] * np.exp(-log_left), cls.signs[1] * np.exp(-log_right)
+        first, second = (offset + width) * per_left, (offset - width) * per_right
+        log_first, log_second = _log_sigmoid(first), _log_sigmoid(second)
         # d log s(u) / du = 1 - s(u)
-        by_rise, by_fall = -np.expm1(log_rise), -np.expm1(log_fall)
+        by_first, by_second = -np.expm1(log_first), -np.expm1(log_second)
         gradient = np.empty((4, *offset.shape))
-        np.multiply(by_rise, -rise, out=gradient[2])
-        np.multiply(by_fall, -fall, out=gradient[3])
-        by_rise *= inverse_left
-        by_fall *= inverse_right
-        np.subtract(by_fall, by_rise, out=gradient[0])
-        np.multiply(by_rise + by_fall, width, out=gradient[1])
-        return log_rise + log_fall, gradient
+        np.multiply(by_first, -first, out=gradient[2])
+        np.multiply(by_second, -second, out=gradient[3])
+        by_first *= per_left
+        by_second *= per_right
+        np.subtract(-by_first, by_second, out=gradient[0])
+        np.multiply(by_first - by_second, width, out=gradient[1])
+        return log_first + log_second, gradient
 
     @staticmethod
     def start(center, spacing, overlap):
@@ -129,6 +131,27 @@ class SigmoidProduct(Membership):
         v = _first_ratio(overlap)
         flank = 0.5 * spacing / np.arccosh(0.5 * np.exp(v) / overlap - np.cosh(v))
         return np.stack([center, np.log(v * flank), np.log(flank), np.log(flank)])
+
+
+class BothRising(SigmoidProduct):
+    """Above two cuts, c - a and c + a, over lengths of their own."""
+
+    name = "sigmoids_rising"
+    signs = (1.0, 1.0)
+
+
+class BothFalling(SigmoidProduct):
+    """Below two cuts."""
+
+    name = "sigmoids_falling"
+    signs = (-1.0, -1.0)
+
+
+class FallingRising(SigmoidProduct):
+    """Below the lesser of two cuts and above the greater one: true nowhere but for their widths."""
+
+    name = "sigmoids_apart"
+    signs = (-1.0, 1.0)
 
 
 class _Side(Membership):

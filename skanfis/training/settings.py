@@ -27,6 +27,12 @@ def given_weights(estimator):
 def structure_request(estimator, names):
     """What training starts from, with all names of columns and families resolved."""
     start = _imported(estimator, names)
+    is_default = isinstance(estimator.mf, str) and estimator.mf == "gaussian"
+    if isinstance(start, str) and start == "tree" and not is_default:
+        raise ValueError(
+            f"mf={estimator.mf!r} means nothing to partition='tree', whose rules are sides of "
+            "cuts: leave mf at 'gaussian', its default, or use another partition."
+        )
     if estimator.order == 0 and estimator.consequent_features is not None:
         raise ValueError(
             f"consequent_features={estimator.consequent_features!r} means nothing with order=0, "

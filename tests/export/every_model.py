@@ -3,17 +3,17 @@
 Inputs are in everyday units, one of them far from the origin; rows are in the box and out of it.
 """
 
-from itertools import product
+from itertools import chain, product
 from typing import NamedTuple
 
 import numpy as np
 
 from skanfis.antecedent import RuleTableAntecedent, TermGroup
-from skanfis.membership import MEMBERSHIPS, Gaussian
+from skanfis.membership import FAMILIES, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS
 
-from ..oracles import random_grid, random_scattered
+from ..oracles import random_grid, random_scattered, random_tree
 from .rule_bases import OFFSET, SCALE, build, narrow_target
 
 
@@ -56,8 +56,9 @@ def generate():
     """All combinations; the policies out of bounds go round among them."""
     policies = ("linear", "clip", "linear", "nan", "linear", "raise")
     limits = (np.inf, 0.5, 0.6, 0.5, 0.2, 0.5)
-    every = product(MEMBERSHIPS.items(), PARTITIONS.items(), (0, 1), (1, 3))
-    for i, ((name, family), (kind, make), order, n_outputs) in enumerate(every):
+    every = product(FAMILIES.items(), PARTITIONS.items(), (0, 1), (1, 3))
+    trees = product([("sides", None)], [("tree", lambda rng, _: random_tree(rng))], (0, 1), (1, 3))
+    for i, ((name, family), (kind, make), order, n_outputs) in enumerate(chain(every, trees)):
         turn = (i + i // 6) % 6
         policy, limit = policies[turn], limits[turn]
         antecedent = make(np.random.default_rng(i), family)

@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 
-from skanfis.antecedent import GridAntecedent
+from skanfis.antecedent import GridAntecedent, TreeAntecedent
 from skanfis.membership import Bell, Gaussian, TwoSidedGaussian
 from skanfis.model import TSKModel
 from skanfis.policies import TargetRange
@@ -14,6 +14,16 @@ from .. import oracles
 # Of x = OFFSET + SCALE z, with z of order one.
 OFFSET, SCALE = np.array([1e6, 20.0, 0.0]), np.array([600.0, 15.0, 0.01])
 NAMES = ("time", "chip temperature", "rate")
+
+
+def a_tree():
+    """Leaves that ask of an input nothing, one side, or two: above both, between, below both."""
+    tree, splits = TreeAntecedent.build([], np.empty((2, 0)), [[]]), [(0, 0, 0.6, 0.4)]
+    # Of the first input: above both cuts, between them, below both.
+    splits += [(1, 0, -0.7, 0.3), (0, 0, 1.1, 0.2), (2, 2, 0.3, 0.05), (0, 1, -0.4, 0.8)]
+    for leaf, j, cut, width in splits:
+        tree = tree.split(leaf, j, cut, np.log(width))
+    return tree
 
 
 def _antecedents():
@@ -27,6 +37,7 @@ def _antecedents():
         "scattered": oracles.random_scattered(rng(), Gaussian, 4, (0, 1, 2)),
         "scattered on two inputs": oracles.random_scattered(rng(), Bell, 3, (1, 2)),
         "rule table": oracles.random_table(rng()),
+        "tree": a_tree(),
         "one rule": GridAntecedent((), counts=()),
     }
 

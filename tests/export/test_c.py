@@ -27,6 +27,7 @@ from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from .every_model import CASES, FEWEST, full_scale, rows, surface
+from .rule_bases import MODELS
 
 MIN_COVERAGE = 0.3
 TOLERANCE = {"double": 1e-12, "float": 1e-5}
@@ -265,6 +266,16 @@ def test_files_are_cpp_too(dtype, tmp_path):
     )
     flags = ["-std=c++11", "-Wall", "-Wextra", "-Werror", "-pedantic"]
     subprocess.run(["g++", *flags, "-c", "all.cpp", "-o", "all.o"], cwd=tmp_path, check=True)
+
+
+def test_tree_takes_an_exponential_per_node():
+    model = MODELS["tree, order 1, 1 outputs"]
+    cost = export_c(model, name="m", min_coverage=None).cost
+    assert (cost.exponentials, cost.divisions, cost.logarithms) == (5, 5, 0)
+    # The place on the sigmoid, its other side, two products; per rule its value and three slopes.
+    assert cost.multiply_adds == 5 * 4 + 6 * 4
+    # z, the sum, and what comes to leaves and nodes.
+    assert cost.stack_bytes == 8 * (3 + 1 + 6 + 5)
 
 
 def test_grid_takes_an_exponential_per_term():

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from skanfis.export import export_c
 from skanfis.export.fis.functions import function_of, theta_of
-from skanfis.membership import MEMBERSHIPS
+from skanfis.membership import FAMILIES
 
 from ..quick import quick
 
@@ -67,7 +67,7 @@ def psigmf(x, a1, c1, a2, c2):
 
 BY_DEFINITION = {
     f.__name__: f
-    for f in (gaussmf, gbellmf, trimf, trapmf, gauss2mf, smf, zmf, pimf, dsigmf, psigmf)
+    for f in (gaussmf, gbellmf, trimf, trapmf, gauss2mf, smf, zmf, pimf, sigmf, dsigmf, psigmf)
 }
 
 
@@ -77,7 +77,7 @@ def mu(name, parameters):
     return family.value(X[None], theta[:, None])[0]
 
 
-@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=list(MEMBERSHIPS))
+@pytest.mark.parametrize("family", FAMILIES.values(), ids=list(FAMILIES))
 def test_what_is_written_is_the_family_and_is_read(family, rng):
     for _ in range(20):
         theta = rng.normal(scale=0.7, size=(len(family.parameters), 1))
@@ -99,6 +99,7 @@ def test_what_is_written_is_the_family_and_is_read(family, rng):
         ("pimf", [-1.0, 0.5, 0.5, 2.0]),
         ("dsigmf", [-3.0, 1.0, -3.0, -1.0]),  # both sigmoids fall
         ("psigmf", [-3.0, 1.0, 2.0, -1.0]),  # the fall first
+        ("psigmf", [3.0, 1.0, 2.0, -1.0]),  # the greater place first
     ],
 )
 def test_other_ways_to_write_a_function_are_read(name, parameters):
@@ -113,7 +114,9 @@ def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any():
 @pytest.mark.parametrize(
     ("name", "parameters", "message"),
     [
-        ("sigmf", [1.0, 2.0], "'sigmf' is not supported; gaussmf, gbellmf"),
+        ("sinc", [1.0, 2.0], "'sinc' is not supported; gaussmf, gbellmf"),
+        ("sigmf", [0.0, 2.0], "slope 0 is one half everywhere"),
+        ("psigmf", [1.0, 2.0, 1.0, 2.0], "width 0, which must be"),
         ("gaussmf", [1.0], "gaussmf takes 2 parameters, found 1"),
         ("gaussmf", [0.0, 1.0], "width 0, which must be between 1e-50 and 1e"),
         ("gbellmf", [1.0, 0.0, 0.0], "slope 0, which must be between"),
@@ -122,7 +125,7 @@ def test_vertical_flank_at_the_edge_of_the_range_or_beyond_is_as_good_as_any():
         ("gauss2mf", [1.0, 1.0, 1.0, -1.0], "plateau -2, which must be"),
         ("smf", [1.0, 1.0], "width 0, which must be"),
         ("dsigmf", [1.0, 0.0, 2.0, 1.0], "must be the same and not zero"),
-        ("psigmf", [1.0, 0.0, 2.0, 1.0], "one must be positive and one negative"),
+        ("psigmf", [1.0, 0.0, 0.0, 1.0], "slope 0 is one half everywhere"),
     ],
 )
 def test_refuses(name, parameters, message):
@@ -131,7 +134,7 @@ def test_refuses(name, parameters, message):
 
 
 def test_a_family_of_ones_own_is_refused():
-    class Own(MEMBERSHIPS["gaussian"]):
+    class Own(FAMILIES["gaussian"]):
         name = "own"
 
     with pytest.raises(ValueError, match="'own' has no function in the"):
@@ -147,7 +150,7 @@ PAGE = Path(__file__).parents[2] / "docs" / "memberships.rst"
 @pytest.mark.skipif(not PAGE.is_file(), reason="the documentation is not here")
 def test_every_family_is_on_the_page_with_its_function():
     page = PAGE.read_text(encoding="utf-8")
-    for family in MEMBERSHIPS.values():
+    for family in FAMILIES.values():
         name, _ = function_of(family, [1.0] * len(family.parameters))
         assert family.name in page
         assert f"``{name}``" in page

@@ -14,7 +14,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis.export import read_fis, write_fis
-from skanfis.membership import MEMBERSHIPS
+from skanfis.membership import FAMILIES
 
 from .. import oracles
 from .rule_bases import EVERY_PAIR, MODELS, build, rows_of
@@ -22,7 +22,7 @@ from .rule_bases import EVERY_PAIR, MODELS, build, rows_of
 N_ROWS = 1000
 # In full scale. Where terms end at a foot, ours have a floor of 1e-10 there; others agree to
 # rounding errors, which in a constant about zero are those of 1e6 times the slope in time.
-TOLERANCE = dict.fromkeys(MEMBERSHIPS, 1e-10) | dict.fromkeys(
+TOLERANCE = dict.fromkeys(FAMILIES, 1e-10) | dict.fromkeys(
     ("triangular", "trapezoidal", "pi_shaped", "s_shaped", "z_shaped"), 1e-6
 )
 
@@ -85,9 +85,9 @@ def difference(outputs, model, rows):
 
 @pytest.mark.theory
 @pytest.mark.filterwarnings("ignore:At .* no rule of the .fis file fires")
-@pytest.mark.parametrize("mf", MEMBERSHIPS)
+@pytest.mark.parametrize("mf", FAMILIES)
 def test_fuzzylite_agrees_on_every_family(mf, fuzzylite, tmp_path, rng):
-    model = build(oracles.random_grid(rng, [MEMBERSHIPS[mf]] * 2, (3, 2), (0, 2)))
+    model = build(oracles.random_grid(rng, [FAMILIES[mf]] * 2, (3, 2), (0, 2)))
     rows = rows_of(model, 1.0, N_ROWS)
     # Where no rule of the file fires, fuzzylite gives NaN.
     fires = model.antecedent.log_memberships(rows.T).reshape(-1, N_ROWS) > np.log(1e-6)

@@ -14,7 +14,7 @@ from skanfis.export import export_json, read_json, write_json
 from skanfis.export.json_reader import parse_json
 from skanfis.model import TSKModel
 
-from .rule_bases import EVERY_PAIR, MODELS, narrow_target, rows_of
+from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
@@ -88,7 +88,7 @@ def _set(*path):
 
 
 REFUSED = [
-    (_set("version", 2), "of version 2, this skanfis reads version 1: upgrade"),
+    (_set("version", 3), "of version 3, this skanfis reads versions 1 to 2: upgrade"),
     (_set("format", "pickle"), "not a model of skanfis"),
     (_set("more", 1), "the file has the unknown key 'more'"),
     (lambda d: d.pop("rules"), "the file has no 'rules'"),
@@ -109,7 +109,8 @@ REFUSED = [
     (_set("terms", 0, "input", 3), r"is not a whole number from 0 to 2"),
     (_set("terms", 0, "log_width", 200.0), "not a number of size up to 115"),
     (_set("terms", 0, "before_training", {}), r"terms\[0\]\.before_training has no"),
-    (_set("rule_base", "tree"), "rule_base is 'tree'"),
+    (_set("rule_base", "forest"), "rule_base is 'forest'"),
+    (_set("rule_base", "tree"), 'those of a "tree" are sigmoid_rising first'),
     (_set("rules", 0, "terms", [0, 2]), "other numbers of terms"),
     (_set("rules", 0, "terms", [0, 2, 99]), "99 is not a whole number from -1 to 6"),
     (_set("rules", 0, "weight", 0.9), r"rules\[\]\.weight: the sum over all rules is 1\.\d+"),
@@ -128,10 +129,67 @@ def test_refuses(change, message):
         parse_json(changed(change))
 
 
-def test_refuses_a_table_with_two_inputs_at_one_place():
+def test_refuses_a_rule_with_one_term_twice():
     table = MODELS["rule table, order 1, 1 outputs"]
-    with pytest.raises(ValueError, match="at one place of the rules are of different inputs"):
+    with pytest.raises(ValueError, match=r"rules\[0\]\.terms: \[3, 3\] has a term twice"):
         parse_json(changed(_set("rules", 0, "terms", [3, 3, -1]), table))
+
+
+A_TREE = MODELS["tree, order 1, 2 outputs"]
+
+
+def _without(place):
+    """Remove a node's two sides from all lists; what was after it moves up."""
+
+    def change(document):
+        n = len(document["terms"]) // 2
+        for t in (n + place, place):
+            document["terms"].pop(t)
+        for rule in document["rules"]:
+            kept = [t for t in rule["terms"] if t % n != place or t < 0]
+            rule["terms"] = [t - (t % n > place) - (t >= n) if t >= 0 else t for t in kept]
+        longest = max(len(rule["terms"]) for rule in document["rules"])
+        for rule in document["rules"]:
+            rule["terms"] += [-1] * (longest - len(rule["terms"]))
+
+    return change
+
+
+def _idle(document):
+    """Add a node that no path goes by."""
+    terms = document["terms"]
+    terms[:] = [*terms[:5], terms[4], *terms[5:], terms[-1]]
+    for rule in document["rules"]:
+        rule["terms"] = [t + (t >= 5) for t in rule["terms"]]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_set("terms", 5, "center", 1.0), r"terms\[0\]: the side below has another input, cut or"),
+        (_set("terms", 6, "input", 1), r"terms\[1\]: the side below has another input, cut or"),
+        (_set("terms", 7, "log_width", 1.0), r"terms\[2\]: the side below has another input, cut"),
+        (
+            lambda d: (d["terms"].pop(), _set("rules", 1, "terms", [0, 2, -1])(d)),
+            "terms: 5 sides above a cut, and 4 below",
+        ),
+        (_without(4), r"rules\[0\]\.terms: the paths are no tree: each cut stands at one place"),
+        (_without(0), r"rules\[0\]\.terms: the paths are no tree"),
+        (_set("rules", 0, "terms", [2, 0, 4]), "the paths are no tree"),
+        (_set("rules", 5, "terms", [5, 6, 9]), r"none goes on above cut 4"),
+        (_set("rules", 5, "terms", [9, 1, 5]), r"rules\[0\]\.terms: the paths are no tree"),
+        (_idle, "terms: 1 cuts are on no path"),
+    ],
+)
+def test_refuses_what_is_no_tree(change, message):
+    with pytest.raises(ValueError, match=message):
+        parse_json(changed(change, A_TREE))
+
+
+def test_files_of_the_first_version_are_read():
+    text = export_json(A_GRID)
+    assert '"version": 2' in text
+    assert_same(parse_json(text.replace('"version": 2', '"version": 1')), A_GRID)
 
 
 @pytest.mark.parametrize(
@@ -148,6 +206,13 @@ def test_refuses_a_table_with_two_inputs_at_one_place():
 def test_refuses_text_that_is_no_such_json(text, message):
     with pytest.raises(ValueError, match=message):
         parse_json(text)
+
+
+def test_a_rule_table_that_a_tree_leaves_comes_back():
+    antecedent, _ = A_TREE.antecedent.without_rules([1])
+    # Its rules have two terms of the first input, at places that others have for other inputs.
+    left = build(antecedent)
+    assert_same(parse_json(export_json(left)), left)
 
 
 @pytest.mark.parametrize("given", [export_json(A_GRID), '{"a": 1}', b"{}", Path('{"a": 1}')])

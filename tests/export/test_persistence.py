@@ -27,7 +27,7 @@ from skanfis.gyro import (
 )
 from skanfis.intervals import ConformalRegressor
 from skanfis.learning import SOLVERS, Hybrid
-from skanfis.membership import MEMBERSHIPS
+from skanfis.membership import FAMILIES, MEMBERSHIPS
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 
 from ..quick import quick, with_few_candidates
@@ -110,7 +110,7 @@ def test_trusted_types_are_all_there_and_no_more():
     for name in TRUSTED_TYPES:
         module, _, name = name.rpartition(".")
         assert isinstance(getattr(import_module(module), name), type)
-    families = {f"{family.__module__}.{family.__name__}" for family in MEMBERSHIPS.values()}
+    families = {f"{family.__module__}.{family.__name__}" for family in FAMILIES.values()}
     assert families == {name for name in TRUSTED_TYPES if ".membership." in name}
 
 

@@ -36,14 +36,17 @@ def test_noise_is_told_in_the_units_of_the_target():
 
 
 def rules_read(text):
-    """Per rule: its number, {input: term}, and its value for each output as a Python expression."""
+    """Per rule: its number, pairs (input, term), and by output its value as a Python expression."""
     found = re.findall(
         r"^Rule (\d+),.*\n  IF (.*)\n((?:  (?:THEN| AND) .*\n?)+)", text, re.MULTILINE
     )
     rules = []
     for label, premise, conclusion in found:
         parts = premise.split(" AND ") if premise != "anything" else []
-        terms = dict(re.fullmatch(r"(.+) is (.+)", part).groups() for part in parts)
+        terms = []
+        for part in parts:
+            name, term, sides = re.fullmatch(r"(.+?) (?:is (.+)|([<>] .+))", part).groups()
+            terms += [(name, one) for one in (sides.split(" and ") if sides else [term])]
         rules.append((int(label), terms, re.findall(r"(?:THEN|AND) .+? = (.*)", conclusion)))
     return rules
 
@@ -68,7 +71,7 @@ def predict_as_read(text, rows):
         at = dict(zip(NAMES, row, strict=True))
         firing = [
             np.prod([textbook_membership(terms[key][0], at[key[0]], terms[key][1]) for key in rule])
-            for rule in (premise.items() for _, premise, _ in rules)
+            for _, rule, _ in rules
         ]
         values = []
         for _, _, expressions in rules:
@@ -203,8 +206,9 @@ def test_there_is_a_line_per_rule(model):
     assert "".join(page.texts).count("(no row)") == np.sum(model.rule_rows < 0.5)
     assert page.count("tr") == 2 + model.n_rules
     terms = model.antecedent.rule_terms
+    told = "\n".join(page.texts)
     for t in np.unique(terms[terms >= 0]):
-        assert model.term_names[t] in page.texts
+        assert model.term_names[t] in told
     assert f"{model.n_rules} rule" in "".join(page.texts)
 
 

@@ -5,7 +5,7 @@ from collections import namedtuple
 import numpy as np
 from hypothesis import strategies as st
 
-from skanfis.membership import MEMBERSHIPS
+from skanfis.membership import FAMILIES, MEMBERSHIPS
 
 from .. import oracles
 from ..export.rule_bases import build
@@ -76,12 +76,15 @@ settings_of_fit = st.fixed_dictionaries(
 def frozen_models(draw):
     """A model of any family, rule base, order and number of outputs."""
     rng = np.random.default_rng(draw(_seeds))
-    family = draw(st.sampled_from(list(MEMBERSHIPS.values())))
-    kind = draw(st.sampled_from(["grid", "scattered"]))
+    family = draw(st.sampled_from(list(FAMILIES.values())))
+    kind = draw(st.sampled_from(["grid", "tree", "scattered"]))
     if kind == "grid":
         counts = draw(st.lists(st.integers(2, 3), min_size=1, max_size=3))
         inputs = sorted(draw(st.permutations(range(3)))[: len(counts)])
         antecedent = oracles.random_grid(rng, [family] * len(counts), counts, inputs)
+    elif kind == "tree":
+        # Of more, .fis files refuse those that cut an input three times on a path.
+        antecedent = oracles.random_tree(rng, draw(st.integers(2, 3)))
     else:
         antecedent = oracles.random_scattered(rng, family, draw(st.integers(1, 5)), (0, 1, 2))
     return build(antecedent, draw(st.sampled_from([0, 1])), draw(st.integers(1, 2)))

@@ -9,7 +9,7 @@ since an absolute error of log mu is a relative one of the strengths.
 
 from functools import reduce
 
-from ...membership import MEMBERSHIPS
+from ...membership import FAMILIES, PRODUCTS
 
 # A flank with a foot: a function of s, which is zero at the foot and one at the shoulder, over a
 # floor. @ is its name, and it has a mu and a slope between the two.
@@ -135,6 +135,16 @@ def _sigmoids(gain, left, right, at_left, at_right):
     return value, slope
 
 
+_SIDE = (
+    """
+    return $name_log_sigmoid((x - p[0]) * p[1]);
+""",
+    """
+    return p[1] * $name_sigmoid((p[0] - x) * p[1]);
+""",
+)
+
+
 # Bodies of functions of x and p: the value, and its derivative by x.
 _BY_NAME = {
     "gaussian": (
@@ -187,11 +197,13 @@ _BY_NAME = {
     "s_shaped": _ONE_FOOT,
     "z_shaped": _ONE_FOOT,
     "sigmoid_difference": _sigmoids("p[3] + ", 1, 1, 2, 2),
-    "sigmoid_product": _sigmoids("", 1, 2, 3, 4),
+    **{one.name: _sigmoids("", 1, 2, 3, 4) for one in PRODUCTS.values()},
+    "sigmoid_rising": _SIDE,
+    "sigmoid_falling": _SIDE,
 }
 
 # By the class, since another class may go by the same name.
-BODIES = {MEMBERSHIPS[name]: in_c for name, in_c in _BY_NAME.items()}
+BODIES = {FAMILIES[name]: in_c for name, in_c in _BY_NAME.items()}
 
 # Exponentials, logarithms and multiplications that a value takes at most.
 COSTS = {
@@ -204,5 +216,7 @@ COSTS = {
     "s_shaped": (1, 1, 6),
     "z_shaped": (1, 1, 6),
     "sigmoid_difference": (2, 2, 2),
-    "sigmoid_product": (2, 2, 2),
+    **{one.name: (2, 2, 2) for one in PRODUCTS.values()},
+    "sigmoid_rising": (1, 1, 1),
+    "sigmoid_falling": (1, 1, 1),
 }

@@ -1,8 +1,9 @@
 """The .c file: constant tables, and the functions that read them.
 
 The order of work is that of ``skanfis.model``. A grid normalises each input by itself and
-multiplies shares in nested loops: one exponential per term, not per rule and input. "linear" is
-worked out only outside the box, by the derivative along the way back.
+multiplies shares in nested loops: one exponential per term, not per rule and input. A tree parts
+the strength that comes to a node, from the root on: one exponential per node, nothing to normalise.
+"linear" is worked out only outside the box, by the derivative along the way back.
 """
 
 import re
@@ -72,6 +73,7 @@ class Source:
             )
         self.model, self.n_terms = numbers.model, numbers.model.antecedent.n_terms
         self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
+        self.is_tree = numbers.nodes is not None
         # Whether the terms of a table of rules follow from the order of its rules.
         self.is_in_order = np.array_equal(numbers.rule_terms.ravel(), np.arange(self.n_terms))
         # Logarithms of terms, and the zero of "none".
@@ -87,6 +89,8 @@ class Source:
         linear = self.policy == "linear" and not is_constant and bool(numbers.reach.any())
         facts = {
             "shares": self.n_terms > 0 or not self.is_grid,
+            # Strengths that have to be made to sum to one.
+            "normal": (self.n_terms > 0 or not self.is_grid) and not self.is_tree,
             "slopes": self.n_slopes > 0,
             "covers": covers,
             # Rows outside the box get no answer; are less covered; are followed along the tangent.
@@ -108,6 +112,11 @@ class Source:
         ]
         exponentials, logarithms, multiply_adds = map(int, sum(of_terms, np.zeros(3)))
         n_shares = self.n_terms if self.is_grid else self.model.n_rules
+        divisions = len(numbers.counts) if self.is_grid else 1
+        if self.is_tree:
+            # The place on the sigmoid, its other side, and what goes above and below.
+            n_shares, divisions = 0, self.n_terms // 2
+            exponentials, logarithms, multiply_adds = divisions, 0, 4 * divisions
         # Of a grid, products of shares: after two inputs, after three, ...
         products = int(np.cumprod(numbers.counts or (), dtype=int)[1:].sum())
         # The strongest rule is asked, then all that have data.
@@ -119,7 +128,7 @@ class Source:
             exponentials=exponentials + n_shares,
             logarithms=logarithms,
             multiply_adds=multiply_adds + products + n_shares + numbers.coefficients.size,
-            divisions=len(numbers.counts) if self.is_grid else 1,
+            divisions=divisions,
             table_bytes=sum(
                 values.size * _INDEX_BYTES.get(kind, itemsize) for values, kind in tables
             ),
@@ -139,7 +148,8 @@ class Source:
         dialect, indices = self.dialect, ["r", "o"]
         main, tangent = self.arrays()
         loops = [f"i{k}" for k in range(len(self.numbers.counts or ()))]
-        indices += ["j"] * (self.n_slopes > 0) + ["k"] * (not self.is_grid) + loops
+        indices += ["j"] * (self.n_slopes > 0) + loops
+        indices += ["k"] * (not self.is_grid and not self.is_tree)
         # What the place of a row is told by: z, and what the strengths are made of.
         taken = ["z", "l" if self.is_grid else "w"] if "shares" in self.facts else ["z"]
         words = {
@@ -179,15 +189,18 @@ class Source:
             found["reach"] = numbers.reach
         if "held" in facts:
             found["output_low"], found["output_high"] = numbers.output_limits
-        found |= {f"terms{k}": terms.constants for k, terms in enumerate(numbers.terms)}
+        if self.is_tree:
+            found["nodes"], found["node_input"], found["node_ends"] = numbers.nodes
+        else:
+            found |= {f"terms{k}": terms.constants for k, terms in enumerate(numbers.terms)}
         if "covers" in facts:
             found["support"] = numbers.support
         if "saturates" in facts:
             found["limits"] = self.limits
         found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
-        if self.n_terms:
+        if self.n_terms and not self.is_tree:
             found["term_input"] = numbers.term_inputs
-        if not self.is_grid and not self.is_in_order:
+        if not self.is_grid and not self.is_tree and not self.is_in_order:
             found["rule_terms"] = numbers.rule_terms
         if 0 < self.n_slopes < self.model.n_inputs:
             found["slope_input"] = numbers.slope_inputs
@@ -203,14 +216,17 @@ class Source:
             main["e"] = self.model.n_inputs
         if "linear" in self.facts:
             main["change"] = self.model.n_outputs
-        if "shares" in self.facts:
+        if "normal" in self.facts:
             main["l"] = tangent["t"] = self.n_logarithms
         if not self.is_grid:
-            main["w"] = tangent["s"] = self.model.n_rules
+            # Of leaves, then of nodes.
+            main["w"] = tangent["s"] = self.model.n_rules + self.is_tree * self.n_terms // 2
         return main, tangent
 
     def _memberships(self):
         """Functions of the families in use, after those that they call."""
+        if self.is_tree:
+            return []
         functions = []
         for family in {terms.family: None for terms in self.numbers.terms}:
             suffixes = ["", "_slope"] if "linear" in self.facts else [""]
@@ -229,6 +245,12 @@ class Source:
 
     def _strengths(self, logarithms, rules, slope):
         """Terms, then shares (of a grid, in place) or strengths; or their derivatives along e."""
+        if self.is_tree:
+            body = kept_lines(templates.TREE_SLOPE if slope else templates.TREE, self.facts)
+            words = {"$n_nodes": self.n_terms // 2, "$n_rules": self.model.n_rules}
+            for word, number in words.items():
+                body = body.replace(word, str(number))
+            return _indented(body.splitlines())
         numbers, lines = self.numbers, []
         for k, terms in enumerate(numbers.terms):
             at = _at(terms.start, "i")

@@ -35,46 +35,46 @@ FINITE_INPUT = """
 # Near the foot of the only term that speaks its derivative is huge, and all but the mean: what is
 # left of it would have no digits; so the strongest term's is subtracted first.
 FUNCTIONS = """
-shares        |/* Turns n logarithms into shares that add up to one. */
-shares        |static void $name_normalise($real *l, $int n)
-shares        |{
-shares        |    $int i;
-shares        |    $real top = l[0], sum = 0.0R;
-shares        |    for (i = 1; i < n; ++i) {
-shares        |        if (l[i] > top) {
-shares        |            top = l[i];
-shares        |        }
-shares        |    }
-shares        |    for (i = 0; i < n; ++i) {
-shares        |        l[i] = $EXP(l[i] - top);
-shares        |        sum += l[i];
-shares        |    }
-shares        |    sum = 1.0R / sum;
-shares        |    for (i = 0; i < n; ++i) {
-shares        |        l[i] *= sum;
-shares        |    }
-shares        |}
-shares        |
-linear shares |/* Subtracts from n derivatives their mean by the n shares. */
-linear shares |static void $name_centre($real *s, const $real *share, $int n)
-linear shares |{
-linear shares |    $int i, top = 0;
-linear shares |    $real most, mean = 0.0R;
-linear shares |    for (i = 1; i < n; ++i) {
-linear shares |        if (share[i] > share[top]) {
-linear shares |            top = i;
-linear shares |        }
-linear shares |    }
-linear shares |    most = s[top];
-linear shares |    for (i = 0; i < n; ++i) {
-linear shares |        s[i] -= most;
-linear shares |        mean += share[i] * s[i];
-linear shares |    }
-linear shares |    for (i = 0; i < n; ++i) {
-linear shares |        s[i] -= mean;
-linear shares |    }
-linear shares |}
-linear shares |
+normal        |/* Turns n logarithms into shares that add up to one. */
+normal        |static void $name_normalise($real *l, $int n)
+normal        |{
+normal        |    $int i;
+normal        |    $real top = l[0], sum = 0.0R;
+normal        |    for (i = 1; i < n; ++i) {
+normal        |        if (l[i] > top) {
+normal        |            top = l[i];
+normal        |        }
+normal        |    }
+normal        |    for (i = 0; i < n; ++i) {
+normal        |        l[i] = $EXP(l[i] - top);
+normal        |        sum += l[i];
+normal        |    }
+normal        |    sum = 1.0R / sum;
+normal        |    for (i = 0; i < n; ++i) {
+normal        |        l[i] *= sum;
+normal        |    }
+normal        |}
+normal        |
+linear normal|/* Subtracts from n derivatives their mean by the n shares. */
+linear normal|static void $name_centre($real *s, const $real *share, $int n)
+linear normal|{
+linear normal|    $int i, top = 0;
+linear normal|    $real most, mean = 0.0R;
+linear normal|    for (i = 1; i < n; ++i) {
+linear normal|        if (share[i] > share[top]) {
+linear normal|            top = i;
+linear normal|        }
+linear normal|    }
+linear normal|    most = s[top];
+linear normal|    for (i = 0; i < n; ++i) {
+linear normal|        s[i] -= most;
+linear normal|        mean += share[i] * s[i];
+linear normal|    }
+linear normal|    for (i = 0; i < n; ++i) {
+linear normal|        s[i] -= mean;
+linear normal|    }
+linear normal|}
+linear normal|
 covers        |/* Of a rule in coverage: its share, falling with the distance from its data. */
 covers        |static $real $name_near(const $real *z, const $real *p)
 covers        |{
@@ -199,6 +199,35 @@ linear        |
               |    }
               |    return status;
               |}
+"""
+# From the root on: of what comes to node i, w[$n_rules + i], a part goes to either of its two ends.
+# What a sigmoid has 80 widths off its cut, 2e-35, no sum of strengths can tell from
+# nothing: odds are held there, and no branch depends on the side on which a row lies.
+TREE = """
+ |w[$n_rules] = 1.0R;
+ |for (i = 0; i < $n_nodes; ++i) {
+ |    $real odds, above;
+ |    $real u = (z[$name_node_input[i]] - $name_nodes[i][0]) * $name_nodes[i][1];
+ |    u = u < -80.0R ? -80.0R : u;
+ |    odds = $EXP(-u);
+ |    above = 1.0R / (1.0R + odds);
+ |    w[$name_node_ends[i][0]] = w[$n_rules + i] * above;
+ |    w[$name_node_ends[i][1]] = w[$n_rules + i] * (odds * above);
+ |}
+"""
+TREE_SLOPE = """
+ |s[$n_rules] = 0.0R;
+ |for (i = 0; i < $n_nodes; ++i) {
+ |    const $int k = $name_node_input[i];
+ |    const $real ahead = e[k] * $name_nodes[i][1];
+ |    $real odds, above;
+ |    $real u = (z[k] - $name_nodes[i][0]) * $name_nodes[i][1];
+ |    u = u < -80.0R ? -80.0R : u;
+ |    odds = $EXP(-u);
+ |    above = 1.0R / (1.0R + odds);
+ |    s[$name_node_ends[i][0]] = s[$n_rules + i] + odds * above * ahead;
+ |    s[$name_node_ends[i][1]] = s[$n_rules + i] - above * ahead;
+ |}
 """
 ADD_SUPPORT = """
  |if (covered < enough && $name_support[r][0] > 0.0R) {

@@ -72,7 +72,7 @@ def export_fis(estimator: Any) -> str:
     >>> export_fis(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc())).splitlines()[-1]
     '2 2, 4 (1) : 1'
     """
-    model = fold(estimator)
+    model = fold(estimator).as_rule_table()
     _warn_of_gaps(model)
     inputs, names_of_terms, terms, rules = _premises(model)
     comments, (input_names, output_names) = _comments_and_names(model)
@@ -204,7 +204,9 @@ def _identifiers(names, fallback):
     """Names of letters, digits and underscores, different from each other."""
     identifiers = []
     for k, name in enumerate(names, start=1):
-        plain = unicodedata.normalize("NFKD", _MINUS.sub("minus ", name))
+        plain = _MINUS.sub("minus ", name).replace("> ", "above ").replace("< ", "below ")
+        plain = plain.replace("±", "pm")
+        plain = unicodedata.normalize("NFKD", plain)
         base = _NOT_IN_A_NAME.sub("_", plain.encode("ascii", "ignore").decode()).strip("_")
         if not base:
             base = f"{fallback}{k}"
@@ -222,7 +224,8 @@ def _warn_of_gaps(model):
     rng = np.random.default_rng(0)
     Z = rng.uniform(model.minimum, model.maximum, (_N_POINTS, model.n_inputs)).T
     groups = model.antecedent.groups
-    by_group = [group.family.value(Z[group.inputs], group.theta) for group in groups]
+    with np.errstate(over="ignore"):
+        by_group = [group.family.value(Z[group.inputs], group.theta) for group in groups]
     # One more, for the inputs that a rule does not look at (-1).
     mu = np.concatenate([*by_group, np.ones((1, _N_POINTS))])
     fires = np.zeros(_N_POINTS, dtype=bool)

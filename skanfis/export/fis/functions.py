@@ -10,7 +10,7 @@ from math import log
 
 import numpy as np
 
-from ...membership import MEMBERSHIPS
+from ...membership import FAMILIES, PRODUCTS, SIDES
 from ..limits import LARGEST_NUMBER, SMALLEST_NUMBER, shown
 
 # A plateau that is a point, of a family that always has one, as part of the shorter flank.
@@ -43,8 +43,11 @@ def theta_of(name, parameters, low, high):
     natural = from_file(*parameters)
     if name == "trapmf" and parameters[1] == parameters[2]:
         family, natural = "triangular", natural[:3]
+    if name in ("sigmf", "psigmf"):
+        signs = [1.0 if slope > 0.0 else -1.0 for slope in _from_the_left(parameters)[0]]
+        family = (SIDES[signs[0]] if name == "sigmf" else PRODUCTS[signs[0], signs[1]]).name
     theta = []
-    for parameter, value in zip(MEMBERSHIPS[family].parameters, natural, strict=True):
+    for parameter, value in zip(FAMILIES[family].parameters, natural, strict=True):
         if parameter.kind == "location":
             theta.append(value)
         elif SMALLEST_NUMBER <= value <= LARGEST_NUMBER:
@@ -54,7 +57,7 @@ def theta_of(name, parameters, low, high):
                 f"{name} {parameters} is a {family} membership of {parameter.name} {value:g}, "
                 f"which must be between {SMALLEST_NUMBER:g} and {LARGEST_NUMBER:g}."
             )
-    return MEMBERSHIPS[family], np.array(theta)
+    return FAMILIES[family], np.array(theta)
 
 
 def _open_flanks(name, corners, low, high):
@@ -109,15 +112,22 @@ def _difference_from_file(slope, place, other_slope, other_place):
     return [*_from_sigmoids(*ends), 1.0 / abs(slope)]
 
 
-def _product_from_file(slope, place, other_slope, other_place):
-    if not slope * other_slope < 0.0:
-        raise ValueError(
-            f"psigmf with slopes {slope:g} and {other_slope:g} is not supported: one must be "
-            "positive and one negative."
-        )
-    if slope < 0.0:
-        slope, place, other_slope, other_place = other_slope, other_place, slope, place
-    return [*_from_sigmoids(place, other_place), 1.0 / slope, -1.0 / other_slope]
+def _sides_from_file(*numbers):
+    """Slopes and places by turns, of one sigmoid or two: natural parameters."""
+    slopes, places = _from_the_left(numbers)
+    if 0.0 in slopes:
+        raise ValueError("a sigmoid of slope 0 is one half everywhere: leave it out.")
+    flanks = [1.0 / abs(slope) for slope in slopes]
+    return [*(_from_sigmoids(*places) if len(places) > 1 else places), *flanks]
+
+
+def _from_the_left(numbers):
+    pairs = sorted(zip(numbers[::2], numbers[1::2], strict=True), key=lambda pair: pair[1])
+    return list(zip(*pairs, strict=True))
+
+
+def _product_to_file(first, second):
+    return lambda c, width, left, right: [first / left, c - width, second / right, c + width]
 
 
 # By family: the function's name, its number of parameters, and what turns those of the family into
@@ -162,11 +172,11 @@ _TABLE: dict[str, tuple[str, int, Callable, Callable]] = {
         lambda c, width, flank: [1.0 / flank, c - width, 1.0 / flank, c + width],
         _difference_from_file,
     ),
-    "sigmoid_product": (
-        "psigmf",
-        4,
-        lambda c, width, left, right: [1.0 / left, c - width, -1.0 / right, c + width],
-        _product_from_file,
-    ),
+    "sigmoid_rising": ("sigmf", 2, lambda cut, width: [1.0 / width, cut], _sides_from_file),
+    "sigmoid_falling": ("sigmf", 2, lambda cut, width: [-1.0 / width, cut], _sides_from_file),
+    **{
+        one.name: ("psigmf", 4, _product_to_file(*signs), _sides_from_file)
+        for signs, one in PRODUCTS.items()
+    },
 }
 _FAMILIES = {name: family for family, (name, *_) in _TABLE.items()}

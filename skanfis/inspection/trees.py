@@ -1,0 +1,211 @@
+"""Pictures of a tree: its cuts and what stands at the leaves, and the plane that they cut."""
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from .._validation import check_choice
+from ..antecedent import TreeAntecedent
+from ..export import fold
+from ..model import TSKModel
+from .displays import _position, _pyplot, _section
+from .labels import as_label
+from .rules import condition, writable
+from .text import number
+
+# Inches: of a letter, of a leaf, around the tree.
+_LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
+# Line widths, in points, of a branch that no row takes and more of one that all do.
+_THIN, _THICK = 0.6, 6.0
+# Digits of a leaf's value; points of the plane along each input; parts of the plane's sides that
+# the place of a leaf must have for its value to stand there.
+_DIGITS, _N_POINTS, _ROOM = 3, 200, np.array([0.13, 0.07])
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class TreeDisplay:
+    """The rules of a tree: cuts, and at each leaf its typical value and its share of the rows.
+
+    A branch is the thicker the more rows take it. With ``kind="plane"`` it is the prediction over
+    the two inputs that are cut: lines where they are, pale bands where a cut turns, between 0.1 and
+    0.9 true, values where there is room for them. ``ax_`` and ``figure_`` are matplotlib's, once
+    drawn.
+
+    Parameters
+    ----------
+    model : TSKModel
+        Its rule base is a tree.
+    output : int, default=0
+        Whose values stand at the leaves.
+    kind : {"tree", "plane"}, default="tree"
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.inspection import TreeDisplay
+    >>> model = ANFISRegressor(partition="tree", max_rules=4).fit(*make_jang_sinc())
+    >>> display = TreeDisplay.from_estimator(model)
+    >>> len(display.leaves) == model.n_rules_
+    True
+    """
+
+    model: TSKModel
+    output: int = 0
+    kind: str = "tree"
+
+    @classmethod
+    def from_estimator(
+        cls, estimator: Any, *, kind: str = "tree", output: int | str = 0, ax: Any = None
+    ) -> Self:
+        """Draw the tree of a fitted estimator.
+
+        Parameters
+        ----------
+        estimator : fitted estimator or TSKModel
+            As :func:`skanfis.export.fold` takes it; scalers are folded into the cuts.
+        kind : {"tree", "plane"}, default="tree"
+            "plane" is of trees that cut two inputs; the others are held at their mean.
+        output : int or str, default=0
+            Which output, by position or name.
+        ax : matplotlib Axes, default=None
+            None makes a figure.
+
+        Raises
+        ------
+        ValueError
+            If the rules are no tree, or the plane is asked of one that cuts more or fewer inputs.
+        """
+        check_choice("kind", kind, ("tree", "plane"))
+        model = writable(fold(estimator))
+        if not isinstance(model.antecedent, TreeAntecedent):
+            raise ValueError(
+                f"The {model.n_rules} rules are no tree: there are no cuts to draw. Fit with "
+                "partition='tree'."
+            )
+        inputs = np.unique(model.antecedent.term_inputs)
+        if kind == "plane" and inputs.size != 2:
+            names = ", ".join(repr(model.input_names[j]) for j in inputs)
+            raise ValueError(f"kind='plane' is of two inputs; this tree cuts {names}.")
+        place = _position(output, model.output_names, "output")
+        return cls(model=model, output=place, kind=kind).plot(ax=ax)
+
+    @property
+    def _tree(self) -> Any:
+        return self.model.antecedent
+
+    @property
+    def values(self) -> np.ndarray:
+        """Of every leaf, the rule's value where its rows lie, (n_rules,)."""
+        model, coefficients = self.model, self.model.coefficients[:, :, self.output]
+        if model.support is None or not model.order:
+            return coefficients[:, 0]
+        away = model.support.center - model.reference
+        return coefficients[:, 0] + np.einsum("rj,rj->r", away, coefficients[:, 1:])
+
+    @property
+    def leaves(self) -> list[str]:
+        """Of every leaf, what stands at it."""
+        values = [number(value, _DIGITS) for value in self.values]
+        shares = [f"{100.0 * share:.2g} %" for share in self.model.rule_weights]
+        return [f"{value}  ({share})" for value, share in zip(values, shares, strict=True)]
+
+    def plot(self, *, ax: Any = None) -> Self:
+        """Draw on ``ax``, as of :meth:`from_estimator`."""
+        draw = self._draw_tree if self.kind == "tree" else self._draw_plane
+        draw(ax)
+        self.figure_ = self.ax_.figure
+        return self
+
+    def _conditions(self):
+        """Above and below each node in words."""
+        model = self.model
+        names = [as_label(model.input_names[j]) for j in model.antecedent.term_inputs]
+        said = [condition(*pair) for pair in zip(names, model.term_names, strict=True)]
+        return np.array(said, dtype=object).reshape(2, -1).T
+
+    def _draw_tree(self, ax):
+        model, (order, ends) = self.model, self._tree.walk
+        n_rules, words = model.n_rules, self._conditions()[order]
+        # By place, leaves first: how high it stands, how far from the root, what comes to it.
+        depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
+        share = np.concatenate([model.rule_weights, np.zeros(n_rules - 1)])
+        for k, pair in enumerate(ends):
+            depth[pair] = depth[n_rules + k] + 1.0
+        height[self._from_above(ends)] = np.arange(n_rules)[::-1]
+        for k, pair in reversed(list(enumerate(ends))):
+            height[n_rules + k], share[n_rules + k] = height[pair].mean(), share[pair].sum()
+        step = _LETTER * max(map(len, words.ravel())) + _MARGIN
+        last = _LETTER * max(map(len, self.leaves)) + _MARGIN
+        if ax is None:
+            size = step * depth.max() + last + _MARGIN, _LEAF * n_rules + _MARGIN
+            ax = _pyplot().subplots(figsize=size, layout="constrained")[1]
+        self.ax_ = ax
+        for k, pair in enumerate(ends):
+            start = depth[n_rules + k], height[n_rules + k]
+            for end, text in zip(pair, words[k], strict=True):
+                width = _THIN + _THICK * share[end]
+                path = [start[0], start[0], depth[end]], [start[1], height[end], height[end]]
+                ax.plot(*path, color="0.75", linewidth=width, solid_joinstyle="round", zorder=1)
+                place = start[0] + 0.08, height[end] + 0.04 + width / 100.0
+                ax.text(*place, text, fontsize="small", va="bottom")
+        for r, text in enumerate(self.leaves):
+            ax.text(depth[r] + 0.06, height[r], text, fontsize="small", weight="bold", va="center")
+        ax.set_xlim(-0.05, depth.max() + last / step)
+        ax.set_ylim(-0.6, n_rules - 0.2)
+        ax.set_axis_off()
+        name = as_label(model.output_names[self.output])
+        ax.set_title(f"{name}: typical value (share of the rows)", fontsize="small", loc="left")
+
+    def _from_above(self, ends):
+        """The leaves from the uppermost to the lowest."""
+        n_rules, found, pending = self.model.n_rules, [], [self.model.n_rules]
+        while pending:
+            place = pending.pop()
+            if place < n_rules:
+                found.append(place)
+            else:
+                pending.extend(ends[place - n_rules][::-1])
+        return found
+
+    def _draw_plane(self, ax):
+        model, plt = self.model, _pyplot()
+        if ax is None:
+            ax = plt.subplots(figsize=(5.6, 4.2), layout="constrained")[1]
+        self.ax_ = ax
+        both = np.unique(model.antecedent.term_inputs)
+        low, high = model.minimum[both], model.maximum[both]
+        axes = np.linspace(low, high, _N_POINTS).T
+        values = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
+        rows, held, _ = _section(model, both, values, None)
+        response = model.predict(rows)[:, self.output].reshape(_N_POINTS, _N_POINTS)
+        colours = ax.pcolormesh(*axes, response, shading="nearest", rasterized=True)
+        name = as_label(model.output_names[self.output])
+        ax.figure.colorbar(colours, ax=ax, label=name)
+        drawn: set[int] = set()
+        for value, path in zip(self.values, self._tree.paths, strict=True):
+            self._outline(ax, value, path, both, drawn)
+        first, second = (as_label(model.input_names[j]) for j in both)
+        ax.set(xlabel=first, ylabel=second, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        notes = "; ".join(f"{as_label(name)} = {value:.4g}" for name, value in held.items())
+        ax.set_title(notes, fontsize="small", loc="left")
+
+    def _outline(self, ax, value, path, both, drawn):
+        """The cuts on the way to a leaf, each as long as the place that it cuts, and its value."""
+        low, high = self.model.minimum[both].copy(), self.model.maximum[both].copy()
+        room = _ROOM * (high - low)
+        nodes = self._tree.groups[0]
+        for node, is_above in path:
+            (cut, width), k = nodes.theta[:, node], int(nodes.inputs[node] == both[1])
+            if node not in drawn:
+                drawn.add(node)
+                along, reach = [low[1 - k], high[1 - k]], np.exp(width) * np.log(9.0)
+                line, fill = (ax.hlines, ax.fill_between) if k else (ax.vlines, ax.fill_betweenx)
+                line(cut, *along, color="white", linewidth=1.5)
+                fill(along, cut - reach, cut + reach, color="white", alpha=0.25, linewidth=0)
+            (low if is_above else high)[k] = cut
+        if (high - low > room).all():
+            box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "boxstyle": "round"}
+            middle, text = 0.5 * (low + high), number(value, _DIGITS)
+            ax.text(*middle, text, fontsize="small", ha="center", va="center", bbox=box)

@@ -1,0 +1,210 @@
+"""A tree against products of sigmoids along its paths, written out."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis.antecedent import RuleTableAntecedent, TreeAntecedent
+from skanfis.antecedent.tree import CRISP, LEAST_WIDTH
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+from skanfis.learning.premise import Premise
+from skanfis.membership import PRODUCTS
+
+from .. import oracles
+
+ROOT = TreeAntecedent.build([], np.empty((2, 0)), [[]])
+SIZES = pytest.mark.parametrize("n_rules", [1, 2, 5, 12])
+
+
+def tree(n_rules=6, seed=1, inputs=(0, 1, 2)):
+    return oracles.random_tree(np.random.default_rng(seed), n_rules, inputs)
+
+
+def sides(found, Z):
+    """How true it is that each node's input is above its cut, (n_nodes, n_rows)."""
+    nodes = found.groups[0]
+    z = (Z[nodes.inputs] - nodes.theta[0][:, None]) / np.exp(nodes.theta[1])[:, None]
+    return oracles.sigmoid(z)
+
+
+def by_paths(found, Z):
+    """Strengths as products down the paths."""
+    above = sides(found, Z)
+    return np.array(
+        [
+            np.prod(
+                [above[n] if up else 1.0 - above[n] for n, up in path] or [0 * Z[0] + 1], axis=0
+            )
+            for path in found.paths
+        ]
+    )
+
+
+@SIZES
+def test_strengths_are_products_along_the_paths(n_rules, rng):
+    Z = rng.normal(size=(3, 200))
+    found = tree(n_rules)
+    assert found.n_rules == n_rules
+    assert found.n_nodes == n_rules - 1
+    assert_allclose(found.strengths(Z), by_paths(found, Z), rtol=1e-9, atol=1e-14)
+
+
+@SIZES
+@pytest.mark.parametrize("scale", [1.0, 1e4])
+def test_strengths_sum_to_one_with_nothing_to_normalise(n_rules, scale, rng):
+    strengths = tree(n_rules).strengths(scale * rng.normal(size=(3, 2000)))
+    assert_allclose(strengths.sum(axis=0), 1.0, rtol=0, atol=2e-15)
+
+
+def test_a_split_leaves_the_other_leaves_as_they_are(rng):
+    Z, whole = rng.normal(size=(3, 100)), tree(5)
+    split = whole.split(2, 1, 0.4, np.log(0.3))
+    before, after = whole.strengths(Z), split.strengths(Z)
+    assert_array_equal(after[[0, 1, 4, 5]], before[[0, 1, 3, 4]])
+    above = oracles.sigmoid((Z[1] - 0.4) / 0.3)
+    assert_allclose(after[2], before[2] * above, rtol=1e-12)
+    assert_allclose(after[3], before[2] * (1.0 - above), rtol=1e-9)
+    assert split.paths[2] == [*whole.paths[2], (4, True)]
+    assert split.paths[3] == [*whole.paths[2], (4, False)]
+
+
+def test_a_node_moves_the_output_by_what_stands_above_and_below_it(rng):
+    # d yhat / d z_n = (1 - s_n) sum_above w_r f_r - s_n sum_below w_r f_r
+    Z, found = rng.normal(size=(3, 80)), tree(8)
+    f = rng.normal(size=(8, 80))
+    log_mu = found.log_memberships(Z)
+    truth = np.exp(log_mu[:7])
+    strengths, shares = found.normalise(log_mu)
+    by_term = found.term_sensitivity(strengths * f, (strengths * f).sum(axis=0), shares)
+    # log s and log (1 - s) move by 1 - s and by -s.
+    chained = (1.0 - truth) * by_term[:7] - truth * by_term[7:]
+    for n in range(7):
+        sums = [
+            sum((strengths[r] * f[r] for r, path in enumerate(found.paths) if (n, up) in path))
+            for up in (True, False)
+        ]
+        expected = (1.0 - truth[n]) * sums[0] - truth[n] * sums[1]
+        assert_allclose(chained[n], expected, rtol=1e-10, atol=1e-12)
+
+
+@pytest.mark.theory
+@pytest.mark.parametrize("agreement", [0.0, 0.05])
+@pytest.mark.parametrize(("order", "n_outputs"), [(1, 1), (0, 2)])
+def test_gradient_and_gauss_newton_by_cuts_and_widths(agreement, order, n_outputs):
+    g = np.random.default_rng(3)
+    rows = oracles.bumpy_rows(g, 250, 2, n_outputs, weighted=True)
+    start = tree(5, inputs=(0, 1))
+    penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-2)
+    problem = SeparableProblem(rows, start, order, penalty)
+    dense = oracles.DenseProblem(rows, start, order, penalty)
+    premise = Premise.of(start, *oracles.box(rows))
+    assert premise.size == 8
+    x = 0.2 * g.normal(size=premise.size)
+    evaluation = problem.evaluate(premise.parameters(x))
+    linearisation = problem.linearise(evaluation)
+    gradient, gauss_newton = premise.pull_back(
+        x, linearisation.gradient, linearisation.gauss_newton
+    )
+    slope = oracles.central_difference(lambda d: dense.cost(premise.parameters(d)), x, 1e-3)
+    assert_allclose(gradient, slope, rtol=0, atol=1e-8 * np.abs(slope).max())
+    jacobian = oracles.central_difference(premise.parameters, x, 1e-3)
+    expected = jacobian.T @ dense.gauss_newton(premise.parameters(x)) @ jacobian
+    assert_allclose(gauss_newton, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+
+
+def test_both_sides_of_a_cut_move_as_one(rng):
+    start = tree(6)
+    premise = Premise.of(start, np.full(3, -3.0), np.full(3, 3.0))
+    moved = start.with_parameters(premise.parameters(0.3 * rng.normal(size=premise.size)))
+    above, below = moved.groups
+    assert_array_equal(above.theta, below.theta)
+    assert (above.theta != start.groups[0].theta).all()
+
+
+def test_widths_have_a_floor_and_crisp_cuts_stay():
+    theta = np.array([[0.5, 0.0], np.log([0.5 / CRISP, 0.3])])
+    start = TreeAntecedent.build([0, 1], theta, [[(0, True)], [(0, False), (1, True)]])
+    premise = Premise.of(start, np.full(2, -1.0), np.ones(2))
+    lowest = start.with_parameters(premise.parameters(premise.lower)).groups[0].theta
+    highest = start.with_parameters(premise.parameters(premise.upper)).groups[0].theta
+    assert_array_equal(lowest[:, 0], theta[:, 0])
+    assert_array_equal(highest[:, 0], theta[:, 0])
+    assert np.exp(lowest[1, 1]) >= LEAST_WIDTH * (1.0 - 1e-12)
+    assert_allclose(lowest[0, 1], -1.3)  # a width beyond the data
+
+
+@pytest.mark.parametrize(("offset", "scale"), [(-40.0, 1.8), (1e6, 1e-3)])
+def test_change_of_units_moves_cuts_and_rows_together(offset, scale, rng):
+    Z, found = rng.normal(size=(3, 100)), tree(6)
+    moved = found.change_units(np.full(3, offset), np.full(3, scale))
+    assert isinstance(moved, TreeAntecedent)
+    assert_allclose(moved.strengths(offset + scale * Z), found.strengths(Z), atol=1e-6)
+
+
+@SIZES
+def test_a_walk_from_the_root_meets_every_place_once(n_rules, rng):
+    found, Z = tree(n_rules), rng.normal(size=(3, 50))
+    order, ends = found.walk
+    assert sorted(order.tolist()) == list(range(n_rules - 1))
+    come = np.zeros((2 * n_rules - 1, 50))
+    come[n_rules if n_rules > 1 else 0] = 1.0
+    above = sides(found, Z)
+    for k, (node, (up, down)) in enumerate(zip(order, ends, strict=True)):
+        come[up], come[down] = (
+            come[n_rules + k] * above[node],
+            come[n_rules + k] * (1 - above[node]),
+        )
+    assert_allclose(come[:n_rules], found.strengths(Z), rtol=1e-9, atol=1e-14)
+
+
+def test_without_some_leaves_the_others_are_a_table(rng):
+    Z, found = rng.normal(size=(3, 100)), tree(6)
+    left, terms = found.without_rules([1, 4])
+    assert type(left) is RuleTableAntecedent
+    before = found.strengths(Z)[[0, 2, 3, 5]]
+    assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-9)
+    assert terms.size == left.n_terms
+
+
+class TestOneTermEach:
+    """Sides of an input on one path as one term."""
+
+    @staticmethod
+    def two_cuts(first, second):
+        """Two cuts of input 1 on one path, and one of input 0."""
+        found = ROOT.split(0, 1, first, np.log(0.3)).split(0, 1, second, np.log(0.2))
+        return found.split(1, 0, 0.1, np.log(0.5))
+
+    @pytest.mark.parametrize("second", [1.5, -1.5])
+    def test_strengths_are_the_same(self, second, rng):
+        Z, found = 2.0 * rng.normal(size=(2, 500)), self.two_cuts(0.2, second)
+        table, made = found.with_one_term_each(["a", "b"])
+        assert type(table) is RuleTableAntecedent
+        assert_allclose(table.strengths(Z), found.strengths(Z), rtol=0, atol=1e-12)
+        inputs = table.term_inputs
+        for place in table.table.T:
+            assert np.unique(inputs[place[place >= 0]]).size == 1
+        assert len(made) == table.n_terms
+
+    def test_every_pair_of_directions_has_a_family(self):
+        found = set()
+        for second in (1.5, -1.5):
+            table, _ = self.two_cuts(0.2, second).with_one_term_each(["a", "b"])
+            found |= {group.family for group in table.groups}
+        below = ROOT.split(0, 0, 0.2, -1.0).split(1, 0, 1.5, -1.0)
+        found |= {g.family for g in below.with_one_term_each(["a"])[0].groups}
+        assert found >= set(PRODUCTS.values())
+
+    def test_three_cuts_of_an_input_on_one_path_are_refused_by_name(self):
+        found = self.two_cuts(0.2, 1.5).split(0, 1, 1.8, -1.0)
+        with pytest.raises(
+            ValueError, match=r"Rule 0 has 3 terms of 'rate' \(at 0\.2, 1\.5, 1\.8\)"
+        ):
+            found.with_one_term_each(["time", "rate"])
+
+    def test_terms_that_are_no_sides_are_refused(self):
+        table = oracles.random_table(np.random.default_rng(0))
+        twice = RuleTableAntecedent(table.groups, np.array([[0, 1], [2, 4]]))
+        with pytest.raises(ValueError, match="Rule 0 has 2 terms of 'a'"):
+            twice.with_one_term_each(["a", "b", "c"])

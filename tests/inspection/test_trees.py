@@ -1,0 +1,94 @@
+"""Pictures of a tree whose shape, values and shares are known."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from skanfis.inspection import TreeDisplay, export_text, rules_html
+
+from ..export.rule_bases import MODELS, a_tree, build
+from ..quick import quick
+
+plt = pytest.importorskip("matplotlib.pyplot")
+A_TREE = MODELS["tree, order 1, 2 outputs"]
+
+
+def texts(display):
+    """Every text by its place."""
+    return {text.get_text(): text.get_position() for text in display.ax_.texts}
+
+
+def test_leaves_stand_from_above_every_cut_to_below_it():
+    display = TreeDisplay.from_estimator(A_TREE, output="y1")
+    places = texts(display)
+    heights = [places[leaf][1] for leaf in display.leaves]
+    # split() puts what is above a cut before what is below.
+    assert heights == sorted(heights, reverse=True)
+    for r, path in enumerate(A_TREE.antecedent.paths):
+        assert int(places[display.leaves[r]][0]) == len(path)
+    assert sum("chip temperature" in text for text in places) == 2
+    assert display.figure_ is display.ax_.figure
+    assert "y1: typical value" in display.ax_.get_title(loc="left")
+
+
+def test_values_are_those_of_the_rules_where_their_rows_lie():
+    for k in (0, 1):
+        display = TreeDisplay(model=A_TREE, output=k)
+        away = A_TREE.support.center - A_TREE.reference
+        for r, value in enumerate(display.values):
+            constant, *slopes = A_TREE.coefficients[r, :, k]
+            assert_allclose(value, constant + away[r] @ slopes)
+    constants = build(a_tree(), 0, support=None)
+    assert_allclose(TreeDisplay(model=constants).values, constants.coefficients[:, 0, 0])
+    shares = [float(leaf.split("(")[1].split(" %")[0]) for leaf in TreeDisplay(model=A_TREE).leaves]
+    assert_allclose(shares, 100.0 * A_TREE.rule_weights, rtol=0.05)
+
+
+def test_branches_are_as_thick_as_the_rows_that_take_them():
+    lines = TreeDisplay.from_estimator(A_TREE).ax_.lines
+    assert len(lines) == 2 * A_TREE.antecedent.n_nodes
+    widths = np.array([line.get_linewidth() for line in lines])
+    # The first two come from the root, which all rows pass.
+    assert_allclose(widths[:2].sum(), 2 * 0.6 + 6.0)
+    assert_allclose(widths[0], 0.6 + 6.0 * A_TREE.rule_weights[:3].sum())
+
+
+def plane(rng, n_rows=300):
+    X = rng.uniform(-1.0, 1.0, (n_rows, 3))
+    y = np.where(X[:, 0] > 0.2, np.where(X[:, 2] > -0.3, 2.0, 1.0), -1.0)
+    return X, y + 0.01 * rng.normal(size=n_rows)
+
+
+def test_plane_has_the_cuts_and_the_values(rng):
+    X, y = plane(rng)
+    settings = {"premise_features": [0, 2], "order": 0, "max_rules": 3, "simplicity": 0}
+    model = quick(partition="tree", **settings).fit(X, y)
+    display = TreeDisplay.from_estimator(model, kind="plane", ax=plt.figure().add_subplot())
+    values = {round(float(text)) for text in texts(display)}
+    assert values == {-1, 1, 2}
+    for text, place in texts(display).items():
+        row = np.array([[place[0], 0.0, place[1]]])
+        assert abs(model.predict(row)[0] - float(text)) < 0.2
+    assert (display.ax_.get_xlabel(), display.ax_.get_ylabel()) == ("x0", "x2")
+    assert "x1 = " in display.ax_.get_title(loc="left")
+
+
+def test_what_cannot_be_drawn_is_refused(rng):
+    X, y = plane(rng)
+    with pytest.raises(ValueError, match="The 4 rules are no tree: there are no cuts to draw"):
+        TreeDisplay.from_estimator(quick(n_mfs=[2, 1, 2]).fit(X, y))
+    names = "'time', 'chip temperature', 'rate'"
+    with pytest.raises(ValueError, match=f"is of two inputs; this tree cuts {names}"):
+        TreeDisplay.from_estimator(A_TREE, kind="plane")
+    with pytest.raises(ValueError, match="kind"):
+        TreeDisplay.from_estimator(A_TREE, kind="forest")
+    with pytest.raises(ValueError, match="'y2' is no output"):
+        TreeDisplay.from_estimator(A_TREE, output="y2")
+
+
+def test_text_says_sides_with_the_length_over_which_they_turn():
+    text = export_text(A_TREE)
+    path = "IF time > 1000360 ± 530 and > 1000660 ± 260 AND chip temperature < 14 ± 26\n"
+    assert path in text
+    assert "    < 0.003 ± 0.0011: sigmoid_falling, center 0.003, width 0.0005\n" in text
+    assert "&lt; 14 ± 26" in rules_html(A_TREE)
