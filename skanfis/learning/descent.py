@@ -79,11 +79,14 @@ class NaturalPremise:
             np.repeat([p.kind for p in group.family.parameters], group.n_terms)
             for group in premise.antecedent.groups
         ]
-        self._is_log = np.concatenate(kinds) != "location"
+        # Of what is tied, one stands for all.
+        self._tied = premise.antecedent.tied
+        self._first = np.unique(self._tied, return_index=True)[1]
+        self._is_log = (np.concatenate(kinds) != "location")[self._first]
 
     def _natural(self, x):
         """n."""
-        parameters = self.premise.parameters(x)
+        parameters = self.premise.parameters(x)[self._first]
         return np.where(self._is_log, np.exp(parameters * self._is_log), parameters)
 
     def _by_parameters(self, x):
@@ -92,9 +95,9 @@ class NaturalPremise:
 
     def _jacobian(self, x):
         """dn / dx."""
-        identity = np.eye(x.size)
-        transposed, _ = self.premise.pull_back(x, identity, identity)
-        return self._by_parameters(x)[:, None] * transposed.T
+        every = np.eye(self._tied.size)
+        transposed, _ = self.premise.pull_back(x, every, every)
+        return self._by_parameters(x)[:, None] * transposed.T[self._first]
 
     def slope(self, x, by_parameters, stiffness):
         """Gradient of F + stiffness/2 |x|^2 by n, out of dF / d parameters.
@@ -102,7 +105,7 @@ class NaturalPremise:
         Also the largest entry of the gradient by x, projected on the box.
         """
         jacobian = self._jacobian(x)
-        gradient = by_parameters / self._by_parameters(x)
+        gradient = np.bincount(self._tied, by_parameters) / self._by_parameters(x)
         by_displacement = jacobian.T @ gradient + stiffness * x
         gradient += np.linalg.solve(jacobian.T, stiffness * x)
         inside = np.clip(x - by_displacement, self.premise.lower, self.premise.upper)
@@ -113,7 +116,7 @@ class NaturalPremise:
         # What would not be positive, a width or the distance of two terms, goes to its lower bound.
         natural = self._natural(x) + step
         logs = np.log(np.where(self._is_log, np.maximum(natural, np.finfo(float).tiny), 1.0))
-        moved = self.premise.displacement(np.where(self._is_log, logs, natural))
+        moved = self.premise.displacement(np.where(self._is_log, logs, natural)[self._tied])
         return np.clip(moved, self.premise.lower, self.premise.upper)
 
 

@@ -59,10 +59,11 @@ class Premise:
             lower[locations] = np.minimum((minimum[j] - raw[locations]) / widths - 1.0, 0.0)
             upper[locations] = np.maximum((maximum[j] - raw[locations]) / widths + 1.0, 0.0)
             first = np.array([term.widths[0] for term in own])
-            is_crisp = widths < antecedent.least_width
+            # What is as narrow as may be is so but for rounding; what is crisp is half of it.
+            is_crisp = widths < 0.75 * antecedent.least_width
             with np.errstate(divide="ignore"):
                 least = np.log(antecedent.least_width) - raw[first]
-            lower[first] = np.maximum(lower[first], least)
+            lower[first] = np.minimum(np.maximum(lower[first], least), 0.0)
             for still in (locations[is_crisp], first[is_crisp]):
                 lower[still] = upper[still] = 0.0
         tied = antecedent.tied

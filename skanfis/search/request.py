@@ -16,6 +16,7 @@ from ..learning.data import StandardisedData
 from ..learning.evidence import FREE
 from ..membership import Gaussian, Membership
 from ..model import TSKModel
+from ..naming import default_term_names
 from .candidates import KINDS
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
@@ -83,21 +84,19 @@ class StructureRequest:
         if self.is_searched:
             return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
         if isinstance(self.partition, TSKModel):
-            antecedent = imported_antecedent(self.partition, rows)
-            names = self.partition.term_names
+            model = self.partition
+            antecedent = imported_antecedent(model, rows)
+            default = default_term_names(model.antecedent, model.minimum, model.maximum)
+            # Names that say where terms stand are made anew when these have moved.
+            names = () if model.term_names == default else model.term_names
             return replace(self._tuned(antecedent, rows), term_names=names)
         return self._tuned(self._antecedent(rows), rows)
 
     def _kinds(self):
         """What is searched. A tree has sides of cuts, and no terms of a family that was given."""
-        has_family = any(family is not Gaussian for family in self.families)
-        if self.partition == "tree" and has_family:
-            raise ValueError(
-                "mf is of grids and scattered rules, and partition='tree' has sides of cuts, which "
-                "are sigmoids: leave mf at 'gaussian', or use another partition."
-            )
         if self.partition != "auto":
             return (self.partition,)
+        has_family = any(family is not Gaussian for family in self.families)
         return [kind for kind in KINDS if kind != "tree" or not has_family]
 
     def _plan(self, rows):
@@ -142,7 +141,7 @@ class StructureRequest:
         is_grid = isinstance(self.partition, str) and self.partition in ("auto", "grid")
         if isinstance(self.n_mfs, str) or is_grid:
             return
-        what = "the imported rules" if isinstance(self.partition, TSKModel) else "scattered rules"
+        what = "the imported rules" if isinstance(self.partition, TSKModel) else "other rules"
         raise ValueError(
             f"n_mfs={self.n_mfs!r} asks for a grid, partition={self.partition!r} for {what}: "
             "leave n_mfs at 'auto', or use partition='grid'."

@@ -91,7 +91,7 @@ def _width(column, own, cut):
     """At the start; of an input that has two values, next to nothing."""
     below, above = column[column < cut], column[column > cut]
     if np.ptp(below) == 0.0 == np.ptp(above):
-        return 0.5 * (above[0] - below[0]) / CRISP
+        return min(0.5 * (above[0] - below[0]) / CRISP, 0.5 * LEAST_WIDTH)
     center = np.average(column, weights=own)
     spread = np.sqrt(np.average((column - center) ** 2, weights=own))
     return max(_WIDTH * spread, LEAST_WIDTH)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent
+from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TreeAntecedent
 from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_EACH
 from ..learning.objective import SeparableProblem
@@ -107,10 +107,13 @@ def tuned_start(
 def _as_given(tuned: Tuned):
     """What there is to say of rules that were given."""
     problem = tuned.problem
-    n_rules, counts = problem.antecedent.n_rules, problem.antecedent.grid_counts
+    n_rules = problem.antecedent.n_rules
+    kind = "scattered" if problem.antecedent.grid_counts is None else "grid"
+    if isinstance(problem.antecedent, TreeAntecedent):
+        kind = "tree"
     return {
         "structure": f"{n_rules} rules as given",
-        "kind": "scattered" if counts is None else "grid",
+        "kind": kind,
         "rules": n_rules,
         "n_mfs": None,
         "reading_cost": cost_of(tuned),
