@@ -24,4 +24,5 @@ def test_terms_values_and_slopes_are_counted_as_they_are_written(model):
             alone = re.sub(rf"\({NAME} [-+] {NUMERAL}\)", "", conclusion)
             counted += len(re.findall(NUMERAL, re.sub(NAME, "", alone)))
     _, n_basis, n_outputs = model.coefficients.shape
-    assert reading_cost(model.antecedent, n_basis - 1, n_outputs) == counted
+    n_slopes = model.n_rules * (n_basis - 1)
+    assert reading_cost(model.antecedent, n_slopes, n_outputs) == counted

@@ -19,6 +19,7 @@ from .evidence import Laplace
 # What a slope of its own must be worth of the evidence, in -2 log p: as much as a parameter costs
 # by Akaike's criterion.
 _WORTH = 2.0
+_TINY = np.finfo(float).tiny
 
 
 def common_slopes(posterior: Laplace, coefficients):
@@ -71,9 +72,11 @@ def _given(state, contrasts):
 
 
 def _farthest(state, slopes):
-    """The rule whose slope is farthest from the mean of the others, in its deviations."""
+    """The rule whose slope is farthest from the mean of the others, in deviations."""
     mean, after, _ = state
-    values, variances = slopes @ mean, np.einsum("ri,ij,rj->r", slopes, after, slopes)
-    weights = 1.0 / np.maximum(variances, np.finfo(float).tiny)
-    center = np.average(values, axis=0, weights=weights)
-    return int(np.argmax(np.sum((values - center) ** 2, axis=1) * weights))
+    values = slopes @ mean
+    weights = 1.0 / np.maximum(np.einsum("ri,ij,rj->r", slopes, after, slopes), _TINY)
+    others = weights.sum() - weights
+    centers = (weights @ values - weights[:, None] * values) / others[:, None]
+    squares = np.sum((values - centers) ** 2, axis=1)
+    return int(np.argmax(squares / (1.0 / weights + 1.0 / others)))

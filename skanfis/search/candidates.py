@@ -34,6 +34,7 @@ class Candidate:
     counts: tuple[int, ...]
     n_clusters: int = 0  # of scattered rules
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
+    has_common_slopes: bool = False  # where the evidence asks for no more
 
     @property
     def kind(self):
@@ -62,9 +63,11 @@ class Candidate:
         """In words."""
         if self.n_rules == 1:
             return "one rule"
-        if self.is_grid:
-            return f"grid {list(self.counts)}"
-        return f"tree of {self.n_rules} rules" if self.splits else f"{self.n_rules} scattered rules"
+        words = f"grid {list(self.counts)}"
+        if not self.is_grid:
+            words = "tree of {} rules" if self.splits else "{} scattered rules"
+        common = ", slopes in common" if self.has_common_slopes else ""
+        return words.format(self.n_rules) + common
 
     def with_more_terms(self, j):
         """The grid with one more term on an input."""

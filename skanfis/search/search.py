@@ -6,6 +6,7 @@ falls, and a step further: a product of two inputs needs terms on both before an
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -68,10 +69,11 @@ class StructureSearch:
             ]
             if candidate is None or None in in_folds:
                 return
-            self.judged.append(self._judge(candidate, in_folds))
+            now = self._judge(candidate, in_folds)
+            self.judged += [now, self._judge(*_with_common_slopes(candidate, in_folds))]
             n_further += 1
-            if self.judges.prefer(self.judged[-1], best):
-                best, n_further = self.judged[-1], 0
+            if self.judges.prefer(now, best):
+                best, n_further = now, 0
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""
@@ -111,3 +113,9 @@ class StructureSearch:
             }
             for one in sorted(self.judged, key=lambda one: one.squared_error)
         ]
+
+
+def _with_common_slopes(candidate, in_folds):
+    """The same, of which the rules have slopes in common."""
+    of_folds = [replace(one, has_common_slopes=True) for one in in_folds]
+    return replace(candidate, has_common_slopes=True), of_folds

@@ -96,11 +96,13 @@ def tuned_start(
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_free = freed, True
-    best = with_common_slopes(best, free)
     left, error = 1.0, best.expected_error
     if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))
-        left = tolerated(error, variance, simplicity) / error
+        most = tolerated(error, variance, simplicity)
+        simpler = with_common_slopes(best, free)
+        best = simpler if simpler.expected_error <= most else best
+        left = most / best.expected_error
     return started(best, replace(plan, free=free), left, [_as_given(best)], is_free)
 
 

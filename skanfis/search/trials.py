@@ -163,9 +163,12 @@ class Trials:
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
         if candidate not in self._found:
-            begun = self._begun[candidate]
-            found = self._train(candidate, begun=begun)
-            self._found[candidate] = with_common_slopes(found, self.plan.free)
+            if candidate.has_common_slopes:
+                trained = self.tuned(replace(candidate, has_common_slopes=False))
+                found = with_common_slopes(trained, self.plan.free)
+            else:
+                found = self._train(candidate, begun=self._begun[candidate])
+            self._found[candidate] = found
         return self._found[candidate]
 
     def expected(self, tuned: Tuned) -> float:

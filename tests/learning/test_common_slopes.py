@@ -1,0 +1,134 @@
+"""Slopes that rules have in common: against the marginal likelihood, planted ones, and the text."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy import stats
+
+from skanfis import ANFISRegressor
+from skanfis.antecedent import TreeAntecedent
+from skanfis.learning.common_slopes import _given, _loss, common_slopes
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.evidence import laplace
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.penalty import Penalty
+
+pytestmark = pytest.mark.theory
+
+STUMP = TreeAntecedent.build([], [[], []], [[]]).split(0, 0, 0.1, -0.5)
+TREE = STUMP.split(0, 2, 0.3, -0.7)
+PENALTY = Penalty(agreement=1e-4, alpha=1e-4, slope=1e-4)
+
+
+def planted(rng, n_rows=600, noise=0.1):
+    """By the second input all rules rise alike; by the first, the last rule does otherwise."""
+    X = rng.uniform(-1.7, 1.7, (n_rows, 3))
+    slopes = np.array([[1.0, 0.7, 0.5], [1.0, 0.7, -1.0], [-1.0, 0.7, 2.0]])
+    values = np.array([0.0, 1.0, -1.0]) + X @ slopes.T
+    y = np.sum(TREE.strengths(X.T).T * values, axis=1)
+    return X, y + noise * rng.standard_normal(n_rows)
+
+
+def posterior_of(X, y, antecedent=TREE, penalty=PENALTY):
+    rows = StandardisedData.of(X, y.reshape(len(X), -1))
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    evaluation = problem.evaluate(antecedent.parameters)
+    posterior = laplace(
+        evaluation.normal,
+        problem.common_line,
+        evaluation.mean_squared_error,
+        penalty,
+        float(len(X)),
+        antecedent.n_rules,
+    )
+    return problem, evaluation, posterior
+
+
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_what_it_takes_from_the_evidence_is_that_of_the_marginal_likelihood(rng, n_outputs):
+    X = rng.uniform(-1.7, 1.7, (40, 3))
+    y = np.column_stack([np.sin(X[:, 0]) + X[:, 1], X[:, 2]])[:, :n_outputs]
+    problem, evaluation, posterior = posterior_of(X, y + 0.1 * rng.normal(size=y.shape))
+    line, n = problem.common_line, 40
+    noise = posterior.noise_variance
+    prior = evaluation.normal.penalty + 1e-3 * np.outer(line.height, line.height)
+    # Phi in local coordinates.
+    rows = StandardisedData.of(X, y)
+    Z = np.concatenate([rows.read(part)[0] for chunk in rows.chunks(40) for part in chunk], axis=1)
+    design = (TREE.strengths(Z)[:, None] * np.vstack([np.ones(n), Z])).reshape(12, n)
+    design = problem.local.transform_rows(design).T
+    target = np.concatenate([rows.read(p)[1] for c in rows.chunks(40) for p in c], axis=1)
+
+    def minus_twice_log(of_prior):
+        covariance = noise * np.eye(n) + design @ of_prior @ design.T
+        return -2.0 * stats.multivariate_normal(cov=covariance).logpdf(target).sum()
+
+    before = noise / n * np.linalg.inv(prior)
+    after = noise / n * np.linalg.inv(design.T @ design / n + prior)
+    state = [after @ design.T @ target.T / noise, after, before]
+    for j, rules in ((1, [0, 1, 2]), (0, [0, 2])):
+        contrasts = line.contrasts(j, np.array(rules))
+        across = before @ contrasts.T
+        given = before - across @ np.linalg.solve(contrasts @ across, across.T)
+        expected = minus_twice_log(given) - minus_twice_log(before)
+        assert_allclose(_loss(state, contrasts), expected, rtol=1e-6)
+        # What is left is conditioned on it.
+        before, state = given, _given(state, contrasts)
+        assert_allclose(contrasts @ state[0], 0.0, atol=1e-10)
+
+
+def test_planted_slopes_are_found(rng):
+    _, evaluation, posterior = posterior_of(*planted(rng))
+    found = dict(common_slopes(posterior, evaluation.normal.coefficients))
+    assert found == {0: (0, 1), 1: (0, 1, 2)}
+
+
+def test_contrasts_are_of_slopes_by_unit_of_the_input(rng):
+    problem, _, _ = posterior_of(*planted(rng, 200))
+    coefficients = rng.normal(size=(3, 4))
+    coefficients[:, 2] = 0.3
+    local = problem.local.to_local(coefficients.reshape(-1, 1))
+    every = np.arange(3)
+    assert_allclose(problem.common_line.contrasts(1, every) @ local, 0.0, atol=1e-12)
+    slopes = (problem.common_line.of_slopes(0, every) @ local)[:, 0]
+    assert_allclose(slopes / slopes[0], coefficients[:, 1] / coefficients[0, 1])
+
+
+def test_held_slopes_are_one_and_count_as_one(rng):
+    X, y = planted(rng)
+    free = posterior_of(X, y)[2]
+    held = replace(PENALTY, common=((0, (0, 1)), (1, (0, 1, 2))))
+    _, evaluation, posterior = posterior_of(X, y, penalty=held)
+    slopes = evaluation.coefficients.reshape(3, 4)
+    assert np.ptp(slopes[:, 2]) < 1e-5 * np.abs(slopes[:, 2]).max()
+    assert abs(slopes[0, 1] - slopes[1, 1]) < 1e-5
+    # Three of twelve less, but for what the penalty held of them already.
+    assert 2.5 < free.n_effective - posterior.n_effective <= 3.0
+
+
+class TestFit:
+    def model(self, rng, **settings):
+        X, y = planted(rng)
+        return ANFISRegressor(partition="tree", **settings).fit(X, y)
+
+    def test_the_model_that_is_kept_has_them(self, rng):
+        model = self.model(rng)
+        common = model.model_.common_slopes
+        assert common[:, 1].sum() == model.n_rules_ > 1
+        own = model.consequents_[:, 2]
+        assert_array_equal(own, own[0])
+        costs = [one["reading_cost"] for one in model.structures_ if one["chosen"]]
+        assert costs == [model.readability_.reading_cost]
+
+    def test_a_weight_that_is_given_leaves_every_rule_its_slopes(self, rng):
+        assert not self.model(rng, alpha=1e-3).model_.common_slopes.any()
+
+    def test_partial_fit_keeps_them(self, rng):
+        X, y = planted(rng)
+        model = ANFISRegressor(partition="tree").partial_fit(X[:500], y[:500])
+        before, common = model.predict(X), model.model_.common_slopes
+        model.partial_fit(X[500:], y[500:])
+        assert_array_equal(model.model_.common_slopes, common)
+        assert_allclose(model.predict(X), before, atol=0.05)
