@@ -68,16 +68,20 @@ def in_user_units(coefficients, inputs, targets, slopes, order):
     return found
 
 
-def with_common_slopes(coefficients, masses, common, inputs):
-    """Coefficients on [1, z] in which slopes that are common are one, their mean, to the last bit.
+def with_common_slopes(coefficients, masses, penalty, inputs):
+    """Coefficients on [1, z] whose slopes are common, or zero, to the last bit.
 
-    ``common`` are inputs and rules, as ``Penalty.common``; ``inputs`` those of the slopes.
+    ``penalty`` says which; ``inputs`` are those of the slopes.
     """
+    if not (penalty.common or penalty.zero):
+        return coefficients
     found = coefficients.reshape(masses.size, 1 + len(inputs), -1).copy()
     place = {int(j): 1 + k for k, j in enumerate(inputs)}
-    for j, rules in common:
+    for j, rules in penalty.common:
         own = list(rules), place[j]
         found[own] = np.average(found[own], axis=0, weights=masses[own[0]])
+    for j, rules in penalty.zero:
+        found[list(rules), place[j]] = 0.0
     return found.reshape(coefficients.shape)
 
 
@@ -155,9 +159,19 @@ class NormalFactor:
     soon as two rules are alike, which is an everyday case here. ``shift`` times the identity is
     added, at the level of rounding (p eps max diag G): a singular matrix then has a solution too,
     and it is of small norm.
+
+    Parameters
+    ----------
+    matrix : ndarray of shape (n, n)
+        G + P.
+    free : ndarray of shape (n, n_free), optional
+        Orthonormal columns E: solutions are E v, and L that of E' (G + P) E.
     """
 
-    def __init__(self, matrix):
+    def __init__(self, matrix, free=None):
+        self._n, self._free = matrix.shape[0], free
+        if free is not None:
+            matrix = free.T @ matrix @ free
         floor = matrix.shape[0] * _EPS * np.diagonal(matrix).max(initial=0.0)
         self.shift = max(floor, _TINY)
         shifted = matrix.copy()
@@ -177,15 +191,20 @@ class NormalFactor:
     def solve(self, right_side):
         """(G + P)^-1 times right_side."""
         # LAPACK itself: around it, scipy.linalg takes longer than what is solved mostly does.
-        return linalg.lapack.dpotrs(self._lower, right_side, lower=1)[0]
+        found = linalg.lapack.dpotrs(self._lower, self._within(right_side), lower=1)[0]
+        return found if self._free is None else self._free @ found
+
+    def _within(self, columns):
+        return columns if self._free is None else self._free.T @ columns
 
     def half_solve(self, right_side):
         """L^-1 times right_side, so that (.)' (.) is the quadratic form of the inverse."""
-        return linalg.lapack.dtrtrs(self._lower, right_side, lower=1)[0]
+        return linalg.lapack.dtrtrs(self._lower, self._within(right_side), lower=1)[0]
 
     def back_solve(self, right_side):
         """L'^-1 times right_side."""
-        return linalg.lapack.dtrtrs(self._lower, right_side, lower=1, trans=1)[0]
+        found = linalg.lapack.dtrtrs(self._lower, right_side, lower=1, trans=1)[0]
+        return found if self._free is None else self._free @ found
 
     def log_determinant(self):
         """log |G + P|."""
@@ -194,7 +213,8 @@ class NormalFactor:
     @cached_property
     def root(self):
         """L^-1, whose product with many columns is quicker than solving for them."""
-        return np.ascontiguousarray(linalg.lapack.dtrtri(self._lower, lower=1)[0])
+        found = np.ascontiguousarray(linalg.lapack.dtrtri(self._lower, lower=1)[0])
+        return found if self._free is None else found @ self._free.T
 
     def trace(self, matrix):
         """Tr (G + P)^-1 A of a symmetric A; of a large one an estimate (Hutchinson 1990)."""
@@ -214,6 +234,6 @@ class NormalFactor:
     @cached_property
     def _probes(self):
         """Random signs, and what solves them."""
-        n = self._lower.shape[0]
+        n = self._n
         signs = np.random.default_rng(n).choice([-1.0, 1.0], size=(n, _PROBES))
         return signs, self.solve(signs)

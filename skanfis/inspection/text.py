@@ -24,6 +24,7 @@ from .rules import (
 
 # More than these give back no other double.
 _MOST_DIGITS = 17
+_IN_PLACE = "It is added to what a rule says; a slope that a rule states stands in its place."
 
 
 def export_text(
@@ -100,7 +101,9 @@ def export_text(
     chosen = weightiest(frame, max_shown)
     consequents, common = _consequent_texts(model, frame, reference, precision)
     parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
-    parts += [f"Every rule adds, to {name}: {text}" for name, text in common.items()]
+    parts += [f"Common to the rules, {name}: {text}" for name, text in common.items()]
+    if common:
+        parts[-1] += f"\n{_IN_PLACE}"
     for r, premise in zip(chosen.index, premise_texts(chosen), strict=True):
         heading = f"Rule {r}"
         if has_training_data(model):
@@ -168,7 +171,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = 4) -> st
     counts = f"<b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}"
     parts = [f"<div>{counts}</div>", table]
     parts += [
-        f"<div>every rule adds, to {escape(name)}: {escape(text)}</div>"
+        f"<div>common to the rules, {escape(name)}: {escape(text)}. {_IN_PLACE}</div>"
         for name, text in common.items()
     ]
     if len(chosen) < model.n_rules:
@@ -189,7 +192,9 @@ def _consequent_texts(model, frame, reference, precision):
         # Slopes that move the output by less than the last digit written.
         change = np.abs(values[:, 1:]) * (model.maximum - model.minimum)
         scale = max(np.abs(values[:, 0]).max(), change.max(initial=0.0))
-        values[:, 1:][change < 10.0 ** -(precision + 2) * scale] = 0.0
+        # But not where others have one in common: it would be taken for theirs.
+        is_small = (change < 10.0 ** -(precision + 2) * scale) & ~is_common.any(axis=0)[1:]
+        values[:, 1:][is_small] = 0.0
         line = np.where(is_common.any(axis=0), values[first], 0.0)
         if line.any():
             common[output] = _formula(line, model.input_names, reference, precision)

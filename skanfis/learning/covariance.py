@@ -47,10 +47,10 @@ def posterior_of(
     normal = evaluation.normal
     assert normal is not None
     half = np.ascontiguousarray(normal.factor.half_solve(np.eye(n_columns)))
-    n_effective = n_columns - float(np.sum(half * (half @ normal.penalty)))
+    n_effective = len(half) - float(np.sum(half * (half @ normal.penalty)))
     noise = np.sqrt(_mean_squares(problem, evaluation, robust))
     premises = np.zeros((0, n_parameters))
-    cross = np.zeros((problem.n_outputs, 0, n_columns))
+    cross = np.zeros((problem.n_outputs, 0, len(half)))
     n_varying = max(int(np.count_nonzero(~rows.targets.is_constant)), 1)
     n_determined = 0.0
     if premise is not None and premise.size:
@@ -60,17 +60,30 @@ def posterior_of(
     shared = np.sqrt(np.sum(noise**2) / n_varying)
     # L^-1 T' is the factor of consequents on [1, z], T the local basis.
     local = problem.local
-    blocks = half.reshape(n_columns, -1, problem.n_basis)
+    blocks = half.reshape(len(half), -1, problem.n_basis)
     blocks[:, :, 1:] /= local.spread
     blocks[:, :, 0] -= np.einsum("crj,rj->cr", blocks[:, :, 1:], local.center)
     blocks[:, :, 1:] /= rows.inputs.scale[problem.consequent_inputs]
     half /= np.sqrt(n_rows)
+    if len(half) < n_columns:
+        half, cross = _squared(half, cross)
     premises = (
         premises * (shared / np.sqrt(n_rows)) * parameter_units(antecedent, rows.inputs.scale)
     )
     scale = rows.targets.scale
     cross = cross * (shared * scale)[:, None, None]
     return Posterior(noise * scale, problem.consequent_inputs, half, premises, cross)
+
+
+def _squared(half, cross):
+    """A lower triangle whose square is that of a half of fewer rows, and the cross terms by it."""
+    n_free, n_columns = half.shape
+    turned, upper = np.linalg.qr(half[:, ::-1])
+    triangle = np.zeros((n_columns, n_columns))
+    triangle[-n_free:] = upper[::-1, ::-1]
+    found = np.zeros((*cross.shape[:2], n_columns))
+    found[:, :, -n_free:] = (cross @ turned)[:, :, ::-1]
+    return triangle, found
 
 
 def _mean_squares(problem, evaluation, robust):

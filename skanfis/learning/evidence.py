@@ -223,10 +223,11 @@ def laplace(
     # Of one constant there is no penalty at all: any size will do.
     size = np.trace(matrix) / matrix.shape[0] or 1.0
     # ``matrix`` takes on the factor's shift.
-    own, _, error = normal.with_penalty(matrix, mean_squared_error)
+    free = line.free(penalty)
+    own, _, error = normal.with_penalty(matrix, mean_squared_error, free)
     factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
-    prior = NormalFactor(matrix + size * np.outer(line.height, line.height))
+    prior = NormalFactor(matrix + size * np.outer(line.height, line.height), free)
     has_premises = curvature is not None and curvature.size
     paid = line.weights(penalty).copy()
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)

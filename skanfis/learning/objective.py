@@ -93,20 +93,26 @@ class NormalEquations:
     penalty: np.ndarray  # P
     factor: NormalFactor  # of Phi' S Phi / W + P
     coefficients: np.ndarray  # local, (n_columns, n_outputs)
+    free: np.ndarray | None = None  # what these are made of, see ``CommonLine.free``
 
-    def with_penalty(self, penalty, error):
+    def with_penalty(self, penalty, error, free=None):
         """The same with another penalty, which takes on the factor's shift; no pass over the rows.
 
         And the change of the coefficients, and the mean squared error, which is ``error`` here.
         """
-        factor = NormalFactor(self.gram + penalty)
+        factor = NormalFactor(self.gram + penalty, free)
         penalty.flat[:: penalty.shape[0] + 1] += factor.shift
         # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 and u_0 those of here.
         slope = self.penalty @ self.coefficients
-        change = factor.solve(slope - penalty @ self.coefficients)
+        if free is self.free:
+            change = factor.solve(slope - penalty @ self.coefficients)
+        else:
+            # From coefficients that were free to be anything.
+            assert self.free is None
+            change = factor.solve(self.gram @ self.coefficients + slope) - self.coefficients
         error += float(np.vdot(change, self.gram @ change - 2.0 * slope))
         solved = self.coefficients + change
-        normal = replace(self, penalty=penalty, factor=factor, coefficients=solved)
+        normal = replace(self, penalty=penalty, factor=factor, coefficients=solved, free=free)
         return normal, change, max(error, 0.0)
 
 
@@ -264,7 +270,8 @@ class SeparableProblem:
         masses = rule_masses(gram, antecedent.n_rules)
         disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
         penalty = self.penalty_matrix(disagreement)
-        factor = NormalFactor(gram + penalty)
+        free = self._common_line.free(self.penalty)
+        factor = NormalFactor(gram + penalty, free)
         penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
         pull = penalty @ reference_local
@@ -278,14 +285,16 @@ class SeparableProblem:
             reference + self.local.to_global(change),
             masses,
             max(2.0 * cost - float(np.vdot(solved, penalty @ solved)), 0.0),
-            NormalEquations(gram, disagreement, penalty, factor, solved),
+            NormalEquations(gram, disagreement, penalty, factor, solved, free),
         )
 
     def solved_again(self, evaluation):
         """An evaluation of the same rows under this penalty; no pass over them."""
         before = evaluation.normal
         normal, change, error = before.with_penalty(
-            self.penalty_matrix(before.disagreement), evaluation.mean_squared_error
+            self.penalty_matrix(before.disagreement),
+            evaluation.mean_squared_error,
+            self._common_line.free(self.penalty),
         )
         paid = float(np.vdot(normal.coefficients, normal.penalty @ normal.coefficients))
         return replace(

@@ -44,8 +44,6 @@ from .departures import Departures
 
 # What comes first in a row of weights; after these, those on all slopes and on all components.
 WEIGHTS = ("agreement", "stiffness")
-# On what slopes that are common differ by: what is left of it is beyond what anyone reads.
-_HELD = 1e6
 # Penalties whose weights are kept.
 _MOST_KNOWN = 8
 
@@ -62,13 +60,15 @@ class Penalty:
     # where there is none. Those of some rows hold for others, where other inputs are constant.
     pulls: dict[tuple[int, ...], float] = field(default_factory=dict)
     slope_pulls: dict[int, float] = field(default_factory=dict)
-    # Inputs, and the rules that have one slope by each.
+    # Inputs, and the rules that have one slope by each; and those that have none.
     common: tuple[tuple[int, tuple[int, ...]], ...] = ()
+    zero: tuple[tuple[int, tuple[int, ...]], ...] = ()
 
     @property
     def n_held(self):
         """How many coefficients less there are: of every common slope, one is left."""
-        return sum(len(rules) - 1 for _, rules in self.common)
+        n_zero = sum(len(rules) for _, rules in self.zero)
+        return n_zero + sum(len(rules) - 1 for _, rules in self.common)
 
     @property
     def rho(self):
@@ -169,6 +169,7 @@ class CommonLine:
         # Slopes per unit of z out of local ones, in units of a typical extent; where each stands.
         self._per_unit = extent.mean(axis=0) / local.spread
         self._function = {j: k for k, j in enumerate(slopes) if j is not None}
+        self._free: dict[tuple, np.ndarray] = {}
         self._known: dict[int, tuple[Penalty, np.ndarray]] = {}
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
@@ -187,13 +188,30 @@ class CommonLine:
         else:
             rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
             matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
-        for j, rules in penalty.common:
-            contrasts = self.contrasts(j, np.array(rules))
-            matrix += _HELD * contrasts.T @ contrasts
         if self._to_none.size:
             # What is constant has no slope to learn, but one that is held.
             matrix += penalty.rho * self._to_none.T @ self._to_none
         return matrix
+
+    def free(self, penalty: Penalty):
+        """Orthonormal columns that u is made of, (n_columns, n_free); None where it is any."""
+        if not (penalty.common or penalty.zero):
+            return None
+        key = penalty.common, penalty.zero
+        if key not in self._free:
+            is_free, shared = np.ones(self.height.size, dtype=bool), []
+            for j, rules in (*penalty.common, *penalty.zero):
+                own = np.array(rules) * self._n_basis + 1 + self._function[j]
+                is_free[own] = False
+                # Slopes per unit of z are one: local ones are as the units.
+                column = np.zeros(self.height.size)
+                column[own] = 1.0 / self._per_unit[list(rules), self._function[j]]
+                shared.append(column / np.linalg.norm(column))
+            columns = np.array(shared[: len(penalty.common)]).reshape(-1, self.height.size)
+            self._free[key] = np.ascontiguousarray(
+                np.concatenate([np.eye(self.height.size)[is_free], columns]).T
+            )
+        return self._free[key]
 
     def of_slopes(self, j, rules):
         """Slopes by an input of some rules out of u, per unit of z times a typical extent."""
@@ -203,8 +221,8 @@ class CommonLine:
         return found
 
     def contrasts(self, j, rules):
-        """What they differ by, in orthonormal contrasts."""
-        return linalg.helmert(rules.size) @ self.of_slopes(j, rules)
+        """What they differ by, in orthonormal contrasts; of one rule, nothing."""
+        return linalg.helmert(rules.size, full=True)[1:] @ self.of_slopes(j, rules)
 
     def weights(self, penalty: Penalty):
         """All weights of a penalty, in a row; not to be changed."""

@@ -34,7 +34,7 @@ class Candidate:
     counts: tuple[int, ...]
     n_clusters: int = 0  # of scattered rules
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
-    has_common_slopes: bool = False  # where the evidence asks for no more
+    has_common_slopes: bool = False  # or none, where the evidence asks for no more
 
     @property
     def kind(self):
@@ -61,13 +61,11 @@ class Candidate:
 
     def describe(self):
         """In words."""
-        if self.n_rules == 1:
-            return "one rule"
         words = f"grid {list(self.counts)}"
         if not self.is_grid:
             words = "tree of {} rules" if self.splits else "{} scattered rules"
-        common = ", slopes in common" if self.has_common_slopes else ""
-        return words.format(self.n_rules) + common
+        words = "one rule" if self.n_rules == 1 else words.format(self.n_rules)
+        return words + (", fewer slopes" if self.has_common_slopes else "")
 
     def with_more_terms(self, j):
         """The grid with one more term on an input."""

@@ -47,8 +47,9 @@ class StructureSearch:
 
     def run(self, kinds: Sequence[str] = KINDS) -> Start:
         """A start from the structure that is chosen."""
-        one_rule = self._judge(self.trials.one_rule, [self.trials.one_rule] * len(self.folds))
-        self.judged.append(one_rule)
+        line = self.trials.one_rule, [self.trials.one_rule] * len(self.folds)
+        one_rule = self._judge(*line)
+        self.judged += [one_rule, self._judge(*_with_common_slopes(*line))]
         for kind in kinds:
             self._grow(kind, one_rule)
         best = best_of(self.judged, self.judges)

@@ -256,11 +256,9 @@ def _improved(
 
 def cost_of(tuned: Tuned) -> int:
     """To read the rules."""
-    problem, common = tuned.problem, tuned.penalty.common
-    antecedent = problem.antecedent
-    n_common = sum(len(rules) for _, rules in common)
-    n_own = antecedent.n_rules * (problem.n_basis - 1) - n_common
-    return reading_cost(antecedent, n_own + len(common), problem.n_outputs)
+    problem, n_rules = tuned.problem, tuned.problem.antecedent.n_rules
+    n_slopes = n_rules * len(problem.common_line.slopes) - tuned.penalty.n_held
+    return reading_cost(problem.antecedent, n_slopes, problem.n_outputs)
 
 
 def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, left: float) -> Tuned:
@@ -287,12 +285,12 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
 
 
 def with_common_slopes(tuned: Tuned, free) -> Tuned:
-    """The same with one slope for as many rules as the evidence allows, by every input."""
+    """The same with one slope for as many rules as the evidence allows, or none, by every input."""
     problem = tuned.problem
-    if not tuned.displacement.size or "alpha" not in free or problem.n_columns > MOST_COLUMNS:
+    if not {"alpha", "slope"} <= {*free} or problem.n_columns > MOST_COLUMNS:
         return tuned
-    found = common_slopes(tuned.posterior, tuned.solved.normal.coefficients)
-    penalty = replace(tuned.penalty, common=found)
+    common, zero = common_slopes(tuned.posterior, tuned.solved.normal.coefficients)
+    penalty = replace(tuned.penalty, common=common, zero=zero)
     again = problem.with_penalty(penalty)
     n_rows, n_rules = tuned.posterior.n_rows, problem.antecedent.n_rules
     posterior = laplace(

@@ -383,8 +383,15 @@ def solve(sums: RowSums, given, first=None) -> Solved:
             found["slope_pulls"] = dict(first["slope_pulls"])
         given = found | given
     free = [key for key in _FREE if key not in given]
-    first_penalty = replace(FIRST_PENALTY, common=_common(sums.base))
-    problem = _ProblemOfSums(sums, replace(first_penalty, **given, stiffness=0.0))
+    # Slopes that rules have in common stay so, and so do those that are zero.
+    common, zero = (
+        tuple(
+            (j, tuple(np.flatnonzero(own).tolist())) for j, own in enumerate(where.T) if own.any()
+        )
+        for where in (sums.base.common_slopes, sums.base.zero_slopes)
+    )
+    start = replace(FIRST_PENALTY, **given, stiffness=0.0, common=common, zero=zero)
+    problem = _ProblemOfSums(sums, start)
     if free:
         premise = Premise(antecedent, none, none, none, none.astype(int), ())
         tuned = tune(problem, premise, free, sums.effective_weight, turns=0, first_steps=ARRIVING)
@@ -400,23 +407,13 @@ def solve(sums: RowSums, given, first=None) -> Solved:
     )
 
 
-def _common(model):
-    """The slopes that rules of a model have in common, as ``Penalty.common``."""
-    return tuple(
-        (j, tuple(np.flatnonzero(rules).tolist()))
-        for j, rules in enumerate(model.common_slopes.T)
-        if rules.any()
-    )
-
-
 def _model(sums, problem, evaluation):
     """The model in the user's units."""
     inputs, targets, slopes = sums.inputs, sums.targets, sums.consequent_inputs
     order = 1 if slopes.size else 0
-    common, masses = problem.penalty.common, evaluation.masses
-    coefficients = evaluation.coefficients
-    if common:
-        coefficients = with_common_slopes(coefficients, masses, common, slopes)
+    coefficients = with_common_slopes(
+        evaluation.coefficients, evaluation.masses, problem.penalty, slopes
+    )
     return replace(
         sums.base,
         coefficients=in_user_units(coefficients, inputs, targets, slopes, order),

@@ -68,11 +68,12 @@ class ModelBuilder:
         rows, trained = self.rows, evaluation.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
         firing = self.firing(evaluation) if firing is None else firing
-        slopes, masses = self.request.consequent_inputs, evaluation.masses
-        coefficients = evaluation.coefficients
-        if start.penalty.common:
-            common = start.penalty.common
-            coefficients = with_common_slopes(coefficients, masses, common, slopes)
+        coefficients = with_common_slopes(
+            evaluation.coefficients,
+            evaluation.masses,
+            start.penalty,
+            self.request.consequent_inputs,
+        )
         support = rule_support(rows, trained, self.n_coefficients, firing)
         model = TSKModel(
             antecedent=trained.change_units(offset, scale),
