@@ -109,9 +109,6 @@ def draw(blocks, known, n_draws, rng):
 class ProductAnova:
     """Of one output of rules whose strengths are products; ``known`` has the blocks' moments."""
 
-    # A share, as far as it counts.
-    accuracy = 1e-3
-
     def __init__(self, model, output, blocks, known):
         self.n_rules, self.blocks = model.n_rules, blocks
         self.antecedent, self.scale = _standardised(model)
@@ -168,10 +165,9 @@ class ProductAnova:
         """E[y | x_v] at rows X in the box, less the mean, (n_subsets, n_rows)."""
         Z = self.scale.apply(X.T, np.empty(X.T.shape))
         factors, found = self.antecedent.factors(Z), np.empty((len(subsets), len(X)))
-        used = {g for subset in subsets for g in subset}
         parts = {
             g: self.by_function[g] @ _functions(factors, self.sets[g], Z[list(self.blocks[g])])
-            for g in used
+            for g in {g for subset in subsets for g in subset}
         }
         for one, subset in zip(found, subsets, strict=True):
             p, plus = np.ones(len(X)), np.zeros(len(X))
@@ -193,15 +189,8 @@ def _times(one, other):
 
 
 def _square(weights, element):
-    return float(
-        np.einsum(
-            "ar,abrs,bs->",
-            weights,
-            np.broadcast_to(element, (2, 2, *[weights.shape[1]] * 2)),
-            weights,
-            optimize=True,
-        )
-    )
+    element = np.broadcast_to(element, (2, 2, *[weights.shape[1]] * 2))
+    return float(np.einsum("ar,abrs,bs->", weights, element, weights, optimize=True))
 
 
 def _but_rounding(variance, mean):
@@ -211,8 +200,6 @@ def _but_rounding(variance, mean):
 
 class DrawnAnova:
     """The same of any rules, by draws."""
-
-    accuracy = 0.02
 
     def __init__(self, model, output, blocks, known):
         self.model, self.output, self.blocks, self.known = model, output, blocks, known

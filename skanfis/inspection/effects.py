@@ -113,7 +113,8 @@ def effects(
         is_all = set(wanted) >= set(study.pairs())
         rest = "three or more" if is_all else "other pairs, three or more"
         table.loc[rest] = float(anova.variance > 0.0) - table.sum()
-    return Effects(table, study.held, _notes(table, study))
+    held = study.held
+    return Effects(table, held, _notes(table, held, isinstance(anova, DrawnAnova)))
 
 
 def _shares(subsets, closed, variance):
@@ -124,7 +125,7 @@ def _shares(subsets, closed, variance):
     return [(found[v] - sum(found[(g,)] for g in v if len(v) > 1)) / variance for v in subsets]
 
 
-def _notes(table, study):
+def _notes(table, held, is_drawn):
     notes = []
     if "rows" in table:
         apart = table[(table["sobol"] - table["rows"]).abs() > _DIFFERENT]
@@ -133,15 +134,15 @@ def _notes(table, study):
             notes.append(
                 f"Inputs go together in the rows, which changes shares: {'; '.join(found)}."
             )
-    if study.held > _HELD:
+    if held > _HELD:
         notes.append(
-            f"In {100.0 * study.held:.1f} % of the combinations of inputs, taken as independent, "
+            f"In {100.0 * held:.1f} % of the combinations of inputs, taken as independent, "
             "the output is held within its limits: shares are of the sum of rules before that."
         )
-    if isinstance(study.anova, DrawnAnova):
+    if is_drawn:
         notes.append(
-            f"The strengths of these rules are no products of functions of one input: shares are "
-            f"from {N_DRAWS:,} draws, good to about {study.anova.accuracy}."
+            "The strengths of these rules are no products of functions of one input: shares are "
+            f"from {N_DRAWS:,} draws, good to about 0.02."
         )
     return notes
 
@@ -213,17 +214,13 @@ class Study:
         if rows is not None:
             rows = np.clip(rows, model.minimum, model.maximum)
         elif groups:
-            raise ValueError(
-                "groups takes X: fit keeps inputs one by one, not how they go together."
-            )
+            raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
         found = _one_hot(estimator, model.input_names)
         for label, columns in (groups or {}).items():
             own = {_position(column, model.input_names) for column in columns}
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
                 if not own >= set(found.pop(other)):
-                    raise ValueError(
-                        f"groups: {label!r} has some columns of {other!r}; give it all."
-                    )
+                    raise ValueError(f"groups[{label!r}] has some columns of {other!r}, not all.")
             found[label] = tuple(sorted(own))
         taken = {j for inputs in found.values() for j in inputs}
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}
@@ -245,12 +242,11 @@ class Study:
         """Pairs by names or positions of blocks."""
         found: dict[tuple[int, ...], None] = {}
         for pair in pairs:
-            own = (
-                () if isinstance(pair, str) else {_position(one, list(self.blocks)) for one in pair}
-            )
+            names = [pair] if isinstance(pair, str) else pair
+            own = tuple(sorted({_position(name, list(self.blocks)) for name in names}))
             if len(own) != 2:
                 raise ValueError(f'pairs is "all" or pairs of two inputs; it has {pair!r}.')
-            found[tuple(sorted(own))] = None
+            found[own] = None
         return list(found)
 
     @property
@@ -277,9 +273,8 @@ def _one_hot(estimator, names):
     found: dict[str, tuple[int, ...]] = {}
     for encoder in _encoders(estimator):
         known, levels = getattr(encoder, "feature_names_in_", None), encoder.categories_
-        for column, own in (
-            product(numbered, levels) if known is None else zip(known, levels, strict=True)
-        ):
+        columns = product(numbered, levels) if known is None else zip(known, levels, strict=True)
+        for column, own in columns:
             own = [f"{column}_{level}" for level in [*own, "infrequent_sklearn"]]
             inputs = tuple(sorted(place[name] for name in own if name in place))
             if len(inputs) > max(len(found.get(column, ())), 1):

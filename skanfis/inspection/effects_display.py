@@ -14,6 +14,8 @@ from .effects import Study
 from .labels import as_label
 
 _N_POINTS, _N_ACROSS = 61, 31
+# A pair of a smaller share is not drawn; draws are no better.
+_LEAST = 0.02
 # Parts of a panel's height: its data, and room above the curves.
 _DATA_HEIGHT, _ROOM = 0.15, 0.03
 
@@ -88,7 +90,7 @@ class EffectsDisplay:
             pairs=[
                 _pair(study, *pair) | {"share": both[pair] / unit}
                 for pair in pairs
-                if both[pair] > anova.accuracy * unit
+                if both[pair] > _LEAST * unit
             ],
             output_name=study.model.output_names[study.output],
         ).plot(ax=ax)

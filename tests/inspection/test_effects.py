@@ -144,7 +144,7 @@ def test_groups_enter_as_one():
         effects(model, groups={"fibre": ["a", "b", "c"]})
     with pytest.raises(ValueError, match="'d' is no input"):
         effects(model, X, groups={"fibre": ["a", "d"]})
-    with pytest.raises(ValueError, match="some columns of 'one'"):
+    with pytest.raises(ValueError, match="some columns of 'one', not all"):
         effects(model, X, groups={"one": ["a", "b"], "two": ["b", "c"]})
     with pytest.raises(ValueError, match="called as a column"):
         effects(model, X, groups={"rate": ["a", "b"]})
