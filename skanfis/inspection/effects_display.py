@@ -14,8 +14,8 @@ from .effects import Study
 from .labels import as_label
 
 _N_POINTS, _N_ACROSS = 61, 31
-# A pair of a smaller share is not drawn; draws are no better.
-_LEAST = 0.02
+# A pair of a smaller share is not drawn.
+_LEAST = 0.005
 # Parts of a panel's height: its data, and room above the curves.
 _DATA_HEIGHT, _ROOM = 0.15, 0.03
 

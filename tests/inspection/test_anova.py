@@ -6,7 +6,6 @@ from itertools import combinations
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from sklearn.exceptions import ConvergenceWarning
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
@@ -104,14 +103,13 @@ def test_two_inputs_that_go_together_enter_as_one(model):
     assert_allclose(found, expected, rtol=0, atol=1e-10 * y.var())
 
 
-@pytest.mark.parametrize("n_rows", [12, 3000])
+@pytest.mark.parametrize("n_rows", [25, 3000])
 def test_a_fit_keeps_the_moments_of_every_input_and_its_quantiles(n_rows):
     rng = np.random.default_rng(3)
     X, weight = rng.normal([50.0, -3.0], [4.0, 1.0], (n_rows, 2)), rng.integers(1, 4, n_rows)
     y = np.column_stack([np.sin(X[:, 0]) * X[:, 1], X[:, 1]])
-    fitted = ANFISRegressor(n_mfs=[3, 2], max_iter=3, alpha=0.1, agreement=0.1)
-    with pytest.warns(ConvergenceWarning):
-        model = fitted.fit(X, y, sample_weight=weight).model_
+    fitted = ANFISRegressor(n_mfs=[3, 2], max_iter=0, alpha=0.1, agreement=0.1)
+    model = fitted.fit(X, y, sample_weight=weight).model_
     for (found, _), expected in zip(
         model.support.marginals, moments_of_rows(model, [(0,), (1,)], X, weight), strict=True
     ):
@@ -121,7 +119,7 @@ def test_a_fit_keeps_the_moments_of_every_input_and_its_quantiles(n_rows):
         # Each is where so much of the weight lies below; of many rows, of a sample of these.
         below = np.searchsorted(z, values, side="right") / z.size
         parts = (np.arange(200) + 0.5) / 200
-        assert np.abs(below - parts).max() < (0.2 if n_rows == 12 else 0.02)
+        assert np.abs(below - parts).max() < (0.2 if n_rows == 25 else 0.02)
 
 
 def test_of_rules_that_do_not_factor_a_fit_keeps_means_and_quantiles():
