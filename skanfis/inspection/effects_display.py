@@ -33,8 +33,8 @@ class EffectsDisplay:
     curves : list of dict
         The strongest first: "input", "points" (of a category 0, 1, ...), "levels" or None, "share"
         of the variance (Sobol's, of this input alone), "mean" and its "deviation", 0 where none is
-        known, (n_points,); "terms", how true each is, (n_terms, n_points); "edges" and "counts" of
-        the histogram of the data. Groups of several columns have no curve.
+        known, (n_points,); "terms", how true each is (of cuts: above), (n_terms, n_points);
+        "edges" and "counts" of the histogram of the data. Groups of several columns have no curve.
     pairs : list of dict
         "inputs", "points", "levels" of both, "share", and "effect" (n_points up, n_points across).
     output_name : str
@@ -109,9 +109,10 @@ class EffectsDisplay:
             _draw_curve(axes, curve)
             axes.set(ylim=limits, ylabel=name)
         for axes, pair in zip(self.axes_[n_curves:], self.pairs, strict=True):
-            _draw_pair(axes, pair, name)
+            _draw_pair(axes, pair)
         if ax is None:
             note = "curve: mean over all other inputs, ± 2 sd; shaded: terms; grey: data"
+            note += "; colours: beyond what both do alone" if self.pairs else ""
             self.figure_.supxlabel(note, fontsize="small", color="0.4")
         return self
 
@@ -149,6 +150,9 @@ def _curve(study, g):
     Z = rows.T.copy()
     terms = model.antecedent.factors(Z)
     terms = np.exp(model.antecedent.log_memberships(Z)) if terms is None else terms
+    is_own = np.isin(model.antecedent.term_inputs, own)
+    # Of both sides of a cut one will do.
+    is_own[getattr(model.antecedent, "n_nodes", is_own.size) :] = False
     values, weight = study.distributions[g]
     weight = np.full(len(values), 1.0 / len(values)) if weight is None else weight
     if axis["levels"] is None:
@@ -159,7 +163,7 @@ def _curve(study, g):
     return axis | {
         "mean": study.anova.mean + study.anova.curve((g,), rows),
         "deviation": deviation,
-        "terms": terms[np.isin(model.antecedent.term_inputs, own)],
+        "terms": terms[is_own],
         "edges": edges,
         "counts": counts,
     }
@@ -196,17 +200,20 @@ def _draw_curve(axes, curve):
         axes.plot(points, mean, color="black", linewidth=1.8)
         axes.set_xlim(points[0], points[-1])
     _name(axes.xaxis, curve["input"], points, curve["levels"])
-    axes.set_title(f"alone {100.0 * curve['share']:.0f} %", fontsize="small", loc="left")
+    axes.set_title(
+        f"alone {100.0 * curve['share']:.0f} % of variance", fontsize="small", loc="left"
+    )
 
 
-def _draw_pair(axes, pair, name):
+def _draw_pair(axes, pair):
     largest = np.abs(pair["effect"]).max()
     shown = axes.pcolormesh(*pair["points"], pair["effect"], vmin=-largest, vmax=largest)
-    axes.figure.colorbar(shown, ax=axes, label=f"{name}, beyond both alone")
+    label = f"together {100.0 * pair['share']:.0f} % of variance"
+    bar = axes.figure.colorbar(shown, ax=axes, location="top")
+    bar.set_label(label, fontsize="small", loc="left")
     sides = zip(pair["inputs"], pair["points"], pair["levels"], strict=True)
     for side, of_side in zip((axes.xaxis, axes.yaxis), sides, strict=True):
         _name(side, *of_side)
-    axes.set_title(f"together {100.0 * pair['share']:.0f} %", fontsize="small", loc="left")
 
 
 def _name(side, name, points, levels):
