@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, product
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -97,7 +98,7 @@ def effects(
     x0 and x1  0.742 0.742
     """
     study = Study.of(estimator, X, groups, output)
-    anova, labels = study.anova, list(study.blocks)
+    anova, labels = study.anova, study.labels
     wanted = study.pairs() if isinstance(pairs, str) and pairs == "all" else study.given(pairs)
     ones = [(g,) for g in range(len(labels))]
     subsets = [*ones, *wanted]
@@ -150,29 +151,30 @@ def _notes(table, held, is_drawn):
 def importances(model: TSKModel) -> np.ndarray:
     """Sobol's total share of every input over their sum, (n_outputs, n_inputs)."""
     blocks = [(j,) for j in range(model.n_inputs)]
-    anovas = [_anova(model, k, blocks, None) for k in range(model.n_outputs)]
+    known = _distributions(model, blocks, None)
+    anovas = [_anova(model, k, blocks, known, None) for k in range(model.n_outputs)]
     found = np.array([anova.totals() * (anova.variance > 0.0) for anova in anovas])
     total = found.sum(axis=1, keepdims=True)
     return found / np.where(total > 0.0, total, 1.0)
 
 
-def _anova(model, output, blocks, rows):
+def _anova(model, output, blocks, known, rows):
     if model.antecedent.factors(model.reference[:, None]) is None:
-        return DrawnAnova(model, output, blocks, distributions(model, blocks, rows))
+        return DrawnAnova(model, output, blocks, known)
     if rows is not None:
         return ProductAnova(model, output, blocks, moments_of_rows(model, blocks, rows))
-    known = []
-    for inputs, (values, weight) in zip(blocks, distributions(model, blocks, None), strict=True):
+    moments = []
+    for inputs, (values, weight) in zip(blocks, known, strict=True):
         if weight is None:
-            known.append(model.support.marginals[inputs[0]][0])
+            moments.append(model.support.marginals[inputs[0]][0])
         else:
             X = np.tile(model.reference, (len(values), 1))
             X[:, list(inputs)] = values
-            known += moments_of_rows(model, [inputs], X, weight)
-    return ProductAnova(model, output, blocks, known)
+            moments += moments_of_rows(model, [inputs], X, weight)
+    return ProductAnova(model, output, blocks, moments)
 
 
-def distributions(model, blocks, rows):
+def _distributions(model, blocks, rows):
     """Rows of every block and their weights, None for equal ones; without rows, of training."""
     if rows is not None:
         return [(rows[:, list(inputs)], None) for inputs in blocks]
@@ -197,12 +199,14 @@ def distributions(model, blocks, rows):
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Blocks of inputs that enter as one, by labels, and the ANOVA over them."""
+    """Blocks of inputs that enter as one, their distributions, and the ANOVA over them."""
 
     model: TSKModel
     output: int
-    blocks: dict[str, tuple[int, ...]]
-    categories: set[str]
+    labels: list[str]
+    blocks: list[tuple[int, ...]]
+    is_drawn: list[bool]  # whether pictures show it: one input, or a category
+    known: list  # rows of every block, and their weights or None
     rows: np.ndarray | None
     anova: ProductAnova | DrawnAnova
 
@@ -224,16 +228,18 @@ class Study:
             found[label] = tuple(sorted(own))
         taken = {j for inputs in found.values() for j in inputs}
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}
-        blocks = dict(sorted(found.items(), key=lambda item: item[1]))
-        if sum(map(len, blocks.values())) != model.n_inputs:
+        labels, blocks = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
+        if sum(map(len, blocks)) != model.n_inputs:
             raise ValueError("groups: one of them is called as a column that it does not have.")
-        anova = _anova(model, k, list(blocks.values()), rows)
-        return cls(model, k, blocks, set(found) - set(groups or {}), rows, anova)
+        is_drawn = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
+        known = _distributions(model, blocks, rows)
+        anova = _anova(model, k, blocks, known, rows)
+        return cls(model, k, labels, blocks, is_drawn, known, rows, anova)
 
     def pairs(self):
         """Pairs of blocks, but those whose component is zero for want of terms."""
         terms = set(self.model.antecedent.term_inputs.tolist())
-        active = [bool(terms & set(inputs)) for inputs in self.blocks.values()]
+        active = [bool(terms & set(inputs)) for inputs in self.blocks]
         least = 1 if self.model.order else 2
         every = combinations(range(len(active)), 2)
         return [(g, h) for g, h in every if active[g] + active[h] >= least]
@@ -243,22 +249,16 @@ class Study:
         found: dict[tuple[int, ...], None] = {}
         for pair in pairs:
             names = [pair] if isinstance(pair, str) else pair
-            own = tuple(sorted({_position(name, list(self.blocks)) for name in names}))
+            own = tuple(sorted({_position(name, self.labels) for name in names}))
             if len(own) != 2:
                 raise ValueError(f'pairs is "all" or pairs of two inputs; it has {pair!r}.')
             found[own] = None
         return list(found)
 
     @property
-    def distributions(self):
-        """Rows of every block and their weights."""
-        return distributions(self.model, list(self.blocks.values()), self.rows)
-
-    @property
     def held(self):
         """Part of the product's mass where the output would be held."""
-        rng = np.random.default_rng(0)
-        rows = draw(list(self.blocks.values()), self.distributions, _N_HELD, rng)
+        rows = draw(self.blocks, self.known, _N_HELD, np.random.default_rng(0))
         y = replace(self.model, target=None).predict(rows)[:, self.output]
         low, high = self.model.output_limits[:, self.output]
         return float(np.mean((y < low) | (y > high)))

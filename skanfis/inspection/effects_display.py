@@ -77,8 +77,7 @@ class EffectsDisplay:
         """
         check_count("max_shown", max_shown, 1)
         study = Study.of(estimator, X, groups, output)
-        anova, blocks = study.anova, study.blocks.items()
-        shown = [g for g, (k, own) in enumerate(blocks) if len(own) == 1 or k in study.categories]
+        anova, shown = study.anova, np.flatnonzero(study.is_drawn).tolist()
         alone = {g: anova.closed((g,)) for g in shown}
         drawable = [pair for pair in study.pairs() if set(pair) <= set(shown)]
         both = {(g, h): anova.closed((g, h)) - alone[g] - alone[h] for g, h in drawable}
@@ -119,8 +118,8 @@ class EffectsDisplay:
 
 def _along(study, g, n_points):
     """Rows along a block, the others at their means: "input", "points", and "levels" if any."""
-    (name, own), model = list(study.blocks.items())[g], study.model
-    values = np.unique(study.distributions[g][0], axis=0)
+    name, own, model = study.labels[g], list(study.blocks[g]), study.model
+    values = np.unique(study.known[g][0], axis=0)
     levels = None
     if len(own) > 1:
         values = np.eye(len(own))
@@ -130,19 +129,18 @@ def _along(study, g, n_points):
     else:
         values = np.linspace(values[0], values[-1], n_points)
     rows = np.tile(model.reference, (len(values), 1))
-    rows[:, list(own)] = values
+    rows[:, own] = values
     points = values[:, 0] if levels is None else np.arange(len(values))
     return rows, {"input": name, "points": points, "levels": levels}
 
 
 def _curve(study, g):
     """The mean along a block, its deviation, its terms and its data."""
-    model, own = study.model, list(list(study.blocks.values())[g])
+    model, own = study.model, list(study.blocks[g])
     rows, axis = _along(study, g, _N_POINTS)
     deviation = np.zeros(len(rows))
     if model.posterior is not None:
-        blocks, rng = list(study.blocks.values()), np.random.default_rng(0)
-        others = draw(blocks, study.distributions, N_SHARED, rng)
+        others = draw(study.blocks, study.known, N_SHARED, np.random.default_rng(0))
         for i, row in enumerate(rows):
             others[:, own] = row[own]
             deviation[i] = model.posterior.of_mean(model, others.T.copy())[study.output]
@@ -153,7 +151,7 @@ def _curve(study, g):
     is_own = np.isin(model.antecedent.term_inputs, own)
     # Of both sides of a cut one will do.
     is_own[getattr(model.antecedent, "n_nodes", is_own.size) :] = False
-    values, weight = study.distributions[g]
+    values, weight = study.known[g]
     weight = np.full(len(values), 1.0 / len(values)) if weight is None else weight
     if axis["levels"] is None:
         counts, edges = np.histogram(values[:, 0], _BINS, weights=weight)
@@ -172,7 +170,7 @@ def _curve(study, g):
 def _pair(study, g, h):
     """What two blocks do together, less what each does alone."""
     (across, one), (up, other) = _along(study, g, _N_ACROSS), _along(study, h, _N_ACROSS)
-    rows, own = np.tile(across, (len(up), 1)), list(list(study.blocks.values())[h])
+    rows, own = np.tile(across, (len(up), 1)), list(study.blocks[h])
     rows[:, own] = np.repeat(up[:, own], len(across), axis=0)
     effect = study.anova.curve((g, h), rows).reshape(len(up), len(across))
     effect -= study.anova.curve((g,), across) + study.anova.curve((h,), up)[:, None]
