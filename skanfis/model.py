@@ -34,7 +34,10 @@ from .policies import (
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
 
-__all__ = ["TSKModel"]
+__all__ = ["EQUALLY_STRONG", "TSKModel"]
+
+# Strengths that differ by rounding errors only are equal.
+EQUALLY_STRONG = 1.0 - 1e-9
 
 # Bytes that the intermediate results of one block of rows may take.
 _BLOCK_BYTES = 2**22
@@ -185,6 +188,11 @@ class TSKModel:
     def strengths(self, X) -> np.ndarray:
         """Normalised firing strengths, shape (n_rows, n_rules); those of the nearest in-box row."""
         return self._by_block(X, lambda Z: self.antecedent.strengths(self._clip(Z)), self.n_rules)
+
+    def apply(self, X) -> np.ndarray:
+        """The strongest rule of every row, (n_rows,); of equally strong ones the first."""
+        strengths = self.strengths(X)
+        return (strengths >= EQUALLY_STRONG * strengths.max(axis=1, keepdims=True)).argmax(axis=1)
 
     def predict(self, X, inside=None) -> np.ndarray:
         """Outputs (n_rows, n_outputs) by the policy; ``inside`` is what :meth:`in_bounds` gives."""

@@ -36,6 +36,7 @@ from ._validation import (
 from .bounds import FixedPoint, OutputLimits
 from .bounds.constraints import Constraints
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
+from .inspection.effects import importances
 from .inspection.readability import readability_of_rows
 from .learning import MESSAGES, SOLVERS, Solver, VariableProjection
 from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, Membership
@@ -147,6 +148,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Every term after training, and before: its "input", "name", "function" and parameters.
     consequents_ : ndarray of shape (n_rules, 1 + n_features[, n_outputs])
         p0, p1, ..., pd of every rule.
+    feature_importances_ : ndarray of shape (n_features,) or (n_outputs, n_features)
+        Sobol's total share of each input, were they independent, over their sum: see
+        :func:`skanfis.inspection.effects`. Computed on access; not after ``partial_fit``.
     n_iter_, loss_curve_, status_ : int, ndarray of shape (n_iter + 1,), str
         Iterations of the last run of the solver, the mean squared error of the standardised target
         from the start on, and why it stopped.
@@ -490,6 +494,29 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         X = self._check_inputs(X)
         return self.model_.strengths(X)
 
+    def apply(self, X: ArrayLike) -> np.ndarray:
+        """Tell which rule is the strongest on each row.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+
+        Returns
+        -------
+        rules : ndarray of int of shape (n_samples,)
+            Numbers of rules, as in ``rules_``; of rules that are equally strong, the smallest.
+
+        Examples
+        --------
+        >>> from skanfis import ANFISRegressor
+        >>> from skanfis.datasets import make_jang_sinc
+        >>> X, y = make_jang_sinc()
+        >>> ANFISRegressor(n_mfs=2).fit(X, y).apply([[-10.0, -10.0], [10.0, 10.0], [0.0, 10.0]])
+        array([0, 3, 1])
+        """
+        X = self._check_inputs(X)
+        return self.model_.apply(X)
+
     @available_if(chunk_checks.can_learn_from_chunks)
     @fit_context(prefer_skip_nested_validation=False)
     def partial_fit(
@@ -734,6 +761,16 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         """p0, p1, ..., pd of every rule, in the user's units."""
         consequents = self._fitted_model().consequents
         return consequents[:, :, 0] if self._single_output else consequents
+
+    @property
+    def feature_importances_(self) -> np.ndarray:
+        """Sobol's total share of every input over their sum."""
+        model = self._fitted_model()
+        try:
+            found = importances(model)
+        except ValueError as error:
+            raise AttributeError(str(error)) from None
+        return found[0] if self._single_output else found
 
     def _fitted_model(self) -> TSKModel:
         check_is_fitted(self)

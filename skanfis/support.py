@@ -5,7 +5,8 @@ kept the part of its coefficients that they are enough for, their mean and covar
 from that mean the farthest lies.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +31,9 @@ class RuleSupport:
         distance.
     radius : ndarray of shape (n_rules,)
         The largest d of a training row on which the rule fires.
+    marginals : tuple of (ndarray, ndarray)
+        Of every input alone, standardised: second moments of what rules say of it
+        (``inspection.anova``), and values at evenly spaced quantiles. Empty where not known.
 
     Examples
     --------
@@ -47,12 +51,11 @@ class RuleSupport:
     center: np.ndarray
     factor: np.ndarray
     radius: np.ndarray
+    marginals: Any = ()
 
     def change_units(self, offset, scale):
         """Return the same support for inputs given as offset + scale * z, per input."""
-        return RuleSupport(
-            self.share, offset + scale * self.center, self.factor / scale, self.radius
-        )
+        return replace(self, center=offset + scale * self.center, factor=self.factor / scale)
 
     def reordered(self, order):
         """Return the same support with the inputs in another order."""
@@ -60,8 +63,11 @@ class RuleSupport:
             return self
         # Triangular again, with the same norms: the Q of a QR decomposition turns, no more.
         turned = np.asarray(np.linalg.qr(self.factor[:, :, order[::-1]], mode="r"))
-        return RuleSupport(
-            self.share, self.center[:, order], turned[:, ::-1, ::-1].copy(), self.radius
+        return replace(
+            self,
+            center=self.center[:, order],
+            factor=turned[:, ::-1, ::-1].copy(),
+            marginals=tuple(self.marginals[j] for j in order) if self.marginals else (),
         )
 
     def by_rule(self, Z):

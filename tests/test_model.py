@@ -285,3 +285,24 @@ class TestAsRuleTable:
         found = rule_bases.a_tree().split(0, 0, 1.4, -2.0)
         with pytest.raises(ValueError, match=r"Rule 0 has 3 terms of 'time' \(at"):
             rule_bases.build(found).as_rule_table()
+
+
+@pytest.mark.parametrize("counts", [(2, 2), (3, 2)])
+def test_apply_gives_the_strongest_rule_and_of_equals_the_first(counts):
+    rng = np.random.default_rng(6)
+    frozen = ANFISRegressor(list(counts), max_iter=0, alpha=0.1, agreement=0.1)
+    X = rng.uniform(-1.0, 1.0, (50, 2))
+    X[:2] = [[-1.0, -1.0], [1.0, 1.0]]
+    estimator = frozen.fit(X, X[:, 0])
+    found = estimator.apply(X)
+    for row, rule in zip(estimator.strengths(X), found, strict=True):
+        assert rule == max(range(row.size), key=row.__getitem__)
+    assert_array_equal(estimator.model_.apply(X), found)
+    # Half way between the terms of both inputs rules are equally strong but for rounding.
+    model_ = estimator.model_
+    places = model_.antecedent.term_places
+    middle = [[places[: counts[0]].mean(), places[counts[0] :].mean()]]
+    strengths = estimator.strengths(middle)[0]
+    equal = np.flatnonzero(np.isclose(strengths, strengths.max(), rtol=1e-12))
+    assert equal.size >= 2
+    assert estimator.apply(middle)[0] == equal[0]

@@ -433,3 +433,22 @@ def test_rows_at_the_end_of_the_numbers_saturate():
     assert (mean == model.predict(far)).all()
     assert (np.abs(mean[:2]) > 1e90).all()
     assert (model.coverage(far) == 0.0).all()
+
+
+@pytest.mark.parametrize("solver", [VariableProjection(stiffness=1e-2), LeastSquares()])
+def test_deviation_of_a_mean_is_that_of_the_mean_design(solver):
+    rng = np.random.default_rng(8)
+    X = rng.uniform(-1.0, 1.0, (80, 2))
+    fitted = ANFISRegressor([3, 2], agreement=0.01, alpha=1e-3, solver=solver)
+    frozen = fitted.fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * rng.normal(size=80)).model_
+    posterior, noise = frozen.posterior, frozen.posterior.noise
+    for row in X[:5]:
+        # Of a single row, all of the deviation but the noise.
+        deviation = frozen.standard_deviation(row[None])[0]
+        expected = np.sqrt(deviation**2 - noise**2)
+        assert_allclose(posterior.of_mean(frozen, row[:, None].copy()), expected, rtol=1e-9)
+    if isinstance(solver, LeastSquares):
+        basis = np.column_stack([np.ones(80), X - frozen.reference])
+        design = np.einsum("nr,ni->ri", frozen.strengths(X), basis).ravel() / 80
+        expected = noise * np.linalg.norm(posterior.consequents @ design)
+        assert_allclose(posterior.of_mean(frozen, X.T.copy()), expected, rtol=1e-9)

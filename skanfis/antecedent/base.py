@@ -199,6 +199,13 @@ class Antecedent(ABC):
         """The input that each factor's shares depend on; None of a factor of several inputs."""
         return (None,) * len(self.share_counts)
 
+    def factors(self, Z):
+        """A function per term, (n_terms, n_rows), whose products over rules' terms are strengths.
+
+        None where strengths are no products of functions of one input each.
+        """
+        del Z
+
     @abstractmethod
     def normalise(self, log_mu):
         """Strengths w and term shares nu from log mu, which is overwritten."""

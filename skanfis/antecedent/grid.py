@@ -93,6 +93,9 @@ class GridAntecedent(Antecedent):
     def rule_terms(self):
         return _grid_rule_terms(self.counts) if self.counts else np.empty((1, 0), dtype=int)
 
+    def factors(self, Z):
+        return self.strengths_and_shares(Z)[1]
+
     def normalise(self, log_mu):
         n_rows = log_mu.shape[1]
         if not self.counts:

@@ -92,6 +92,9 @@ class TreeAntecedent(RuleTableAntecedent):
         theta = np.column_stack([nodes.theta, [cut, log_width]])
         return self.build(np.append(nodes.inputs, j), theta, paths)
 
+    def factors(self, Z):
+        return np.exp(self.log_memberships(Z))
+
     def normalise(self, log_mu):
         strengths = np.exp(self._contains @ log_mu)
         return strengths, strengths

@@ -1,6 +1,8 @@
 """A trained model as text, tables and pictures; whether its rules can be read."""
 
 from .displays import MembershipDisplay, ResponseSurfaceDisplay
+from .effects import effects
+from .effects_display import EffectsDisplay
 from .readability import Readability, readability
 from .rules import explain, memberships_table, rules_table
 from .structures import StructureDisplay
@@ -8,11 +10,13 @@ from .text import export_text, rules_html
 from .trees import TreeDisplay
 
 __all__ = [
+    "EffectsDisplay",
     "MembershipDisplay",
     "Readability",
     "ResponseSurfaceDisplay",
     "StructureDisplay",
     "TreeDisplay",
+    "effects",
     "explain",
     "export_text",
     "memberships_table",

@@ -15,9 +15,8 @@ import numpy as np
 
 from ..blocks import LARGE_BLOCK_ROWS, fitting_rows, row_blocks
 from ..learning.data import column_statistics
+from ..model import EQUALLY_STRONG
 
-# Strengths that differ by rounding errors only are equal.
-_EQUALLY_STRONG = 1.0 - 1e-9
 # A target that varies by rounding errors only, as the predictions of a constant do, is constant.
 _CONSTANT = 16.0 * np.finfo(float).eps
 # Digits, in widths, to which equal terms agree: one that came through a file may lose its last.
@@ -93,7 +92,7 @@ class RuleSums:
         np.maximum(self.truth, log_mu.max(axis=1), out=self.truth)
         strengths, _ = model.antecedent.normalise(log_mu)
         self.mass += strengths @ weight
-        strongest = (strengths >= _EQUALLY_STRONG * strengths.max(axis=0)).astype(float)
+        strongest = (strengths >= EQUALLY_STRONG * strengths.max(axis=0)).astype(float)
         strongest *= weight / strongest.sum(axis=0)
         self.rows += strongest.sum(axis=1)
         Z -= model.reference[:, None]

@@ -19,6 +19,7 @@ from sklearn.exceptions import ConvergenceWarning
 from .._threads import map_in_threads
 from .._validation import warn_user
 from ..bounds.exchange import constrained
+from ..inspection.anova import input_marginals
 from ..learning import SOLVERS, LeastSquares, Solver, VariableProjection
 from ..learning.covariance import posterior_of
 from ..learning.data import StandardisedData
@@ -237,6 +238,9 @@ class _Fit:
         n_rows = effective_weight(run.problem.rows)
         posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
         model = replace(builder.model(run.start, run.evaluation, firing), posterior=posterior)
+        assert model.support is not None
+        marginals = input_marginals(rows, run.evaluation.antecedent)
+        model = replace(model, support=replace(model.support, marginals=marginals))
         model = replace(model, rows_extrapolation=extrapolation_distance(model, rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
         fitted = Fitted(

@@ -90,7 +90,8 @@ def model_without_rules(model: TSKModel, rules: Sequence[int] | np.ndarray) -> T
 
 
 def _support_of(support, rules):
-    """The support of some of the rules."""
+    """The support of some of the rules; what they say of every input alone is another thing."""
     if support is None:
         return None
-    return RuleSupport(*(getattr(support, field.name)[rules] for field in fields(support)))
+    names = (field.name for field in fields(support) if field.name != "marginals")
+    return RuleSupport(*(getattr(support, name)[rules] for name in names))

@@ -1,0 +1,220 @@
+"""A picture of what every input, and every pair of inputs, does to the output."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .._validation import check_count
+from .anova import N_SHARED, draw
+from .displays import _BINS, _BRIGHTEST, _panels, _pyplot
+from .effects import Study
+from .labels import as_label
+
+_N_POINTS, _N_ACROSS = 61, 31
+# A pair of a smaller share is not drawn.
+_LEAST = 0.005
+# Parts of a panel's height: its data, and room above the curves.
+_DATA_HEIGHT, _ROOM = 0.15, 0.03
+
+
+@dataclass(kw_only=True, eq=False, repr=False)
+class EffectsDisplay:
+    """The output along every input, averaged over the others, and the two strongest pairs.
+
+    The band is two standard deviations of the curve, of consequents and premises, to either side;
+    terms are shaded, data grey. A pair shows what both do together beyond what each does alone.
+    ``axes_`` and ``figure_`` are matplotlib's, once drawn.
+
+    Parameters
+    ----------
+    curves : list of dict
+        The strongest first: "input", "points" (of a category 0, 1, ...), "levels" or None, "share"
+        of the variance (Sobol's, of this input alone), "mean" and its "deviation", 0 where none is
+        known, (n_points,); "terms", how true each is (of cuts: above), (n_terms, n_points);
+        "edges" and "counts" of the histogram of the data. Groups of several columns have no curve.
+    pairs : list of dict
+        "inputs", "points", "levels" of both, "share", and "effect" (n_points up, n_points across).
+    output_name : str
+
+    Examples
+    --------
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.inspection import EffectsDisplay
+    >>> model = ANFISRegressor(n_mfs=4).fit(*make_jang_sinc())
+    >>> EffectsDisplay.from_estimator(model).pairs[0]["inputs"]
+    ('x0', 'x1')
+    """
+
+    curves: list[dict[str, Any]]
+    pairs: list[dict[str, Any]]
+    output_name: str
+
+    @classmethod
+    def from_estimator(
+        cls,
+        estimator: Any,
+        X: ArrayLike | None = None,
+        *,
+        groups: Mapping[str, Sequence[int | str]] | None = None,
+        output: int | str = 0,
+        max_shown: int = 7,
+        ax: Any = None,
+    ) -> Self:
+        """Draw the effects of a fitted estimator.
+
+        Parameters
+        ----------
+        estimator, X, groups, output : fitted estimator, array-like, dict, int or str
+            As of :func:`effects`.
+        max_shown : int, default=7
+            Most curves: those of the largest total shares are shown.
+        ax : sequence of matplotlib Axes, default=None
+            One for each curve, then one for each pair; None makes a figure.
+        """
+        check_count("max_shown", max_shown, 1)
+        study = Study.of(estimator, X, groups, output)
+        anova, shown = study.anova, np.flatnonzero(study.is_drawn).tolist()
+        alone = {g: anova.closed((g,)) for g in shown}
+        drawable = [pair for pair in study.pairs() if set(pair) <= set(shown)]
+        both = {(g, h): anova.closed((g, h)) - alone[g] - alone[h] for g, h in drawable}
+        totals, unit = anova.totals(), anova.variance or 1.0
+        strongest = sorted(shown, key=lambda g: -totals[g])[:max_shown]
+        pairs = sorted(both, key=lambda pair: -both[pair])[:2]
+        return cls(
+            curves=[_curve(study, g) | {"share": alone[g] / unit} for g in strongest],
+            pairs=[
+                _pair(study, *pair) | {"share": both[pair] / unit}
+                for pair in pairs
+                if both[pair] > _LEAST * unit
+            ],
+            output_name=study.model.output_names[study.output],
+        ).plot(ax=ax)
+
+    def plot(self, *, ax: Any = None) -> Self:
+        """Draw the effects on ``ax``, as of :meth:`from_estimator`."""
+        self.axes_ = _panels(ax, len(self.curves) + len(self.pairs))
+        self.figure_ = self.axes_[0].figure
+        name, n_curves = as_label(self.output_name), len(self.curves)
+        # One scale for all, so that what is flat looks flat.
+        low = min(np.min(one["mean"] - 2.0 * one["deviation"]) for one in self.curves)
+        high = max(np.max(one["mean"] + 2.0 * one["deviation"]) for one in self.curves)
+        height = (high - low or 1.0) / (1.0 - _DATA_HEIGHT - 2.0 * _ROOM)
+        limits = low - (_DATA_HEIGHT + _ROOM) * height, high + _ROOM * height
+        for axes, curve in zip(self.axes_[:n_curves], self.curves, strict=True):
+            _draw_curve(axes, curve)
+            axes.set(ylim=limits, ylabel=name)
+        for axes, pair in zip(self.axes_[n_curves:], self.pairs, strict=True):
+            _draw_pair(axes, pair)
+        if ax is None:
+            note = "curve: mean over all other inputs, ± 2 sd; shaded: terms; grey: data"
+            note += "; colours: beyond what both do alone" if self.pairs else ""
+            self.figure_.supxlabel(note, fontsize="small", color="0.4")
+        return self
+
+
+def _along(study, g, n_points):
+    """Rows along a block, the others at their means: "input", "points", and "levels" if any."""
+    name, own, model = study.labels[g], list(study.blocks[g]), study.model
+    values = np.unique(study.known[g][0], axis=0)
+    levels = None
+    if len(own) > 1:
+        values = np.eye(len(own))
+        levels = [model.input_names[j].removeprefix(f"{name}_") for j in own]
+    elif len(values) <= 2:
+        levels = [f"{value:.6g}" for value in values[:, 0]]
+    else:
+        values = np.linspace(values[0], values[-1], n_points)
+    rows = np.tile(model.reference, (len(values), 1))
+    rows[:, own] = values
+    points = values[:, 0] if levels is None else np.arange(len(values))
+    return rows, {"input": name, "points": points, "levels": levels}
+
+
+def _curve(study, g):
+    """The mean along a block, its deviation, its terms and its data."""
+    model, own = study.model, list(study.blocks[g])
+    rows, axis = _along(study, g, _N_POINTS)
+    deviation = np.zeros(len(rows))
+    if model.posterior is not None:
+        others = draw(study.blocks, study.known, N_SHARED, np.random.default_rng(0))
+        for i, row in enumerate(rows):
+            others[:, own] = row[own]
+            deviation[i] = model.posterior.of_mean(model, others.T.copy())[study.output]
+    # As shares, where they are factors of the strengths.
+    Z = rows.T.copy()
+    terms = model.antecedent.factors(Z)
+    terms = np.exp(model.antecedent.log_memberships(Z)) if terms is None else terms
+    is_own = np.isin(model.antecedent.term_inputs, own)
+    # Of both sides of a cut one will do.
+    is_own[getattr(model.antecedent, "n_nodes", is_own.size) :] = False
+    values, weight = study.known[g]
+    weight = np.full(len(values), 1.0 / len(values)) if weight is None else weight
+    if axis["levels"] is None:
+        counts, edges = np.histogram(values[:, 0], _BINS, weights=weight)
+    else:
+        is_at = (values[:, None] == rows[:, own]).all(axis=2)
+        counts, edges = weight @ is_at, np.arange(len(rows) + 1) - 0.5
+    return axis | {
+        "mean": study.anova.mean + study.anova.curve((g,), rows),
+        "deviation": deviation,
+        "terms": terms[is_own],
+        "edges": edges,
+        "counts": counts,
+    }
+
+
+def _pair(study, g, h):
+    """What two blocks do together, less what each does alone."""
+    (across, one), (up, other) = _along(study, g, _N_ACROSS), _along(study, h, _N_ACROSS)
+    rows, own = np.tile(across, (len(up), 1)), list(study.blocks[h])
+    rows[:, own] = np.repeat(up[:, own], len(across), axis=0)
+    effect = study.anova.curve((g, h), rows).reshape(len(up), len(across))
+    effect -= study.anova.curve((g,), across) + study.anova.curve((h,), up)[:, None]
+    return {
+        "inputs": (one["input"], other["input"]),
+        "points": (one["points"], other["points"]),
+        "levels": (one["levels"], other["levels"]),
+        "effect": effect,
+    }
+
+
+def _draw_curve(axes, curve):
+    points, mean, band = curve["points"], curve["mean"], 2.0 * curve["deviation"]
+    on_height = {"transform": axes.get_xaxis_transform()}
+    heights = _DATA_HEIGHT * curve["counts"] / curve["counts"].max()
+    axes.stairs(heights, curve["edges"], fill=True, color="0.8", zorder=0, **on_height)
+    if curve["levels"] is not None:
+        axes.errorbar(points, mean, band, fmt="o", color="black", capsize=3.0)
+        axes.set_xlim(curve["edges"][0], curve["edges"][-1])
+    else:
+        shades = _pyplot().get_cmap()(np.linspace(0.0, _BRIGHTEST, len(curve["terms"])))
+        for term, shade in zip(curve["terms"], shades, strict=True):
+            axes.fill_between(points, term, color=shade, alpha=0.13, linewidth=0, **on_height)
+        axes.fill_between(points, mean - band, mean + band, color="0.3", alpha=0.4, linewidth=0)
+        axes.plot(points, mean, color="black", linewidth=1.8)
+        axes.set_xlim(points[0], points[-1])
+    _name(axes.xaxis, curve["input"], points, curve["levels"])
+    axes.set_title(
+        f"alone {100.0 * curve['share']:.0f} % of variance", fontsize="small", loc="left"
+    )
+
+
+def _draw_pair(axes, pair):
+    largest = np.abs(pair["effect"]).max()
+    shown = axes.pcolormesh(*pair["points"], pair["effect"], vmin=-largest, vmax=largest)
+    label = f"together {100.0 * pair['share']:.0f} % of variance"
+    bar = axes.figure.colorbar(shown, ax=axes, location="top")
+    bar.set_label(label, fontsize="small", loc="left")
+    sides = zip(pair["inputs"], pair["points"], pair["levels"], strict=True)
+    for side, of_side in zip((axes.xaxis, axes.yaxis), sides, strict=True):
+        _name(side, *of_side)
+
+
+def _name(side, name, points, levels):
+    side.set_label_text(as_label(name))
+    if levels is not None:
+        side.set_ticks(points, [as_label(level) for level in levels])

@@ -1,0 +1,210 @@
+"""Shares against definitions on data; what is said, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from numpy.testing import assert_allclose
+from sklearn.compose import make_column_transformer
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import OneHotEncoder, StandardScaler
+
+from skanfis import ANFISRegressor
+from skanfis.export import export_json, fold
+from skanfis.export.json_reader import parse_json
+from skanfis.inspection import effects
+
+from ..export.rule_bases import MODELS, build, narrow_target, rows_of
+from ..quick import quick
+from .test_anova import SUBSETS, TREE, mean_over, on_the_product, variance_of
+
+NAMES = ["time", "chip temperature", "rate"]
+LABELS = [" and ".join(NAMES[j] for j in v) for v in SUBSETS[:6]]
+
+
+def product_shares(y, weight):
+    """Of the three inputs, the three pairs, and all three, by the definition of the ANOVA."""
+    closed = [variance_of(mean_over(y, v, weight), weight) for v in SUBSETS]
+    own = dict(zip(SUBSETS, closed, strict=True))
+    for v in SUBSETS[3:]:
+        own[v] -= sum(own[u] for u in SUBSETS if set(u) < set(v))
+    return np.array(list(own.values())) / closed[-1]
+
+
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("rules", ["grid", "tree"])
+def test_both_shares_are_those_of_the_definition(rules, order):
+    grid = MODELS[f"grid, order {order}, 2 outputs"]
+    model = build(TREE, order, 2) if rules == "tree" else grid
+    X, weight, place = rows_of(model, 1.0, 9), np.full(9, 1.0 / 9.0), np.arange(9)
+    for k in range(2):
+        y = on_the_product(model, X)[..., k]
+        found = effects(model, X, output=k).table
+        expected = product_shares(y, weight)
+        every = [*LABELS, "three or more"]
+        assert_allclose(found["sobol"].reindex(every), expected, rtol=0, atol=1e-10)
+        # The component of a row is that of the combination of its own three values.
+        closed = [mean_over(y, v, weight)[place, place, place] for v in SUBSETS]
+        own = dict(zip(SUBSETS, closed, strict=True))
+        for v in SUBSETS[3:]:
+            own[v] = own[v] - y.mean() - sum(own[u] - y.mean() for u in SUBSETS if set(u) < set(v))
+        yhat = y[place, place, place]
+        parts = [np.mean((c - c.mean()) * (yhat - yhat.mean())) / yhat.var() for c in own.values()]
+        assert_allclose(sum(parts), 1.0)
+        assert_allclose(found["rows"].reindex(every), parts, rtol=0, atol=1e-10)
+
+
+def test_what_fit_keeps_is_what_its_rows_give():
+    rng = np.random.default_rng(0)
+    X = rng.uniform([250.0, -1e-3, 0.0], [330.0, 1e-3, 5.0], (60, 3))
+    y = np.column_stack([np.sin(X[:, 0] / 20.0) + 1e6 * X[:, 1] ** 2 + X[:, 2], X[:, 2]])
+    model = quick(n_mfs=[3, 2, 1]).fit(X, y)
+    scaled = make_pipeline(StandardScaler(), quick(n_mfs=[3, 2, 1])).fit(X, y)
+    for k in range(2):
+        of_rows = effects(model, X, output=k).table["sobol"]
+        kept = effects(model, output=k).table["sobol"]
+        assert_allclose(kept[of_rows.index], of_rows, rtol=0, atol=1e-10)
+        folded = effects(scaled, output=k).table["sobol"]
+        assert_allclose(folded[of_rows.index], of_rows, rtol=0, atol=1e-6)
+        total = [
+            1.0
+            - variance_of(mean_over(grid, v, np.full(60, 1 / 60)), np.full(60, 1 / 60))
+            / variance_of(grid, np.full(60, 1 / 60))
+            for grid in [on_the_product(model.model_, X)[..., k]]
+            for v in [(1, 2), (0, 2), (0, 1)]
+        ]
+        assert_allclose(model.feature_importances_[k], total / np.sum(total), rtol=0, atol=1e-10)
+    assert_allclose(
+        quick(n_mfs=[3, 2, 1]).fit(X, y[:, 1]).feature_importances_, [0, 0, 1], atol=1e-6
+    )
+
+
+def test_inputs_that_go_together_are_told():
+    rng = np.random.default_rng(1)
+    X = rng.normal(size=(300, 2))
+    X[:, 1] = X[:, 0] + 0.2 * X[:, 1]
+    model = quick(n_mfs=1).fit(X, X[:, 0] + X[:, 1])
+    found = effects(model, X)
+    variances, both = X.var(axis=0), np.cov(X.T, bias=True)
+    assert_allclose(found.table["sobol"].loc[["x0", "x1"]], variances / variances.sum(), rtol=1e-3)
+    assert_allclose(found.table["rows"].loc[["x0", "x1"]], both.sum(0) / both.sum(), rtol=1e-3)
+    assert found.notes == []
+    model = quick(n_mfs=1).fit(X, X[:, 0] + 0.3 * X[:, 1])
+    found = effects(model, X)
+    assert len(found.notes) == 1
+    assert found.notes[0].startswith("Inputs go together in the rows, which changes shares: x0 0.")
+    assert str(found).endswith(found.notes[0])
+
+
+def categories():
+    """A column of categories, which goes with another by products."""
+    rng = np.random.default_rng(2)
+    X = pd.DataFrame({"rate": rng.uniform(-1.0, 1.0, 90), "fibre": rng.choice(["a", "b", "c"], 90)})
+    y = X["rate"] * X["fibre"].map({"a": 2.0, "b": -1.0, "c": 0.5}) + (X["fibre"] == "a")
+    return X, y
+
+
+@pytest.mark.parametrize("drop", [None, "first"])
+@pytest.mark.parametrize("has_names", [True, False])
+def test_columns_of_one_category_enter_as_one(drop, has_names):
+    X, y = categories()
+    table = X if has_names else X.to_numpy(dtype=object)
+    encoder = make_column_transformer(
+        (OneHotEncoder(sparse_output=False, drop=drop), [1]), remainder=StandardScaler()
+    )
+    model = make_pipeline(encoder, quick(n_mfs=[2] + [1] * (3 if drop is None else 2))).fit(
+        table, y
+    )
+    search = GridSearchCV(make_pipeline(encoder, quick(n_mfs="auto", partition="grid")), {}, cv=2)
+    rate, fibre = ["rate", "fibre"] if has_names else ["x0", "x1"]
+    # All combinations of a rate and a fibre, by the rows' frequencies.
+    n = len(X)
+    both = pd.DataFrame({"rate": np.repeat(X["rate"], n), "fibre": np.tile(X["fibre"], n)})
+    for fitted in (model, search.fit(table, y)):
+        folded = fold(fitted)
+        rows = np.column_stack([both["rate"], *(both["fibre"] == level for level in "abc")])
+        rows = rows[:, [0, 1, 2, 3] if drop is None else [0, 2, 3]]
+        yhat = folded.predict(rows.astype(float))[:, 0].reshape(n, n)
+        expected = np.array([yhat.mean(axis=1).var(), yhat.mean(axis=0).var()]) / yhat.var()
+        for found in (effects(fitted, table).table, effects(fitted).table):
+            assert_allclose(found.loc[[rate, fibre], "sobol"], expected, rtol=0, atol=1e-9)
+            assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
+
+
+def test_groups_enter_as_one():
+    X, y = categories()
+    X = pd.concat([X[["rate"]], pd.get_dummies(X["fibre"], dtype=float)], axis=1)
+    model = quick(n_mfs=[1, 2, 1, 1]).fit(X, y)
+    found = effects(model, X, groups={"fibre": ["a", "b", "c"]}).table
+    assert list(found.index[:2]) in (["rate", "fibre"], ["fibre", "rate"])
+    assert_allclose(found.sum(), 1.0)
+    with pytest.raises(ValueError, match="groups takes X"):
+        effects(model, groups={"fibre": ["a", "b", "c"]})
+    with pytest.raises(ValueError, match="'d' is no input"):
+        effects(model, X, groups={"fibre": ["a", "d"]})
+    with pytest.raises(ValueError, match="some columns of 'one', not all"):
+        effects(model, X, groups={"one": ["a", "b"], "two": ["b", "c"]})
+    with pytest.raises(ValueError, match="called as a column"):
+        effects(model, X, groups={"rate": ["a", "b"]})
+
+
+def test_what_is_held_is_told():
+    free = MODELS["grid, order 1, 1 outputs"]
+    model = replace(free, target=narrow_target(1))
+    X = rows_of(model, 1.0, 9)
+    y = on_the_product(model, X)
+    low, high = model.output_limits
+    expected = np.mean((y < low) | (y > high))
+    found = effects(model, X)
+    assert expected > 0.05
+    assert abs(found.held - expected) < 0.02
+    assert found.notes[-1].startswith(f"In {100 * found.held:.1f} % of the combinations")
+    assert_allclose(found.table, effects(free, X).table)
+    assert effects(free, X).held == 0.0
+
+
+def test_pairs_that_are_asked_for():
+    model = MODELS["grid, order 1, 1 outputs"]
+    X = rows_of(model, 1.0, 9)
+    every, found = effects(model, X).table, effects(model, X, pairs=[("rate", "time")]).table
+    assert list(found.index[3:]) == ["time and rate", "other pairs, three or more"]
+    assert_allclose(found[:4], every.loc[found.index[:4]])
+    assert_allclose(found.sum(), 1.0)
+    assert len(effects(model, X, pairs=()).table) == 4
+    with pytest.raises(ValueError, match="pairs of two inputs"):
+        effects(model, X, pairs=[("rate", "rate")])
+    # Inputs without terms do nothing together.
+    found = effects(MODELS["grid on two inputs, order 0, 1 outputs"], X).table
+    assert list(found.index[3:]) == ["time and rate", "three or more"]
+
+
+def test_draws_are_said():
+    model = MODELS["scattered, order 1, 1 outputs"]
+    X = rows_of(model, 1.0, 9)
+    found = effects(model, X)
+    expected = product_shares(on_the_product(model, X)[..., 0], np.full(9, 1.0 / 9.0))
+    assert_allclose(found.table["sobol"].reindex(LABELS), expected[:6], rtol=0, atol=0.03)
+    assert "20,000 draws" in found.notes[-1]
+    assert_allclose(found.table, effects(model, X).table)
+
+
+def test_models_that_know_of_no_rows_ask_for_them():
+    X, y = np.random.default_rng(4).uniform(size=(40, 2)), np.arange(40.0)
+    fitted = quick(n_mfs=2).fit(X, y)
+    read = parse_json(export_json(fitted))
+    with pytest.raises(ValueError, match="Give rows of them as X"):
+        effects(read)
+    assert_allclose(effects(read, X).table, effects(fitted, X).table, atol=1e-9)
+    given = ANFISRegressor(partition=read, max_iter=0).fit(X, y)
+    assert not hasattr(given, "feature_importances_")
+    with pytest.raises(ValueError, match="Give rows of them as X"):
+        effects(fitted.without_rules([0]))
+
+
+def test_a_constant_output_has_no_shares():
+    X = np.random.default_rng(5).uniform(size=(30, 2))
+    model = quick(n_mfs=2).fit(X, np.full(30, 3.0))
+    assert_allclose(effects(model, X).table, 0.0)
+    assert_allclose(model.feature_importances_, 0.0)

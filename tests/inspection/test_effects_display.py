@@ -1,0 +1,129 @@
+"""The picture of effects against means over the product of the inputs' values."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.compose import make_column_transformer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import OneHotEncoder
+
+from skanfis.inspection import EffectsDisplay, effects
+
+from ..export.rule_bases import MODELS, build, rows_of
+from ..quick import quick
+from .test_anova import TREE
+from .test_displays import drawn
+from .test_effects import categories
+
+plt = pytest.importorskip("matplotlib.pyplot")
+KINDS = {
+    "grid": MODELS["grid, order 1, 2 outputs"],
+    "tree": build(TREE, 1, 2),
+    "scattered": MODELS["scattered, order 1, 2 outputs"],
+}
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    plt.close("all")
+
+
+def mean_at(model, X, columns, values):
+    """Mean output over all combinations of the rows' values, with some of them given."""
+    rows = np.stack(np.meshgrid(*X.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    rows[:, columns] = values
+    return replace(model, target=None).predict(rows)[:, 1].mean()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_curves_and_pairs_are_means_over_the_product(kind):
+    model = KINDS[kind]
+    X, names = rows_of(model, 1.0, 9), list(model.input_names)
+    display = drawn(EffectsDisplay.from_estimator(model, X, output=1))
+    # Of rules that are drawn, 200 draws stand for the product.
+    atol = 1e-9 if kind != "scattered" else 0.5
+    shares = effects(model, X, output=1).table["sobol"]
+    assert len(display.curves) == 3
+    for curve in display.curves:
+        j = names.index(curve["input"])
+        assert curve["points"][0] == X[:, j].min()
+        assert curve["points"][-1] == X[:, j].max()
+        expected = [mean_at(model, X, [j], value) for value in curve["points"]]
+        assert_allclose(curve["mean"], expected, atol=atol)
+        assert_array_equal(curve["deviation"], 0.0)  # the model knows of none
+        assert abs(curve["share"] - shares[curve["input"]]) < 0.02
+        assert_allclose(curve["counts"].sum(), 1.0)
+    strongest = shares[3:6].sort_values(ascending=False)
+    assert display.pairs or kind == "scattered"
+    for pair, (name, share) in zip(display.pairs, strongest.items(), strict=False):
+        assert abs(pair["share"] - share) < 0.04
+        if kind == "scattered":
+            continue
+        assert " and ".join(pair["inputs"]) == name
+        columns = [names.index(one) for one in pair["inputs"]]
+        mean = mean_at(model, X, [], 0.0)
+        for a, b in ((0, 0), (3, 17), (30, 9)):
+            values = pair["points"][0][a], pair["points"][1][b]
+            alone = [mean_at(model, X, [j], v) for j, v in zip(columns, values, strict=True)]
+            expected = mean_at(model, X, columns, values) - sum(alone) + mean
+            assert_allclose(pair["effect"][b, a], expected, atol=1e-9)
+
+
+def test_terms_are_shares_and_the_strongest_inputs_are_shown():
+    model = KINDS["grid"]
+    X = rows_of(model, 1.0, 30)
+    display = EffectsDisplay.from_estimator(model, X)
+    for curve in display.curves:
+        assert_allclose(curve["terms"].sum(axis=0), 1.0)
+    fewer = EffectsDisplay.from_estimator(model, X, max_shown=1)
+    assert [one["input"] for one in fewer.curves] == [display.curves[0]["input"]]
+    with pytest.raises(ValueError, match="max_shown"):
+        EffectsDisplay.from_estimator(model, X, max_shown=0)
+
+
+def test_the_band_is_the_deviation_of_the_mean_over_other_inputs():
+    rng = np.random.default_rng(0)
+    X = rng.normal([10.0, -2.0], [3.0, 0.5], (60, 2))
+    fitted = quick(n_mfs=1).fit(X, X @ [1.0, 2.0] + rng.normal(size=60))
+    display = drawn(EffectsDisplay.from_estimator(fitted))
+    # On a line the mean over rows is the output at their mean.
+    curve = next(one for one in display.curves if one["input"] == "x0")
+    rows = np.column_stack([curve["points"], np.full(61, X[:, 1].mean())])
+    deviation = fitted.predict(rows, return_std=True)[1]
+    expected = np.sqrt(deviation**2 - fitted.noise_std_**2)
+    assert_allclose(curve["deviation"], expected, rtol=0.03)
+
+
+def test_a_category_is_drawn_by_its_levels():
+    X, y = categories()
+    encoder = make_column_transformer(
+        (OneHotEncoder(sparse_output=False), ["fibre"]), remainder="passthrough"
+    )
+    model = make_pipeline(encoder, quick(n_mfs=[2, 1, 1, 1])).fit(X, y)
+    for table in (X, None):
+        display = drawn(EffectsDisplay.from_estimator(model, table))
+        curve = next(one for one in display.curves if one["input"] == "fibre")
+        assert curve["levels"] == ["a", "b", "c"]
+        frequent = X["fibre"].value_counts(normalize=True).sort_index()
+        assert_allclose(curve["counts"], frequent, atol=1e-9)
+        # Along a level the other columns of the category are zero, not at their means.
+        rate, n = X["rate"].to_numpy(), len(X)
+        for level, mean in zip("abc", curve["mean"], strict=True):
+            rows = X.assign(fibre=level, rate=rate)
+            assert_allclose(mean, model.predict(rows).sum() / n, atol=1e-9)
+        labels = [
+            one.get_text() for one in display.axes_[display.curves.index(curve)].get_xticklabels()
+        ]
+        assert labels == ["a", "b", "c"]
+
+
+def test_axes_may_be_given():
+    model = KINDS["grid"]
+    X = rows_of(model, 1.0, 9)
+    axes = plt.subplots(5)[1]
+    assert list(EffectsDisplay.from_estimator(model, X, ax=axes).axes_) == list(axes)
+    with pytest.raises(ValueError, match="5 are needed"):
+        EffectsDisplay.from_estimator(model, X, ax=axes[:2])
