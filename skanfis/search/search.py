@@ -52,7 +52,13 @@ class StructureSearch:
         self.judged += [one_rule, self._judge(*_with_common_slopes(*line))]
         for kind in kinds:
             self._grow(kind, one_rule)
-        best = best_of(self.judged, self.judges)
+        # With fewer slopes there would be two looks at every size, and chance would have two.
+        whole = [
+            one
+            for one in self.judged
+            if one.candidate.n_rules == 1 or not one.candidate.has_common_slopes
+        ]
+        best = best_of(whole, self.judges)
         most = tolerated(best.squared_error, self._variance(), self.simplicity)
         found = chosen(self.judged, most)
         left = most / found.squared_error if found.squared_error > 0.0 else 1.0

@@ -96,11 +96,11 @@ def tuned_start(
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_free = freed, True
-    left, error = 1.0, best.expected_error
+    left, simpler = 1.0, with_common_slopes(best, free)
+    error = min(best.expected_error, simpler.expected_error)
     if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))
         most = tolerated(error, variance, simplicity)
-        simpler = with_common_slopes(best, free)
         best = simpler if simpler.expected_error <= most else best
         left = most / best.expected_error
     return started(best, replace(plan, free=free), left, [_as_given(best)], is_free)

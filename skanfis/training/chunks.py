@@ -364,7 +364,15 @@ def fitted_weights(estimator, sums: RowSums):
             ([place(name) for name in one["inputs"]], one["pull"]) for one in estimator.pulls_
         ],
         "slope_pulls": [[place(name), pull] for name, pull in estimator.slope_pulls_.items()],
+        "common": _listed(estimator.model_.common_slopes, sums),
+        "zero": _listed(estimator.model_.zero_slopes, sums),
     }
+
+
+def _listed(where, sums):
+    """Inputs with slopes, but for those that never change, and the rules where it holds."""
+    slopes = [j for j in sums.inputs.varying(sums.consequent_inputs) if j is not None]
+    return [[j, np.flatnonzero(where[:, j]).tolist()] for j in slopes if where[:, j].any()]
 
 
 def solve(sums: RowSums, given, first=None) -> Solved:
@@ -381,17 +389,12 @@ def solve(sums: RowSums, given, first=None) -> Solved:
         if "alpha" not in given:
             found["pulls"] = {tuple(component): pull for component, pull in first["pulls"]}
             found["slope_pulls"] = dict(first["slope_pulls"])
+            # Slopes that rules have in common stay so, and so do those that are zero.
+            for key in ("common", "zero"):
+                found[key] = tuple((j, tuple(rules)) for j, rules in first[key])
         given = found | given
     free = [key for key in _FREE if key not in given]
-    # Slopes that rules have in common stay so, and so do those that are zero.
-    common, zero = (
-        tuple(
-            (j, tuple(np.flatnonzero(own).tolist())) for j, own in enumerate(where.T) if own.any()
-        )
-        for where in (sums.base.common_slopes, sums.base.zero_slopes)
-    )
-    start = replace(FIRST_PENALTY, **given, stiffness=0.0, common=common, zero=zero)
-    problem = _ProblemOfSums(sums, start)
+    problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
     if free:
         premise = Premise(antecedent, none, none, none, none.astype(int), ())
         tuned = tune(problem, premise, free, sums.effective_weight, turns=0, first_steps=ARRIVING)

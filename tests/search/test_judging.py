@@ -55,24 +55,38 @@ class TestDealtRows:
         assert abs(np.corrcoef(found.y[1:, 0], found.y[:-1, 0])[0, 1]) < 0.15
 
 
+def left_out(rows, grow):
+    return np.setdiff1d(np.arange(rows.n_rows), grow)
+
+
+def assert_judges(rows, folds):
+    """Of those left out, the ones in the range of the others judge, where most of them are."""
+    for grow, judge in folds:
+        left = left_out(rows, grow)
+        low, high = rows.X[grow].min(axis=0), rows.X[grow].max(axis=0)
+        inside = left[((rows.X[left] >= low) & (rows.X[left] <= high)).all(axis=1)]
+        expected = inside if inside.size >= left.size / 2 else left
+        assert_array_equal(np.sort(judge), expected)
+
+
 class TestSplits:
     @pytest.mark.parametrize("n_rows", [2, 4, 37, 150])
     def test_of_few_rows_each_is_left_out_once(self, rng, n_rows):
-        folds = splits(dealt(*measured(rng, n_rows)))
+        rows = dealt(*measured(rng, n_rows))
+        folds = splits(rows)
         assert len(folds) == min(n_rows, 5)
-        assert_array_equal(np.sort(np.concatenate([rest for _, rest in folds])), np.arange(n_rows))
-        sizes = [rest.size for _, rest in folds]
-        assert max(sizes) - min(sizes) <= 1
-        for grow, rest in folds:
-            assert_array_equal(np.sort(np.append(grow, rest)), np.arange(n_rows))
+        left = [left_out(rows, grow) for grow, _ in folds]
+        assert_array_equal(np.sort(np.concatenate(left)), np.arange(n_rows))
+        assert max(map(len, left)) - min(map(len, left)) <= 1
+        assert_judges(rows, folds)
 
     @pytest.mark.parametrize("n_rows", [400, 999, 1000, 3001])
     def test_of_more_rows_at_least_two_hundred_judge(self, rng, n_rows):
-        folds = splits(dealt(*measured(rng, n_rows)))
-        rest = np.concatenate([rest for _, rest in folds])
-        assert 200 <= np.unique(rest).size == rest.size
-        for grow, own in folds:
-            assert_array_equal(np.sort(np.append(grow, own)), np.arange(n_rows))
+        rows = dealt(*measured(rng, n_rows))
+        folds = splits(rows)
+        left = np.concatenate([left_out(rows, grow) for grow, _ in folds])
+        assert 200 <= np.unique(left).size == left.size
+        assert_judges(rows, folds)
 
     @pytest.mark.parametrize(("n_groups", "n_folds"), [(2, 2), (4, 4), (23, 5)])
     def test_groups_are_left_out_whole(self, rng, n_groups, n_folds):
@@ -80,9 +94,11 @@ class TestSplits:
         rows = dealt(X, y, groups=rng.integers(0, n_groups, 3000))
         folds = splits(rows)
         assert len(folds) == n_folds
-        assert_array_equal(np.sort(np.concatenate([rest for _, rest in folds])), np.arange(3000))
-        for grow, rest in folds:
-            assert not np.intersect1d(rows.groups[grow], rows.groups[rest]).size
+        left = [left_out(rows, grow) for grow, _ in folds]
+        assert_array_equal(np.sort(np.concatenate(left)), np.arange(3000))
+        for (grow, _), own in zip(folds, left, strict=True):
+            assert not np.intersect1d(rows.groups[grow], rows.groups[own]).size
+        assert_judges(rows, folds)
 
     def test_one_group_is_none_and_one_row_judges_itself(self, rng):
         X, y = measured(rng)

