@@ -68,20 +68,16 @@ def in_user_units(coefficients, inputs, targets, slopes, order):
     return found
 
 
-def with_common_slopes(coefficients, masses, penalty, inputs):
-    """Coefficients on [1, z] whose slopes are common, or zero, to the last bit.
+def with_common_slopes(coefficients, masses, common, inputs):
+    """Coefficients on [1, z] in which slopes that are common are one, to the last bit.
 
-    ``penalty`` says which; ``inputs`` are those of the slopes.
+    ``common`` as in ``Penalty``; ``inputs`` are those of the slopes.
     """
-    if not (penalty.common or penalty.zero):
-        return coefficients
     found = coefficients.reshape(masses.size, 1 + len(inputs), -1).copy()
     place = {int(j): 1 + k for k, j in enumerate(inputs)}
-    for j, rules in penalty.common:
+    for j, rules in common:
         own = list(rules), place[j]
         found[own] = np.average(found[own], axis=0, weights=masses[own[0]])
-    for j, rules in penalty.zero:
-        found[list(rules), place[j]] = 0.0
     return found.reshape(coefficients.shape)
 
 

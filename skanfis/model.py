@@ -138,13 +138,6 @@ class TSKModel:
         return textbook
 
     @property
-    def zero_slopes(self) -> np.ndarray:
-        """Where a rule has no slope, (n_rules, n_inputs); nowhere where constants are all."""
-        found = np.zeros((self.n_rules, self.n_inputs), dtype=bool)
-        found[:, : self.coefficients.shape[1] - 1] = ~self.coefficients[:, 1:].any(axis=2)
-        return found
-
-    @property
     def common_slopes(self) -> np.ndarray:
         """Where a rule has the slope that most rules have in common, (n_rules, n_inputs)."""
         found = np.zeros((self.n_rules, self.n_inputs), dtype=bool)

@@ -1,4 +1,4 @@
-r"""Slopes that are common to several rules, or zero: those of which the evidence asks no more.
+r"""Slopes that are common to several rules: those of which the evidence asks no more.
 
 With M and P of ``evidence``, the consequents of an output have the posterior N(m, V), V = sigma^2 /
 n M^-1, and before the data N(0, V0), V0 = sigma^2 / n P^-1. That some rules have one slope by an
@@ -7,9 +7,8 @@ what it takes from the evidence is
 
     -2 log p(C u = 0 | data) / p(C u = 0)  =  (C m)' (C V C')^-1 C m + log |C V C'| - log |C V0 C'|
 
-at a given sigma. So one factorisation tells of every input and of every set of rules, and whether
-the slope that they have in common is zero. What is found is conditioned on before the next is asked
-for.
+at a given sigma. So one factorisation tells of every input and of every set of rules. What is found
+is conditioned on before the next is asked for.
 """
 
 import numpy as np
@@ -24,7 +23,7 @@ _TINY = np.finfo(float).tiny
 
 
 def common_slopes(posterior: Laplace, coefficients):
-    """Which rules have one slope by an input, and of which it is zero; see ``Penalty``.
+    """Inputs, and the rules that have one slope by each, as ``Penalty.common``.
 
     ``coefficients`` are the local ones, (n_columns, n_outputs).
     """
@@ -34,26 +33,18 @@ def common_slopes(posterior: Laplace, coefficients):
         unit * half.T @ half
         for half in (factor.half_solve(identity) for factor in (posterior.prior, posterior.factor))
     )
-    state, every = [coefficients, after, before], np.arange(line.n_rules)
-    common, zero = [], []
-    whole = [_loss(state, line.of_slopes(j, every)) for j in line.slopes]
+    state, every, found = [coefficients, after, before], np.arange(line.n_rules), []
+    whole = [_loss(state, line.contrasts(j, every)) for j in line.slopes]
     for k in np.argsort(whole, kind="stable"):
         j, rules = line.slopes[k], every
-        while True:
+        while rules.size > 1:
             contrasts = line.contrasts(j, rules)
-            if _loss(state, contrasts) <= _WORTH * contrasts.shape[0] * n_outputs:
+            if _loss(state, contrasts) < _WORTH * contrasts.shape[0] * n_outputs:
+                found.append((j, tuple(rules.tolist())))
+                state = _given(state, contrasts)
                 break
             rules = np.delete(rules, _farthest(state, line.of_slopes(j, rules)))
-        if rules.size == 1 < every.size:
-            continue
-        state = _given(state, contrasts)
-        slope = line.of_slopes(j, rules[:1])
-        if _loss(state, slope) < _WORTH * n_outputs:
-            zero.append((j, tuple(rules.tolist())))
-            state = _given(state, slope)
-        elif rules.size > 1:
-            common.append((j, tuple(rules.tolist())))
-    return tuple(sorted(common)), tuple(sorted(zero))
+    return tuple(sorted(found))
 
 
 def _loss(state, contrasts):

@@ -60,15 +60,13 @@ class Penalty:
     # where there is none. Those of some rows hold for others, where other inputs are constant.
     pulls: dict[tuple[int, ...], float] = field(default_factory=dict)
     slope_pulls: dict[int, float] = field(default_factory=dict)
-    # Inputs, and the rules that have one slope by each; and those that have none.
+    # Inputs, and the rules that have one slope by each.
     common: tuple[tuple[int, tuple[int, ...]], ...] = ()
-    zero: tuple[tuple[int, tuple[int, ...]], ...] = ()
 
     @property
     def n_held(self):
         """How many coefficients less there are: of every common slope, one is left."""
-        n_zero = sum(len(rules) for _, rules in self.zero)
-        return n_zero + sum(len(rules) - 1 for _, rules in self.common)
+        return sum(len(rules) - 1 for _, rules in self.common)
 
     @property
     def rho(self):
@@ -195,23 +193,21 @@ class CommonLine:
 
     def free(self, penalty: Penalty):
         """Orthonormal columns that u is made of, (n_columns, n_free); None where it is any."""
-        if not (penalty.common or penalty.zero):
+        if not penalty.common:
             return None
-        key = penalty.common, penalty.zero
-        if key not in self._free:
+        if penalty.common not in self._free:
             is_free, shared = np.ones(self.height.size, dtype=bool), []
-            for j, rules in (*penalty.common, *penalty.zero):
-                own = np.array(rules) * self._n_basis + 1 + self._function[j]
+            for j, rules in penalty.common:
+                k = self._function[j]
+                own = np.array(rules) * self._n_basis + 1 + k
                 is_free[own] = False
                 # Slopes per unit of z are one: local ones are as the units.
                 column = np.zeros(self.height.size)
-                column[own] = 1.0 / self._per_unit[list(rules), self._function[j]]
+                column[own] = 1.0 / self._per_unit[list(rules), k]
                 shared.append(column / np.linalg.norm(column))
-            columns = np.array(shared[: len(penalty.common)]).reshape(-1, self.height.size)
-            self._free[key] = np.ascontiguousarray(
-                np.concatenate([np.eye(self.height.size)[is_free], columns]).T
-            )
-        return self._free[key]
+            columns = np.concatenate([np.eye(self.height.size)[is_free], shared])
+            self._free[penalty.common] = np.ascontiguousarray(columns.T)
+        return self._free[penalty.common]
 
     def of_slopes(self, j, rules):
         """Slopes by an input of some rules out of u, per unit of z times a typical extent."""
@@ -221,8 +217,8 @@ class CommonLine:
         return found
 
     def contrasts(self, j, rules):
-        """What they differ by, in orthonormal contrasts; of one rule, nothing."""
-        return linalg.helmert(rules.size, full=True)[1:] @ self.of_slopes(j, rules)
+        """What they differ by, in orthonormal contrasts."""
+        return linalg.helmert(rules.size) @ self.of_slopes(j, rules)
 
     def weights(self, penalty: Penalty):
         """All weights of a penalty, in a row; not to be changed."""

@@ -6,8 +6,9 @@ tolerance of ``simplicity`` s where
     e^2 - e_best^2  <=  ((1 + s)^2 - 1) min(e_best^2, v - e_best^2) :
 
 s of the error where the signal is clear, and no more than that part of what the best explains where
-it is weak. Of all within it the one that costs least to read is taken; of equal cost, that with the
-smaller error. What is then left of the tolerance goes into agreement (``start``).
+it is weak. Of all within it that have no more rules than the best, the one that costs least to read
+is taken; of equal cost, that with the smaller error. What is then left of the tolerance goes into
+agreement (``start``).
 """
 
 from dataclasses import dataclass
@@ -85,7 +86,10 @@ def tolerated(least: float, variance: float, simplicity: float) -> float:
     return least + excess * min(least, max(variance - least, 0.0))
 
 
-def chosen(judged, most):
-    """Of all whose error is at most so much, the one that costs least to read."""
-    within = [one for one in judged if one.squared_error <= most]
+def chosen(judged, best: Judged, most):
+    """Of all of at most this error and no more rules than the best, what costs least to read."""
+    n_rules = best.candidate.n_rules
+    within = [
+        one for one in judged if one.squared_error <= most and one.candidate.n_rules <= n_rules
+    ]
     return min(within, key=lambda one: (one.cost, one.squared_error))

@@ -47,20 +47,15 @@ class StructureSearch:
 
     def run(self, kinds: Sequence[str] = KINDS) -> Start:
         """A start from the structure that is chosen."""
-        line = self.trials.one_rule, [self.trials.one_rule] * len(self.folds)
-        one_rule = self._judge(*line)
-        self.judged += [one_rule, self._judge(*_with_common_slopes(*line))]
+        one_rule = self._judge(self.trials.one_rule, [self.trials.one_rule] * len(self.folds))
+        self.judged.append(one_rule)
         for kind in kinds:
             self._grow(kind, one_rule)
-        # With fewer slopes there would be two looks at every size, and chance would have two.
-        whole = [
-            one
-            for one in self.judged
-            if one.candidate.n_rules == 1 or not one.candidate.has_common_slopes
-        ]
+        # With slopes in common there would be two looks at every size, and chance would have two.
+        whole = [one for one in self.judged if not one.candidate.has_common_slopes]
         best = best_of(whole, self.judges)
         most = tolerated(best.squared_error, self._variance(), self.simplicity)
-        found = chosen(self.judged, most)
+        found = chosen(self.judged, best, most)
         left = most / found.squared_error if found.squared_error > 0.0 else 1.0
         return started(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
 

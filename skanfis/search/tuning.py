@@ -285,12 +285,12 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
 
 
 def with_common_slopes(tuned: Tuned, free) -> Tuned:
-    """The same with one slope for as many rules as the evidence allows, or none, by every input."""
+    """The same with one slope for as many rules as the evidence allows, by every input."""
     problem = tuned.problem
-    if not {"alpha", "slope"} <= {*free} or problem.n_columns > MOST_COLUMNS:
+    if "alpha" not in free or problem.n_columns > MOST_COLUMNS:
         return tuned
-    common, zero = common_slopes(tuned.posterior, tuned.solved.normal.coefficients)
-    penalty = replace(tuned.penalty, common=common, zero=zero)
+    common = common_slopes(tuned.posterior, tuned.solved.normal.coefficients)
+    penalty = replace(tuned.penalty, common=common)
     again = problem.with_penalty(penalty)
     n_rows, n_rules = tuned.posterior.n_rows, problem.antecedent.n_rules
     posterior = laplace(

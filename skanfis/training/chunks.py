@@ -364,15 +364,12 @@ def fitted_weights(estimator, sums: RowSums):
             ([place(name) for name in one["inputs"]], one["pull"]) for one in estimator.pulls_
         ],
         "slope_pulls": [[place(name), pull] for name, pull in estimator.slope_pulls_.items()],
-        "common": _listed(estimator.model_.common_slopes, sums),
-        "zero": _listed(estimator.model_.zero_slopes, sums),
+        "common": [
+            [j, np.flatnonzero(rules).tolist()]
+            for j, rules in enumerate(estimator.model_.common_slopes.T)
+            if rules.any()
+        ],
     }
-
-
-def _listed(where, sums):
-    """Inputs with slopes, but for those that never change, and the rules where it holds."""
-    slopes = [j for j in sums.inputs.varying(sums.consequent_inputs) if j is not None]
-    return [[j, np.flatnonzero(where[:, j]).tolist()] for j in slopes if where[:, j].any()]
 
 
 def solve(sums: RowSums, given, first=None) -> Solved:
@@ -389,9 +386,8 @@ def solve(sums: RowSums, given, first=None) -> Solved:
         if "alpha" not in given:
             found["pulls"] = {tuple(component): pull for component, pull in first["pulls"]}
             found["slope_pulls"] = dict(first["slope_pulls"])
-            # Slopes that rules have in common stay so, and so do those that are zero.
-            for key in ("common", "zero"):
-                found[key] = tuple((j, tuple(rules)) for j, rules in first[key])
+            # Slopes that rules have in common stay so.
+            found["common"] = tuple((j, tuple(rules)) for j, rules in first["common"])
         given = found | given
     free = [key for key in _FREE if key not in given]
     problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
@@ -415,7 +411,7 @@ def _model(sums, problem, evaluation):
     inputs, targets, slopes = sums.inputs, sums.targets, sums.consequent_inputs
     order = 1 if slopes.size else 0
     coefficients = with_common_slopes(
-        evaluation.coefficients, evaluation.masses, problem.penalty, slopes
+        evaluation.coefficients, evaluation.masses, problem.penalty.common, slopes
     )
     return replace(
         sums.base,

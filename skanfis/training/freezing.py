@@ -71,7 +71,7 @@ class ModelBuilder:
         coefficients = with_common_slopes(
             evaluation.coefficients,
             evaluation.masses,
-            start.penalty,
+            start.penalty.common,
             self.request.consequent_inputs,
         )
         support = rule_support(rows, trained, self.n_coefficients, firing)
