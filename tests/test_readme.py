@@ -26,10 +26,9 @@ def run(block, capsys):
 def test_ordinary_data_as_pasted(capsys):
     namespace, out = run(BLOCKS[0], capsys)
     assert float(re.search(r"R² on new rows: (\S+)", out)[1]) > 0.3
-    announced = re.search(r"# (\d+) rules: IF (\w+) is low \.\.\., IF (\w+) is high", BLOCKS[0])
+    announced = re.search(r"# (\d+) rules, on (\w+) and (\w+)", BLOCKS[0])
     assert int(announced[1]) == namespace["model"].n_rules_
-    for term, name in zip(("low", "high"), announced.groups()[1:], strict=True):
-        assert f"IF {name} is {term}\n" in out
+    assert f"IF {announced[2]} is low AND {announced[3]} is high\n" in out
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

@@ -64,6 +64,9 @@ class Premise:
             with np.errstate(divide="ignore"):
                 least = np.log(antecedent.least_width) - raw[first]
             lower[first] = np.minimum(np.maximum(lower[first], least), 0.0)
+            if antecedent.least_width > 0.0:
+                # A cut may become sharper, and no softer: a rule is to be told from the next.
+                upper[first] = 0.0
             for still in (locations[is_crisp], first[is_crisp]):
                 lower[still] = upper[still] = 0.0
         tied = antecedent.tied
