@@ -192,8 +192,9 @@ def _consequent_texts(model, frame, reference, precision):
         # Slopes that move the output by less than the last digit written.
         change = np.abs(values[:, 1:]) * (model.maximum - model.minimum)
         scale = max(np.abs(values[:, 0]).max(), change.max(initial=0.0))
-        # But not where others have one in common: it would be taken for theirs.
-        is_small = (change < 10.0 ** -(precision + 2) * scale) & ~is_common.any(axis=0)[1:]
+        is_small = change < 10.0 ** -(precision + 2) * scale
+        # Where others have one in common, it would be taken for theirs.
+        is_small &= is_small.all(axis=0) | ~is_common[:, 1:].any(axis=0)
         values[:, 1:][is_small] = 0.0
         line = np.where(is_common.any(axis=0), values[first], 0.0)
         if line.any():

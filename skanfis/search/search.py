@@ -54,9 +54,12 @@ class StructureSearch:
         # With slopes in common there would be two looks at every size, and chance would have two.
         whole = [one for one in self.judged if not one.candidate.has_common_slopes]
         best = best_of(whole, self.judges)
-        most = tolerated(best.squared_error, self._variance(), self.simplicity)
+        variance = self._variance()
+        most = tolerated(best.squared_error, variance, self.simplicity)
         found = chosen(self.judged, best, most)
-        left = most / found.squared_error if found.squared_error > 0.0 else 1.0
+        error = found.squared_error
+        most = tolerated(min(error, best.squared_error), variance, self.simplicity)
+        left = most / error if error > 0.0 else 1.0
         return started(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
 
     def _grow(self, kind, one_rule):
@@ -64,13 +67,15 @@ class StructureSearch:
         best, n_further = one_rule, 0
         candidate, in_folds = self.trials.one_rule, [self.trials.one_rule] * len(self.folds)
         while n_further < _FURTHER:
-            candidate = self.trials.larger(kind, candidate)
-            in_folds = [
-                candidate if fold is self.trials else fold.larger(kind, one)
+            larger = self.trials.larger(kind, candidate)
+            each = [
+                larger if fold is self.trials else fold.larger(kind, one)
                 for fold, one in zip(self.folds, in_folds, strict=True)
             ]
-            if candidate is None or None in in_folds:
+            grown = [one for one in each if one is not None]
+            if larger is None or len(grown) < len(each):
                 return
+            candidate, in_folds = larger, grown
             now = self._judge(candidate, in_folds)
             self.judged += [now, self._judge(*_with_common_slopes(candidate, in_folds))]
             n_further += 1

@@ -290,21 +290,19 @@ def with_common_slopes(tuned: Tuned, free) -> Tuned:
     if "alpha" not in free or problem.n_columns > MOST_COLUMNS:
         return tuned
     common = common_slopes(tuned.posterior, tuned.solved.normal.coefficients)
-    penalty = replace(tuned.penalty, common=common)
-    again = problem.with_penalty(penalty)
-    n_rows, n_rules = tuned.posterior.n_rows, problem.antecedent.n_rules
-    posterior = laplace(
-        tuned.evaluation.normal,
-        problem.common_line,
-        tuned.evaluation.mean_squared_error,
-        penalty,
-        n_rows,
-        n_rules,
+    penalty, n_rows = replace(tuned.penalty, common=common), tuned.posterior.n_rows
+    posterior = _improved(
+        problem,
+        tuned.evaluation,
         tuned.displacement,
+        penalty,
+        0,
+        free,
+        n_rows,
+        False,
         tuned.posterior.curvature,
-        tuned.posterior.n_outputs,
     )
-    return replace(tuned, problem=again, posterior=posterior)
+    return replace(tuned, problem=problem.with_penalty(penalty), posterior=posterior)
 
 
 def _with_penalty(tuned: Tuned, penalty: Penalty) -> Tuned:

@@ -72,6 +72,15 @@ def test_the_numerals_of_the_sentences_are_counted():
     assert found_of(replace(A_GRID, coefficients=level)).reading_cost == 12 * (3 + 3)
 
 
+def test_what_is_common_counts_once():
+    common = A_GRID.coefficients.copy()
+    common[:, 2] = 3.0
+    common[1:, 1] = 2.0
+    # Twelve of the last slope, two and one of what is common.
+    found = found_of(replace(A_GRID, coefficients=common))
+    assert found.reading_cost == 12 * (3 + 1) + 12 + 2 + 1
+
+
 def test_nothing_is_found_at_the_limits():
     found = found_of(A_GRID)
     assert found.findings == []

@@ -20,6 +20,15 @@ from ..oracles import textbook_membership
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 NUMBER = r"[-\d.e+]+"
+WRITTEN = [name if name.isidentifier() else f"[{name}]" for name in NAMES]
+
+
+def with_common_slopes(model):
+    """By the first input all rules have one slope, by the last one all but the first rule."""
+    coefficients = model.coefficients.copy()
+    coefficients[:, 1] = coefficients[0, 1]
+    coefficients[1:, -1] = coefficients[1, -1]
+    return replace(model, coefficients=coefficients)
 
 
 def test_noise_is_told_in_the_units_of_the_target():
@@ -63,9 +72,28 @@ def terms_read(text):
     return terms
 
 
+def common_read(text):
+    """Of every output, the terms of the common line by their inputs, as Python expressions."""
+    found = re.findall(r"^Common to the rules, .+?: (.*)$", text, re.MULTILINE)
+    term = rf"(?:^|[+-] ){NUMBER} \* \(?({'|'.join(map(re.escape, WRITTEN))})(?: [+-] {NUMBER}\))?"
+    return [{part[1]: part[0] for part in re.finditer(term, line)} for line in found]
+
+
+def with_common(expression, common):
+    """A rule's value with those parts of the common line by whose inputs it says nothing itself."""
+    return expression + "".join(
+        f" + ({part})" for name, part in common.items() if name not in expression
+    )
+
+
 def predict_as_read(text, rows):
     """Prediction by a person with the text in hand."""
-    terms, rules = terms_read(text), rules_read(text)
+    terms, rules, common = terms_read(text), rules_read(text), common_read(text)
+    if common:
+        rules = [
+            (label, rule, [with_common(e, c) for e, c in zip(expressions, common, strict=True)])
+            for label, rule, expressions in rules
+        ]
     outputs = []
     for row in rows:
         at = dict(zip(NAMES, row, strict=True))
@@ -90,6 +118,20 @@ def test_text_in_full_digits_is_the_model(model, about):
     text = export_text(model, precision=17, about=about)
     # A constant at the origin holds -b * 1e6 with b of 1 / 600: 1e-13 of that.
     assert_allclose(predict_as_read(text, rows), model.predict(rows), atol=1e-9, rtol=1e-10)
+
+
+@pytest.mark.parametrize("name", ["grid", "rule table"])
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_slopes_in_common_are_told_once(name, n_outputs):
+    model = with_common_slopes(MODELS[f"{name}, order 1, {n_outputs} outputs"])
+    text, rows = export_text(model, precision=17), rows_of(model, 1.0)
+    assert_allclose(predict_as_read(text, rows), model.predict(rows), atol=1e-9, rtol=1e-10)
+    expected = np.ones((model.n_rules, 3), dtype=bool)
+    expected[:, 1], expected[0, 2] = False, False
+    assert (model.common_slopes == expected).all()
+    for _, _, values in rules_read(text):
+        assert all("time" not in value for value in values)
+    assert "time" in rules_html(model).partition("common to the rules")[2]
 
 
 @ALL
