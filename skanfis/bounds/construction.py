@@ -1,168 +1,193 @@
 r"""Promises kept by how a model is made: inequalities on the consequents, proven by themselves.
 
-A prediction rises with x_j all over the range where every rule's slope by x_j is not negative, and
-rules stand in order: f_r >= f_s all over the range for certain pairs (r, s).
+Let no rule's slope b_r by x_j be negative. A prediction then rises with x_j all over a box where
+pairs of rules (r, s) keep, with a weight D of each pair,
 
-*Tree.* At a cut of x_j, every rule above and every rule below it: the derivative is
-sigma' (A - B) / s + sigma dA + (1 - sigma) dB, with A and B what both sides say.
+    (3 b_r + b_s) / D + f_r - f_s >= 0   and   (b_r + 3 b_s) / D + f_r - f_s >= 0 .
+
+*Tree.* At a cut of x_j of width 1 / D, with r above it and s below: what both add to dy / dx_j is,
+but for a factor, t b_r + (1 - t) b_s + t (1 - t) D (f_r - f_s) with t = sigma. Over t (1 - t), the
+part of the slopes is at least (sqrt b_r + sqrt b_s)^2, which is no less than either sum. A slope is
+shared among the cuts of x_j on the path of its rule.
 
 *Any other rule base*, with w = softmax of log-strengths and a_r their slopes by x_j: dy / dx_j =
-E b_j + Cov(a, f), and a covariance of two that are in one order is not negative (Chebyshev). On a
-grid it is taken along the input's own axis. Slopes of Gaussian log-memberships are straight lines:
-what is in one order at both ends of the range is so in between, as centres are if widths are equal.
+E b + Cov(a, f). The covariance is the sum over pairs of w_r w_s D (f_r - f_s), with D = a_r - a_s,
+and E b at least that of w_r w_s (b_r + b_s + 2 sqrt(b_r b_s) / (n - 1)), of n rules. On a grid all
+that is along the input's own axis, of n terms. Where D changes its sign, either order counts.
 
 A prediction is within limits where every rule is. All of it is linear in the consequents, and a
-linear function is least at a corner of the range.
+linear function is least at a corner of the box.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from ..antecedent import Antecedent, TreeAntecedent
 from ..membership import Gaussian
 from ..model import TSKModel
 from .inequalities import InfeasibleError, nearest
-from .terms import EPS
+from .terms import EPS, is_known, term_ranges
 
-# In standard deviations of the target: what is left for rounding, and what is none.
-_MARGIN, _ROUNDING = 1e-9, 1e-11
-# Rounds in which corners are added. Slopes are compared this far beyond the range, in its widths.
-_MOST_ROUNDS, _BEYOND = 200, 1e-9
+# In standard deviations of the target: what inequalities are kept by, and slopes over one of the
+# input; what is none.
+MARGIN, _ROUNDING = 1e-9, 1e-11
+_SLOPE = 1e3
+# Rounds in which corners are added. Pieces of the range in which slopes of log-strengths are
+# enclosed; those of Gaussians are straight lines, compared this far beyond its ends, in its widths.
+_MOST_ROUNDS, _PIECES, _BEYOND = 200, 64, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class RuleOrder:
-    """What rules of one output must keep: f[above] - f[below] >= least on a box; -1 is no rule.
+    """What rules of one output must keep on a box, an entry of each array for an inequality.
 
-    ``signs`` are those of the slopes. Rules of one label are to say the same.
+    f[above] - f[below] + gains @ (slopes of both by the input of ``column``) >= least; -1 is no
+    rule, and no column. ``signs`` are those of the slopes, by column.
     """
 
     above: np.ndarray
     below: np.ndarray
+    gains: np.ndarray
+    column: np.ndarray
     least: np.ndarray
     signs: np.ndarray
-    labels: np.ndarray
 
     @classmethod
-    def of(cls, antecedent: Antecedent, signs, limits, low, high, is_line=False):
-        """None where nothing is known that is enough; of a line, all rules are one."""
-        n_rules, pairs = antecedent.n_rules, [np.empty((0, 2), dtype=int)]
-        for j in () if is_line else np.flatnonzero(signs):
-            found = _pairs(antecedent, j, low[j], high[j])
-            if found is None:
+    def of(cls, antecedent: Antecedent, signs, limits, low, high, slope_inputs):
+        """None where nothing is known that is enough; columns are those of ``slope_inputs``."""
+        n_rules, found = antecedent.n_rules, []
+        for j in np.flatnonzero(signs):
+            pairs = _pairs(antecedent, j, low[j], high[j])
+            if pairs is None:
                 return None
-            pairs.append(found[:, :: signs[j]])
-        above, below = np.vstack(pairs).T
-        graph = coo_array((np.ones(above.size), (above, below)), shape=(n_rules, n_rules))
-        # Rules that must not be below one another say the same.
-        labels = connected_components(graph, connection="strong")[1]
-        if is_line:
-            labels = np.zeros(n_rules, dtype=int)
-        apart = labels[above] != labels[below]
-        above, below = above[apart], below[apart]
-        least, every, none = np.zeros(above.size), np.arange(n_rules), np.full(n_rules, -1)
-        for limit, up, down in ((limits[0], every, none), (-limits[1], none, every)):
+            rules, weight, gains = pairs
+            own = weight > 0.0
+            rules, gains = rules[own], gains[own] / weight[own, None]
+            place = np.flatnonzero(slope_inputs == j)
+            column = np.full(len(rules), place[0] if place.size else -1)
+            # What must not be below and what must not be above, where it is to fall.
+            found.append((rules[:, :: signs[j]], signs[j] * gains[:, :: signs[j]], column))
+        nothing = np.empty((0, 2), dtype=int), np.empty((0, 2)), np.empty(0, dtype=int)
+        parts = [np.concatenate(one) for one in zip(nothing, *found, strict=True)]
+        rules, gains, column = parts if found else nothing
+        least, every = np.zeros(len(rules)), np.arange(n_rules)
+        none = np.full(n_rules, -1)
+        for limit, both in ((limits[0], (every, none)), (-limits[1], (none, every))):
             if np.isfinite(limit):
-                above, below = np.append(above, up), np.append(below, down)
+                rules = np.vstack([rules, np.column_stack(both)])
+                gains, column = np.vstack([gains, np.zeros((n_rules, 2))]), np.append(column, none)
                 least = np.append(least, np.full(n_rules, limit))
-        return cls(above, below, least, signs, labels)
+        return cls(*rules.T, gains, column, least, signs[slope_inputs])
 
     def left(self, rules, low, high):
         """By how much each holds for rules a + b x on a box, its worst corner, and its rounding."""
-        rules = np.vstack([rules, np.zeros((1, rules.shape[1]))])
-        apart = rules[self.above] - rules[self.below]
+        # No rule is zero, and no column too.
+        rules = np.pad(rules, ((0, 1), (0, 1)))
+        apart = (rules[self.above] - rules[self.below])[:, :-1]
         corner = np.where(apart[:, 1:] > 0.0, low, high)
-        parts = np.column_stack([-self.least, apart[:, :1], apart[:, 1:] * corner])
+        column = np.where(self.column < 0, -1, 1 + self.column)
+        slopes = np.stack([rules[self.above, column], rules[self.below, column]], axis=1)
+        parts = [-self.least, apart[:, :1], apart[:, 1:] * corner, self.gains * slopes]
+        parts = np.column_stack(parts)
         return parts.sum(axis=1), corner, (8 + parts.shape[1]) * EPS * np.abs(parts).sum(axis=1)
 
-    def repaired(self, rules, low, high):
-        """Rules that keep it for certain, or None: rounding is made good by raising values."""
-        rules = rules.copy()
-        for label in np.unique(self.labels):
-            own = self.labels == label
-            rules[own] = rules[own].mean(axis=0)
-        rules[:, 1:][rules[:, 1:] * self.signs[: rules.shape[1] - 1] < 0.0] = 0.0
-        for _ in range(2 * len(rules) + 3):
-            left, _, rounding = self.left(rules, low, high)
-            is_short = left < rounding
-            if not is_short.any():
-                return rules
-            if (self.above[is_short] < 0).any():
-                return None
-            lift = np.zeros(len(rules))
-            at, by = self.labels[self.above[is_short]], 2.0 * rounding - left
-            np.maximum.at(lift, at, by[is_short])
-            rules[:, 0] += lift[self.labels]
-        return None
+    def holds(self, rules, low, high):
+        """Whether all hold for certain, whatever rounding has done."""
+        left, _, rounding = self.left(rules, low, high)
+        return bool((left >= rounding).all() and (self.signs * rules[:, 1:] >= 0.0).all())
 
 
-def is_in_order(model: TSKModel, output, j, sign) -> bool:
-    """Whether rules in order prove that an output rises (sign 1), or falls, all over the range."""
-    order = RuleOrder.of(
-        model.antecedent,
-        sign * (np.arange(model.n_inputs) == j),
-        (-np.inf, np.inf),
-        model.minimum,
-        model.maximum,
-    )
-    rules = model.coefficients[:, :, output]
-    if order is None:
-        return False
-    n_slopes = rules.shape[1] - 1
-    ends = ((end - model.reference)[:n_slopes] for end in (model.minimum, model.maximum))
-    left, _, rounding = order.left(rules, *ends)
-    return bool((left >= rounding).all() and (sign * rules[:, 1:][:, j : j + 1] >= 0.0).all())
+def order_of(model: TSKModel, signs, limits=(-np.inf, np.inf)):
+    """The order of a frozen model's rules, and the range about its reference."""
+    inputs = np.arange(model.coefficients.shape[1] - 1)
+    order = RuleOrder.of(model.antecedent, signs, limits, model.minimum, model.maximum, inputs)
+    return order, *((end - model.reference)[inputs] for end in (model.minimum, model.maximum))
 
 
 def _pairs(antecedent, j, low, high):
-    """Pairs of rules, (above, below), that in order let predictions rise with x_j; or None."""
+    """Pairs of rules (above, below), the most that D can be, and what slopes gain, times D.
+
+    D of no more than zero asks for nothing. None where slopes of log-strengths have no bound.
+    """
     if isinstance(antecedent, TreeAntecedent):
         return _pairs_of_tree(antecedent, j)
     terms = np.flatnonzero(antecedent.term_inputs == j)
-    steep, start = np.zeros((2, antecedent.n_terms + 1)), 0
-    ends = np.array([low, high]) + _BEYOND * (high - low) * np.array([-1.0, 1.0])
-    for group in antecedent.groups:
-        own = np.flatnonzero(group.inputs == j)
-        if own.size and group.family is not Gaussian:
-            return None
-        if own.size:
-            center, log_width = group.theta[:, own]
-            steep[:, start + own] = (center - ends[:, None]) * np.exp(-2.0 * log_width)
-        start += group.n_terms
+    steep = _slopes(antecedent, j, low, high)
+    if steep is None:
+        return None
     rules = np.arange(antecedent.n_rules)
     if antecedent.grid_counts is None:
-        rules, steep = rules[:, None], steep[:, antecedent.rule_terms].sum(axis=2)
+        table = antecedent.rule_terms
+        rules, steep = rules[:, None], [end[:, table].sum(axis=2) for end in steep]
     elif terms.size:
         axis = antecedent.share_inputs.index(j)
         rules = np.moveaxis(rules.reshape(antecedent.grid_counts), axis, 0)
-        rules, steep = rules.reshape(terms.size, -1), steep[:, terms]
+        rules, steep = rules.reshape(terms.size, -1), [end[:, terms] for end in steep]
     else:
-        return np.empty((0, 2), dtype=int)
-    order = np.lexsort(steep[::-1])
-    rise = np.diff(steep[:, order], axis=1)
-    if (rise < 0.0).any():
+        return np.empty((0, 2), dtype=int), np.empty(0), np.empty((0, 2))
+    n = len(rules)
+    above, below = (one.ravel() for one in np.meshgrid(range(n), range(n), indexing="ij"))
+    apart = above != below
+    above, below = above[apart], below[apart]
+    weight = (steep[1][:, above] - steep[0][:, below]).max(axis=0)
+    both = np.stack([rules[above], rules[below]], axis=-1).reshape(-1, 2)
+    return _both_sums(
+        both, np.repeat(weight, rules.shape[1]), np.ones(both.shape), 2.0 / max(n - 1, 1)
+    )
+
+
+def _both_sums(rules, weight, gains, more):
+    """Either sum of slopes, in which one of both counts for more."""
+    sums = [gains * (1.0 + more * np.array(one)) for one in ((1.0, 0.0), (0.0, 1.0))]
+    return np.tile(rules, (2, 1)), np.tile(weight, 2), np.vstack(sums)
+
+
+def _slopes(antecedent, j, low, high):
+    """Least and largest slopes by x_j of log-memberships on pieces of its range.
+
+    Two arrays (n_pieces, n_terms + 1), the last for no term; None where they have no bound.
+    """
+    groups = [group for group in antecedent.groups if (group.inputs == j).any()]
+    if not all(is_known(group.family) for group in groups):
         return None
-    step = np.append(0, np.cumsum((rise > 0.0).any(axis=0)))
-    found = [np.empty((0, 2), dtype=int)]
-    for k in range(step[-1]):
-        below, above = rules[order[step == k]], rules[order[step == k + 1]]
-        both = np.broadcast_arrays(above[:, None], below[None])
-        found.append(np.column_stack([one.ravel() for one in both]))
-    return np.vstack(found)
+    own = np.append(antecedent.term_inputs == j, False)
+    ends = np.array([low, high]) + _BEYOND * (high - low) * np.array([-1.0, 1.0])
+    if all(group.family is Gaussian for group in groups):
+        # At both ends: in between they are straight lines, and so are differences.
+        found, start = np.zeros((2, own.size)), 0
+        for group in antecedent.groups:
+            stop = start + group.n_terms
+            place = start + np.flatnonzero(group.inputs == j)
+            if place.size:
+                center, log_width = group.theta[:, place - start]
+                found[:, place] = (center - ends[:, None]) * np.exp(-2.0 * log_width)
+            start = stop
+        return found, found
+    edges = np.linspace(*ends, _PIECES + 1)
+    n_inputs = 1 + antecedent.term_inputs.max()
+    pieces = (np.broadcast_to(edge, (n_inputs, _PIECES)) for edge in (edges[:-1], edges[1:]))
+    with np.errstate(all="ignore"):
+        ranges = term_ranges(antecedent, *pieces)
+    found = [np.vstack([end, np.zeros(_PIECES)]).T for end in (ranges.slope_low, ranges.slope_high)]
+    if not np.isfinite([end[:, own] for end in found]).all():
+        return None
+    return [np.where(own, end, 0.0) for end in found]
 
 
 def _pairs_of_tree(antecedent, j):
-    found = [np.empty((0, 2), dtype=int)]
-    paths = [dict(path) for path in antecedent.paths]
-    for node in np.flatnonzero(antecedent.groups[0].inputs == j):
-        above, below = (
+    nodes, paths = antecedent.groups[0], [dict(path) for path in antecedent.paths]
+    cuts = np.flatnonzero(nodes.inputs == j)
+    share = 1.0 / np.array([max(np.isin(cuts, list(path)).sum(), 1) for path in paths])
+    rules, weight = [np.empty((0, 2), dtype=int)], [np.empty(0)]
+    for node in cuts:
+        sides = (
             [r for r, path in enumerate(paths) if path.get(node) is side] for side in (True, False)
         )
-        found.append(np.stack(np.meshgrid(above, below), axis=-1).reshape(-1, 2))
-    return np.vstack(found)
+        rules.append(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2))
+        weight.append(np.full(len(rules[-1]), np.exp(-nodes.theta[1, node])))
+    both = np.vstack(rules)
+    return _both_sums(both, np.concatenate(weight), share[both], 2.0)
 
 
 def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
@@ -177,81 +202,55 @@ def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
     return replace(antecedent, groups=tuple(groups))
 
 
-def held_by_order(orders, evaluation, problem, equalities):
-    """The nearest local consequents that keep an order by output, and what they meet with equality.
+def held_by_order(order, evaluation, problem, k, equal, equal_to, *, margin=MARGIN, is_line=False):
+    """The nearest local consequents of output k that keep an order, (n_columns,).
 
-    ``equalities`` are local rows and what they equal, by output. What is met are rows on [1, z],
-    (n, n_rules, n_basis) of every output. InfeasibleError where there are none.
+    ``equal`` are local rows, and ``equal_to`` what they are; of a line all rules are one. Then what
+    is met with equality: rows on [1, z], (n, n_rules, n_basis). InfeasibleError where none do.
     """
-    local, met = evaluation.normal.coefficients.copy(), []
+    n_rules, n_basis = evaluation.antecedent.n_rules, problem.n_basis
     low, high = (end[problem.consequent_inputs] for end in problem.rows.inputs.box)
-    for k, order in enumerate(orders):
-        solve = _Corners(order, evaluation, problem, equalities[0], equalities[1][:, k])
-        try:
-            local[:, k] = solve.run(k, low, high)
-        except InfeasibleError as failure:
-            failure.output = k
-            raise
-        met.append(solve.met)
-    return local, met
+    normal, targets, basis = evaluation.normal, problem.rows.targets, np.eye(n_basis)
 
+    def in_local(rows):
+        flat = rows.reshape(len(rows), n_rules * n_basis)
+        return problem.local.transform_rows(np.array(flat.T, order="C")).T if len(flat) else flat
 
-class _Corners:
-    """One output: inequalities at corners, which are added until all hold."""
-
-    def __init__(self, order, evaluation, problem, equal, equal_to):
-        self.order, self.normal, self.problem = order, evaluation.normal, problem
-        self.n_rules, self.n_basis = evaluation.antecedent.n_rules, problem.n_basis
-        first = np.array([np.flatnonzero(order.labels == label)[0] for label in order.labels])
-        basis = np.eye(self.n_basis)
-        doubles = np.flatnonzero(first != np.arange(self.n_rules))
-        self.same = np.zeros((doubles.size, self.n_basis, self.n_rules, self.n_basis))
-        for place, r in zip(self.same, doubles, strict=True):
-            place[:, r], place[:, first[r]] = basis, -basis
-        self.same = self.same.reshape(-1, self.n_rules, self.n_basis)
-        self.equal = np.vstack([equal, self._in_local(self.same)])
-        self.equal_to = np.concatenate([equal_to, np.zeros(len(self.same))])
-        # The sign of every slope; of rules that are one, of the first.
-        slopes = np.zeros((0, self.n_rules, self.n_basis))
-        if self.n_basis > 1:
-            signs = order.signs[problem.consequent_inputs]
-            rules, inputs = (
-                one.ravel() for one in np.meshgrid(np.unique(first), np.flatnonzero(signs))
-            )
-            slopes = np.zeros((rules.size, self.n_rules, self.n_basis))
-            slopes[np.arange(rules.size), rules, 1 + inputs] = signs[inputs]
-        self.rows, self.least = slopes, np.zeros(len(slopes))
-        self.met = self.same
-
-    def _in_local(self, rows):
-        flat = rows.reshape(len(rows), self.n_rules * self.n_basis)
-        if not len(flat):
-            return flat
-        return self.problem.local.transform_rows(np.array(flat.T, order="C")).T
-
-    def run(self, k, low, high):
-        targets, start = self.problem.rows.targets, self.normal.coefficients[:, k]
-        # Limits in standardised units; an order has none.
-        order = self.order
-        alone = np.where(order.below < 0, 1.0, np.where(order.above < 0, -1.0, 0.0))
-        least = (order.least - alone * targets.offset[k]) / targets.scale[k] + _MARGIN
-        order, local = replace(order, least=least), self._in_local(self.rows)
-        for _ in range(_MOST_ROUNDS):
-            solved, active = nearest(
-                self.normal.factor, start, self.equal, self.equal_to, local, self.least
-            )
-            rules = self.problem.local.to_global(solved[:, None]).reshape(self.n_rules, -1)
-            left, corner, _ = order.left(rules, low, high)
-            short = np.flatnonzero(left < -_ROUNDING)
-            if not short.size:
-                break
-            rows = np.zeros((short.size, self.n_rules + 1, self.n_basis))
-            at, place = np.column_stack([np.ones(short.size), corner[short]]), np.arange(short.size)
-            rows[place, order.above[short]] += at
-            rows[place, order.below[short]] -= at
-            rows = rows[:, :-1]
-            self.rows = np.concatenate([self.rows, rows])
-            local = np.vstack([local, self._in_local(rows)])
-            self.least = np.append(self.least, order.least[short])
-        self.met = np.concatenate([self.same, self.rows[active]])
-        return solved
+    same = np.zeros((n_rules - 1 if is_line else 0, n_basis, n_rules, n_basis))
+    for r, rows in enumerate(same, start=1):
+        rows[:, r], rows[:, 0] = basis, -basis
+    same = same.reshape(-1, n_rules, n_basis)
+    equal = np.vstack([equal, in_local(same)])
+    equal_to = np.append(equal_to, np.zeros(len(same)))
+    # Slopes have their signs; limits are in standardised units, an order has none.
+    columns = np.flatnonzero(order.signs)
+    every = np.repeat(np.arange(1 if is_line else n_rules), columns.size)
+    columns = np.resize(columns, every.size)
+    held = np.zeros((every.size, n_rules, n_basis))
+    held[np.arange(every.size), every, 1 + columns] = order.signs[columns]
+    at_least = np.full(len(held), _SLOPE * margin)
+    alone = np.sign(order.below - order.above) * (np.minimum(order.above, order.below) < 0)
+    least = (order.least + alone * targets.offset[k]) / targets.scale[k] + margin
+    order, local = replace(order, least=least), in_local(held)
+    for _ in range(_MOST_ROUNDS):
+        start = normal.coefficients[:, k]
+        solved, active = nearest(normal.factor, start, equal, equal_to, local, at_least)
+        rules = problem.local.to_global(solved[:, None]).reshape(n_rules, n_basis)
+        left, corner, _ = order.left(rules, low, high)
+        short = np.flatnonzero(left < -_ROUNDING)
+        if not short.size:
+            break
+        rows, place = np.zeros((short.size, n_rules + 1, n_basis + 1)), np.arange(short.size)
+        at = np.column_stack([np.ones(short.size), corner[short], np.zeros(short.size)])
+        column = np.where(order.column[short] < 0, -1, 1 + order.column[short])
+        for own, sign, gain in zip(
+            (order.above[short], order.below[short]), (1.0, -1.0), order.gains[short].T, strict=True
+        ):
+            rows[place, own] += sign * at
+            rows[place, own, column] += gain
+        held = np.concatenate([held, rows[:, :-1, :-1]])
+        local = np.vstack([local, in_local(rows[:, :-1, :-1])])
+        at_least = np.append(at_least, order.least[short])
+    else:
+        raise InfeasibleError(False)
+    return solved, np.concatenate([same, held[active]])

@@ -17,7 +17,7 @@ from ..learning.objective import Evaluation
 from ..model import TSKModel
 from .certified import cuts_of, spread_points
 from .constraints import Constraints
-from .construction import RuleOrder, held_by_order, with_equal_widths
+from .construction import RuleOrder, held_by_order, order_of, with_equal_widths
 from .enclosure import Enclosure
 from .inequalities import HeldPoints, InfeasibleError, paid_for
 from .search import largest
@@ -58,12 +58,11 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     else what is nearest of those. One width for all terms of an input may be what it takes.
     """
     exchange = _Exchange(model, problem, constraints, in_user_units)
+    inputs, before = np.flatnonzero(constraints.signs.any(axis=0)), evaluation.mean_squared_error
     kept = exchange.in_order(evaluation)
-    if kept is None:
-        inputs = np.flatnonzero(constraints.signs.any(axis=0))
+    if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
         equal = with_equal_widths(evaluation.antecedent, inputs)
-        kept = exchange.in_order(problem.evaluate(equal.parameters))
-    before = evaluation.mean_squared_error
+        kept = _nearer(kept, exchange.in_order(problem.evaluate(equal.parameters)))
     if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
         kept = exchange.nearest(evaluation, kept)
     exchange.warn_of_contradictions(evaluation, kept)
@@ -84,6 +83,12 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
             ConstraintWarning,
         )
     return kept, report
+
+
+def _nearer(one, other):
+    """Of two, either of which may be None, the one of the smaller error."""
+    found = [kept for kept in (one, other) if kept is not None]
+    return min(found, key=lambda kept: kept.evaluation.mean_squared_error, default=None)
 
 
 class _Exchange:
@@ -107,33 +112,40 @@ class _Exchange:
 
     def in_order(self, evaluation, is_line=False):
         """The nearest consequents of rules in order; None where there is no such order, or none."""
-        constraints, problem, model = self.points.constraints, self.problem, self.model
-        limits = np.stack([constraints.lower, constraints.upper], axis=1)
-        orders, antecedent = [], evaluation.antecedent
-        for signs, ends in zip(constraints.signs, limits, strict=True):
-            order = RuleOrder.of(antecedent, signs, ends, *problem.rows.inputs.box, is_line)
+        constraints, problem = self.points.constraints, self.problem
+        equal, equal_to = self.points.equalities(evaluation.antecedent)
+        local, met = evaluation.normal.coefficients.copy(), []
+        for k, signs in enumerate(constraints.signs):
+            limits = constraints.lower[k], constraints.upper[k]
+            wanted = 0 * signs if is_line else signs
+            box, slopes = problem.rows.inputs.box, problem.consequent_inputs
+            order = RuleOrder.of(evaluation.antecedent, wanted, limits, *box, slopes)
             if order is None:
                 return None
-            orders.append(order)
-        try:
-            equal = self.points.equalities(antecedent)
-            local, met = held_by_order(orders, evaluation, problem, equal)
-        except InfeasibleError:
-            return None
-        coefficients = self.in_user_units(problem.local.to_global(local))
-        low, high = model.minimum - model.reference, model.maximum - model.reference
-        n_slopes = coefficients.shape[1] - 1
-        for k, order in enumerate(orders):
-            own = order.repaired(coefficients[:, :, k], low[:n_slopes], high[:n_slopes])
-            if own is None:
+            order = replace(order, signs=signs[slopes])
+            try:
+                local[:, k], rows = held_by_order(
+                    order, evaluation, problem, k, equal, equal_to[:, k], is_line=is_line
+                )
+            except InfeasibleError:
                 return None
-            coefficients[:, :, k] = own
+            met.append(rows)
+        model = self._model(evaluation, local)
+        if is_line:
+            mean = model.coefficients.mean(axis=0)
+            model = replace(model, coefficients=np.broadcast_to(mean, model.coefficients.shape))
+        for k, signs in enumerate(constraints.signs):
+            limits = constraints.lower[k], constraints.upper[k]
+            order, *ends = order_of(model, 0 * signs if is_line else signs, limits)
+            order = replace(order, signs=signs[: len(ends[0])])
+            if not order.holds(model.coefficients[:, :, k], *ends):
+                return None
         scale = np.append(1.0, problem.rows.inputs.scale[problem.consequent_inputs])
         points = self.points.known_points()
         known = tuple(
             [*points, (rows * scale).reshape(len(rows), problem.n_columns).T] for rows in met
         )
-        return Kept(evaluation, self._ended(evaluation, local), coefficients, known)
+        return Kept(evaluation, self._ended(evaluation, local), model.coefficients, known)
 
     def nearest(self, evaluation, ordered):
         """The nearest that is proven, ``ordered`` if that is none, or what is drawn to a line."""
@@ -147,8 +159,7 @@ class _Exchange:
         if is_proven:
             model = self._model(evaluation, solved.local)
             found = Kept(evaluation, ended, model.coefficients, solved.known)
-            nearer = ordered and ordered.evaluation.mean_squared_error <= ended.mean_squared_error
-            return ordered if nearer else found
+            return _nearer(ordered, found)
         return ordered or self._drawn(evaluation, solved)
 
     def _drawn(self, evaluation, solved):

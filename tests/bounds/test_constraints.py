@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.optimize import lsq_linear
+from scipy.optimize import lsq_linear, minimize
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
@@ -67,6 +67,38 @@ def test_predictions_rise_everywhere(params, rng):
     # A structure that is found may grow under what is held.
     if params.get("n_mfs") != "auto":
         assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
+
+
+@pytest.mark.parametrize("kind", ["tree", "grid", "scattered"])
+def test_predictions_rise_beyond_the_range_too(kind):
+    """Steps up, and steps that an optimiser takes, from anywhere; the free fit falls there."""
+    rng = np.random.default_rng(3)
+    X = rng.uniform(-1.0, 1.0, (200, 2)) * [1.0, 30.0]
+    y = np.exp(X[:, 0]) * (1.5 + np.sin(X[:, 1] / 10.0)) + 0.3 * rng.normal(size=200)
+    params = {"partition": kind, "max_rules": 6, "out_of_bounds": LinearExtrapolation(2.0)}
+    free, held = (
+        ANFISRegressor(**params, **known).fit(X, y) for known in ({}, {"monotonic_cst": [1, 0]})
+    )
+    assert held.constraints_["certified"]
+    low, high = 3.0 * X.min(axis=0), 3.0 * X.max(axis=0)
+    box = np.stack([low, high], axis=1)
+    assert_array_equal(monotonicity(held, 0, box), [1])
+    before = rng.uniform(low, high, (100_000, 2))
+    after = before + rng.exponential(0.3, (100_000, 1)) * [1.0, 0.0]
+
+    def fall(model, start, stop):
+        return model.predict(start) - model.predict(stop)
+
+    assert fall(held, before, after).max() <= 1e-12
+    assert fall(free, before, after).max() > 1e-3
+    for start, stop in zip(before[:5], after[:5], strict=True):
+        found = minimize(
+            lambda u: -fall(held, u[None, :2], u[None, :2] + [abs(u[2]), 0.0])[0],
+            [*start, stop[0] - start[0]],
+            method="Nelder-Mead",
+            options={"maxfev": 100},
+        )
+        assert -found.fun <= 1e-12
 
 
 def test_data_that_contradict_are_told(rng):

@@ -4,12 +4,10 @@ from functools import partial
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
-from scipy.optimize import minimize
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
 from skanfis.bounds.certified import cuts_of
-from skanfis.bounds.construction import RuleOrder, held_by_order, with_equal_widths
+from skanfis.bounds.construction import RuleOrder, held_by_order, order_of, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
 from skanfis.bounds.search import largest
 from skanfis.consequent import in_user_units
@@ -61,23 +59,17 @@ def problem_of(antecedent, rng, order=1, n_inputs=2, alpha=1e-3):
 
 def kept(problem, evaluation, order):
     """A frozen model whose rules are in order."""
-    nothing = np.empty((0, problem.n_columns)), np.empty((0, 1))
-    local, _ = held_by_order([order], evaluation, problem, nothing)
-    rows = problem.rows
-    inputs, targets = rows.inputs, rows.targets
+    nothing = np.empty((0, problem.n_columns)), np.empty(0)
+    local, _ = held_by_order(order, evaluation, problem, 0, *nothing)
+    inputs, targets = problem.rows.inputs, problem.rows.targets
     coefficients = in_user_units(
-        problem.local.to_global(local), inputs, targets, np.arange(2), problem.order
+        problem.local.to_global(local[:, None]), inputs, targets, np.arange(2), problem.order
     )
-    low, high = inputs.minimum - inputs.offset, inputs.maximum - inputs.offset
-    n = coefficients.shape[1] - 1
-    repaired = order.repaired(coefficients[:, :, 0], low[:n], high[:n])
-    # What rounding takes is some billionths of the target's deviation.
-    assert_allclose(repaired, coefficients[:, :, 0], atol=1e-7 * targets.scale[0])
     antecedent = evaluation.antecedent.change_units(inputs.offset, inputs.scale)
     return TSKModel(
         antecedent=antecedent,
         initial_antecedent=antecedent,
-        coefficients=repaired[:, :, None],
+        coefficients=coefficients,
         reference=inputs.offset,
         spread=inputs.scale,
         minimum=inputs.minimum,
@@ -95,21 +87,27 @@ def test_what_is_in_order_rises(kind):
     rng, falls, n_proven, n_asked = np.random.default_rng(5), 0, 0, 0
     for place in range(300):
         antecedent = KINDS[kind](rng, 2)
-        # One input rises or falls, or two; what scattered rules keep by two inputs is one line.
-        signs = np.array([1, -1, 0])[rng.integers(0, 3, 2)]
-        signs = signs if signs.any() else np.array([1, 0])
-        antecedent = with_equal_widths(antecedent, np.flatnonzero(signs))
-        problem = problem_of(antecedent, rng, order=place % 2)
+        # One input rises or falls, or two.
+        signs, order = np.array([1, -1, 0])[rng.integers(0, 3, 2)], place % 2
+        if not signs.all() or (kind == "scattered" and not order):
+            signs = np.array([1 - 2 * (place % 3 > 0), 0])
+        if not order:
+            # Without slopes to help, terms must have one width.
+            antecedent = with_equal_widths(antecedent, [0, 1])
+        problem = problem_of(antecedent, rng, order)
         evaluation = problem.evaluate(antecedent.parameters)
-        order = RuleOrder.of(antecedent, signs, FREE[0], *problem.rows.inputs.box)
-        model = kept(problem, evaluation, order)
+        box, slopes = problem.rows.inputs.box, problem.consequent_inputs
+        held = RuleOrder.of(antecedent, signs, FREE[0], *box, slopes)
+        model = kept(problem, evaluation, held)
+        certificate, *ends = order_of(model, signs)
+        assert certificate.holds(model.coefficients[:, :, 0], *ends)
         scale, low, high = problem.rows.targets.scale[0], model.minimum, model.maximum
         X = rng.uniform(low, high, (500, 2))
         slopes = model.gradient(X)[:, :, 0] * model.spread / scale
         assert (signs * slopes >= -1e-9).all()
         free = evaluation.coefficients.reshape(antecedent.n_rules, -1)
         ends = [end[: free.shape[1] - 1] for end in problem.rows.inputs.box]
-        falls += (order.left(free, *ends)[0] < 0.0).any()
+        falls += (held.left(free, *ends)[0] < 0.0).any()
         for j in np.flatnonzero(signs):
             slope = partial(Enclosure(model, 0, -float(signs[j])).slope, j=int(j))
             until = 1e-9 * scale / model.spread[j]
