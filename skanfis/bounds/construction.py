@@ -29,13 +29,11 @@ from ..model import TSKModel
 from .inequalities import InfeasibleError, nearest
 from .terms import EPS, is_known, term_ranges
 
-# In standard deviations of the target: what inequalities are kept by, and slopes over one of the
-# input; what is none.
-MARGIN, _ROUNDING = 1e-9, 1e-11
-_SLOPE = 1e3
+# In standard deviations of the target, what inequalities are kept by; slopes are by so much more.
+_MARGIN, _SLOPE = 1e-9, 1e3
 # Rounds in which corners are added. Pieces of the range in which slopes of log-strengths are
 # enclosed; those of Gaussians are straight lines, compared this far beyond its ends, in its widths.
-_MOST_ROUNDS, _PIECES, _BEYOND = 200, 64, 1e-9
+_MOST_ROUNDS, _PIECES, _BEYOND = 60, 64, 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +167,7 @@ def _slopes(antecedent, j, low, high):
     pieces = (np.broadcast_to(edge, (n_inputs, _PIECES)) for edge in (edges[:-1], edges[1:]))
     with np.errstate(all="ignore"):
         ranges = term_ranges(antecedent, *pieces)
-    found = [np.vstack([end, np.zeros(_PIECES)]).T for end in (ranges.slope_low, ranges.slope_high)]
+    found = [end.T for end in (ranges.slope_low, ranges.slope_high)]
     if not np.isfinite([end[:, own] for end in found]).all():
         return None
     return [np.where(own, end, 0.0) for end in found]
@@ -202,7 +200,7 @@ def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
     return replace(antecedent, groups=tuple(groups))
 
 
-def held_by_order(order, evaluation, problem, k, equal, equal_to, *, margin=MARGIN, is_line=False):
+def held_by_order(order, evaluation, problem, k, equal, equal_to, is_line=False):
     """The nearest local consequents of output k that keep an order, (n_columns,).
 
     ``equal`` are local rows, and ``equal_to`` what they are; of a line all rules are one. Then what
@@ -228,16 +226,16 @@ def held_by_order(order, evaluation, problem, k, equal, equal_to, *, margin=MARG
     columns = np.resize(columns, every.size)
     held = np.zeros((every.size, n_rules, n_basis))
     held[np.arange(every.size), every, 1 + columns] = order.signs[columns]
-    at_least = np.full(len(held), _SLOPE * margin)
+    at_least = np.full(len(held), _SLOPE * _MARGIN)
     alone = np.sign(order.below - order.above) * (np.minimum(order.above, order.below) < 0)
-    least = (order.least + alone * targets.offset[k]) / targets.scale[k] + margin
+    least = (order.least + alone * targets.offset[k]) / targets.scale[k] + _MARGIN
     order, local = replace(order, least=least), in_local(held)
     for _ in range(_MOST_ROUNDS):
         start = normal.coefficients[:, k]
         solved, active = nearest(normal.factor, start, equal, equal_to, local, at_least)
         rules = problem.local.to_global(solved[:, None]).reshape(n_rules, n_basis)
         left, corner, _ = order.left(rules, low, high)
-        short = np.flatnonzero(left < -_ROUNDING)
+        short = np.flatnonzero(left < -0.5 * _MARGIN)
         if not short.size:
             break
         rows, place = np.zeros((short.size, n_rules + 1, n_basis + 1)), np.arange(short.size)

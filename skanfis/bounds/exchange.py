@@ -24,17 +24,19 @@ from .search import largest
 from .terms import is_known
 
 # Margins, in standard deviations of the target (and of the input): the first, and the last tried.
-_FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.03, 3.0
+_FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.1, 3.0
 # A bound on time: of all proofs of a fit, and of each of those on the way to a line.
-_MOST_ROUNDS, _MOST_BOXES = 40, 30_000
+_MOST_ROUNDS, _ROUNDS_A_MARGIN, _MOST_BOXES = 40, 4, 30_000
 _HALVINGS, _MOST_OF_DRAWN = 6, 5_000
 # Squared errors over the free fit's: rules in order may cost 2 % of the error; more than a tenth,
-# for a line, is told; what data contradict raises it by so much.
-_DEAR, _FAR, _PLAIN = 1.02**2, 1.1**2, 1.01**2
+# drawn, is told; what data contradict raises it by so much.
+_DEAR, _FAR, _PLAIN, _ROWS_TOLD = 1.02**2, 1.1**2, 1.01**2, 5
 # Of each round half of the points are the worst, and half are spread over the others.
 _SAMPLE, _POINTS_A_ROUND = 2048, 40
 # That data which keep the constraints are said to contradict them.
 _CHANCE = 1e-3
+# Of all slopes of the free fit by an input, the part of wrong sign that no shape of rules explains.
+_MUCH = 0.25
 # Inputs up to which a sample has all corners of the range.
 _CORNERS = 8
 
@@ -50,22 +52,25 @@ class Kept:
     drawn: float = 0.0
 
 
-def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, in_user_units):
+def constrained(
+    model: TSKModel, evaluation, problem, constraints: Constraints, in_user_units, rows
+):
     """The consequents next to those of an evaluation that keep all constraints; and a report.
 
-    ``model`` is in the user's units, ``in_user_units`` brings coefficients on [1, z] to them. Where
+    ``model`` is in the user's units, ``in_user_units`` brings coefficients on [1, z] to them;
+    ``rows`` are X, y and their numbers, to say which of them contradict what is known. Where
     rules in order cost too little to matter, they are the answer; else what is nearest and proven;
     else what is nearest of those. One width for all terms of an input may be what it takes.
     """
     exchange = _Exchange(model, problem, constraints, in_user_units)
     inputs, before = np.flatnonzero(constraints.signs.any(axis=0)), evaluation.mean_squared_error
-    kept = exchange.in_order(evaluation)
+    ordered = kept = exchange.in_order(evaluation)
     if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
         equal = with_equal_widths(evaluation.antecedent, inputs)
         kept = _nearer(kept, exchange.in_order(problem.evaluate(equal.parameters)))
     if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
-        kept = exchange.nearest(evaluation, kept)
-    exchange.warn_of_contradictions(evaluation, kept)
+        kept = _nearer(kept, exchange.nearest(evaluation, ordered))
+    exchange.warn_of_contradictions(evaluation, kept, *rows)
     after = kept.evaluation.mean_squared_error
     report = {
         "certified": True,
@@ -148,36 +153,37 @@ class _Exchange:
         return Kept(evaluation, self._ended(evaluation, local), model.coefficients, known)
 
     def nearest(self, evaluation, ordered):
-        """The nearest that is proven, ``ordered`` if that is none, or what is drawn to a line."""
+        """The nearest that is proven, or what is drawn as far as it can be."""
         try:
             solved, is_proven = self.proven(evaluation)
         except InfeasibleConstraintsError:
             if ordered is None:
                 raise
             return ordered
-        ended = self._ended(evaluation, solved.local)
         if is_proven:
-            model = self._model(evaluation, solved.local)
-            found = Kept(evaluation, ended, model.coefficients, solved.known)
-            return _nearer(ordered, found)
-        return ordered or self._drawn(evaluation, solved)
+            return self._kept(evaluation, solved, solved.local)
+        return self._drawn(evaluation, solved, ordered)
 
-    def _drawn(self, evaluation, solved):
-        """Consequents between those found and one line, as near as can be proven."""
-        line = self.in_order(evaluation, is_line=True)
-        if line is None:
+    def _kept(self, evaluation, solved, local, drawn=0.0):
+        """What is proven as it is."""
+        coefficients = self._model(evaluation, local).coefficients
+        return Kept(evaluation, self._ended(evaluation, local), coefficients, solved.known, drawn)
+
+    def _drawn(self, evaluation, solved, ordered):
+        """Between what is found and rules in order, or one line, as near as can be proven."""
+        end = ordered or self.in_order(evaluation, is_line=True)
+        if end is None:
             self._refuse([True] * len(self.inequalities))
-        end = line.evaluation.normal.coefficients
-        drawn, at = 1.0, line
+        drawn, at = 1.0, replace(end, drawn=1.0)
         for step in 0.5 ** np.arange(1, 1 + _HALVINGS) if self.is_known else ():
-            local = solved.local + (drawn - step) * (end - solved.local)
-            model, self.most_boxes = self._model(evaluation, local), self.n_boxes + _MOST_OF_DRAWN
-            worst, is_undecided = self._prove(model)
+            way = end.evaluation.normal.coefficients - solved.local
+            local = solved.local + (drawn - step) * way
+            self.most_boxes = self.n_boxes + _MOST_OF_DRAWN
+            worst, is_undecided = self._prove(self._model(evaluation, local))
             if not is_undecided and not any(map(len, worst)):
                 drawn -= step
-                ended = self._ended(evaluation, local)
-                at = Kept(evaluation, ended, model.coefficients, solved.known, drawn)
-        return replace(at, drawn=drawn)
+                at = self._kept(evaluation, solved, local, drawn)
+        return at
 
     def _ended(self, evaluation, local):
         """The evaluation with other local consequents."""
@@ -205,23 +211,23 @@ class _Exchange:
     def proven(self, evaluation):
         """Consequents without a violation, and whether that is proven."""
         self.most_boxes = _MOST_BOXES
-        for _ in range(_MOST_ROUNDS):
-            solved = self.on_sample(evaluation)
-            if not self.is_known:
-                return solved, False
-            worst, is_undecided = self._prove(self._model(evaluation, solved.local))
-            if self._add(worst):
-                continue
-            if not is_undecided:
-                return solved, True
+        while self.points.margin <= _LAST_MARGIN and self.n_boxes < self.most_boxes:
+            for _ in range(_ROUNDS_A_MARGIN):
+                solved = self.on_sample(evaluation)
+                if not self.is_known:
+                    return solved, False
+                worst, is_undecided = self._prove(self._model(evaluation, solved.local))
+                if not self._add(worst):
+                    if not is_undecided:
+                        return solved, True
+                    break
+            # With more of a margin there is less to find, and boxes are decided sooner.
             self.points.margin *= _RAISE
-            if self.points.margin > _LAST_MARGIN or self.n_boxes >= self.most_boxes:
-                break
         # A margin that does not help is not paid for.
         self.points.margin = _FIRST_MARGIN
-        return self._solve(evaluation), False
+        return self.on_sample(evaluation), False
 
-    def warn_of_contradictions(self, evaluation, kept):
+    def warn_of_contradictions(self, evaluation, kept, X, y, numbers):
         """Warn where less than one fit in a thousand to such data would have to give up so much.
 
         Rules in order give up more than they must: it is the nearest consequents that count.
@@ -238,11 +244,12 @@ class _Exchange:
             return
         # What is paid is half a Mahalanobis distance, over sigma^2 / n, in the posterior.
         n_rows, scale = self.problem.rows.total_weight, self.problem.rows.targets.scale
+        free = self._model(evaluation, evaluation.normal.coefficients)
         for k, name in enumerate(self.model.output_names):
             guilty = [
                 (one.name, active)
                 for one, active in zip(self.inequalities, solved.active, strict=True)
-                if one.output == k and active
+                if one.output == k and active and (one.input is None or self._bends(one, free, X))
             ]
             if not guilty:
                 continue
@@ -250,12 +257,21 @@ class _Exchange:
             count = sum(active for _, active in guilty) + len(self.points.constraints.points)
             if 2.0 * n_rows * solved.paid[k] / noise**2 > chdtri(count, _CHANCE):
                 names = " and ".join(name for name, _ in guilty)
+                models = free, self._model(evaluation, solved.local)
+                squares = [(y[:, k] - model.predict(X)[:, k]) ** 2 for model in models]
+                against = numbers[np.argsort(squares[0] - squares[1])[:_ROWS_TOLD]]
                 warn_user(
                     f"The data contradict {names}: kept, it raises the mean squared error of "
                     f"training from {before:.3g} to {after:.3g} of the variance of {name!r}, far "
-                    "more than noise would. Leave the constraint out, or look at the data.",
+                    f"more than noise would; rows {', '.join(map(str, np.sort(against)))} speak "
+                    "most against it. Leave the constraint out, or look at the data.",
                     ConstraintWarning,
                 )
+
+    def _bends(self, one, free, X):
+        """Whether much of what the free fit does with an input is against its sign."""
+        slopes = one.sign * free.gradient(X[:: max(len(X) // _SAMPLE, 1)])[:, one.input, one.output]
+        return np.maximum(-slopes, 0.0).sum() > _MUCH * np.abs(slopes).sum()
 
     def _add(self, worst):
         """Hold the inequalities at more points each; whether there were any."""

@@ -260,8 +260,13 @@ class _Fit:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
         in_user_units = self.builder.in_user_units
+        X, y = self.data.X[self.trained_on], self.data.y[self.trained_on]
+        known = (
+            np.arange(len(self.data.X)) if self.data.kept is None else self.data.kept.nonzero()[0]
+        )
+        rows = X, y, known[self.trained_on]
         kept, report = constrained(
-            fitted.model, evaluation, run.problem, constraints, in_user_units
+            fitted.model, evaluation, run.problem, constraints, in_user_units, rows
         )
         if kept.free is not evaluation:
             moved = replace(run.result, evaluation=kept.free)
