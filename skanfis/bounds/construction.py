@@ -67,8 +67,7 @@ class RuleOrder:
             # What must not be below and what must not be above, where it is to fall.
             found.append((rules[:, :: signs[j]], signs[j] * gains[:, :: signs[j]], column))
         nothing = np.empty((0, 2), dtype=int), np.empty((0, 2)), np.empty(0, dtype=int)
-        parts = [np.concatenate(one) for one in zip(nothing, *found, strict=True)]
-        rules, gains, column = parts if found else nothing
+        rules, gains, column = map(np.concatenate, zip(nothing, *found, strict=True))
         least, every = np.zeros(len(rules)), np.arange(n_rules)
         none = np.full(n_rules, -1)
         for limit, both in ((limits[0], (every, none)), (-limits[1], (none, every))):
@@ -76,7 +75,7 @@ class RuleOrder:
                 rules = np.vstack([rules, np.column_stack(both)])
                 gains, column = np.vstack([gains, np.zeros((n_rules, 2))]), np.append(column, none)
                 least = np.append(least, np.full(n_rules, limit))
-        return cls(*rules.T, gains, column, least, signs[slope_inputs])
+        return cls(rules[:, 0], rules[:, 1], gains, column, least, signs[slope_inputs])
 
     def left(self, rules, low, high):
         """By how much each holds for rules a + b x on a box, its worst corner, and its rounding."""
@@ -86,8 +85,9 @@ class RuleOrder:
         corner = np.where(apart[:, 1:] > 0.0, low, high)
         column = np.where(self.column < 0, -1, 1 + self.column)
         slopes = np.stack([rules[self.above, column], rules[self.below, column]], axis=1)
-        parts = [-self.least, apart[:, :1], apart[:, 1:] * corner, self.gains * slopes]
-        parts = np.column_stack(parts)
+        parts = np.column_stack(
+            [-self.least, apart[:, :1], apart[:, 1:] * corner, self.gains * slopes]
+        )
         return parts.sum(axis=1), corner, (8 + parts.shape[1]) * EPS * np.abs(parts).sum(axis=1)
 
     def holds(self, rules, low, high):
@@ -162,15 +162,13 @@ def _slopes(antecedent, j, low, high):
                 found[:, place] = (center - ends[:, None]) * np.exp(-2.0 * log_width)
             start = stop
         return found, found
-    edges = np.linspace(*ends, _PIECES + 1)
+    edges = np.linspace(ends[0], ends[1], _PIECES + 1)
     n_inputs = 1 + antecedent.term_inputs.max()
     pieces = (np.broadcast_to(edge, (n_inputs, _PIECES)) for edge in (edges[:-1], edges[1:]))
     with np.errstate(all="ignore"):
         ranges = term_ranges(antecedent, *pieces)
-    found = [end.T for end in (ranges.slope_low, ranges.slope_high)]
-    if not np.isfinite([end[:, own] for end in found]).all():
-        return None
-    return [np.where(own, end, 0.0) for end in found]
+    least, most = (np.where(own, end.T, 0.0) for end in (ranges.slope_low, ranges.slope_high))
+    return (least, most) if np.isfinite([least, most]).all() else None
 
 
 def _pairs_of_tree(antecedent, j):

@@ -58,7 +58,7 @@ def constrained(
     """The consequents next to those of an evaluation that keep all constraints; and a report.
 
     ``model`` is in the user's units, ``in_user_units`` brings coefficients on [1, z] to them;
-    ``rows`` are X, y and their numbers, to say which of them contradict what is known. Where
+    ``rows`` are X, y and their numbers, to say which contradict what is known, or None. Where
     rules in order cost too little to matter, they are the answer; else what is nearest and proven;
     else what is nearest of those. One width for all terms of an input may be what it takes.
     """
@@ -70,7 +70,7 @@ def constrained(
         kept = _nearer(kept, exchange.in_order(problem.evaluate(equal.parameters)))
     if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
         kept = _nearer(kept, exchange.nearest(evaluation, ordered))
-    exchange.warn_of_contradictions(evaluation, kept, *rows)
+    exchange.warn_of_contradictions(evaluation, kept, rows)
     after = kept.evaluation.mean_squared_error
     report = {
         "certified": True,
@@ -109,11 +109,15 @@ class _Exchange:
     @cached_property
     def sample(self):
         """Points at which violations are sought first."""
-        model, rows = self.model, self.problem.rows.sample or self.problem.rows
-        spread = spread_points(model.minimum, model.maximum, _SAMPLE, _CORNERS)
-        parts = [spread, rows.X[:: max(rows.n_rows // _SAMPLE, 1)]]
+        spread = spread_points(self.model.minimum, self.model.maximum, _SAMPLE, _CORNERS)
         # A row that is there twice is asked about once.
-        return np.unique(np.vstack(parts), axis=0)
+        return np.unique(np.vstack([spread, self.some_rows]), axis=0)
+
+    @property
+    def some_rows(self):
+        """Rows of training."""
+        rows = self.problem.rows.sample or self.problem.rows
+        return rows.X[:: max(rows.n_rows // _SAMPLE, 1)]
 
     def in_order(self, evaluation, is_line=False):
         """The nearest consequents of rules in order; None where there is no such order, or none."""
@@ -124,7 +128,7 @@ class _Exchange:
             limits = constraints.lower[k], constraints.upper[k]
             wanted = 0 * signs if is_line else signs
             box, slopes = problem.rows.inputs.box, problem.consequent_inputs
-            order = RuleOrder.of(evaluation.antecedent, wanted, limits, *box, slopes)
+            order = RuleOrder.of(evaluation.antecedent, wanted, limits, box[0], box[1], slopes)
             if order is None:
                 return None
             order = replace(order, signs=signs[slopes])
@@ -227,7 +231,7 @@ class _Exchange:
         self.points.margin = _FIRST_MARGIN
         return self.on_sample(evaluation), False
 
-    def warn_of_contradictions(self, evaluation, kept, X, y, numbers):
+    def warn_of_contradictions(self, evaluation, kept, rows):
         """Warn where less than one fit in a thousand to such data would have to give up so much.
 
         Rules in order give up more than they must: it is the nearest consequents that count.
@@ -244,12 +248,15 @@ class _Exchange:
             return
         # What is paid is half a Mahalanobis distance, over sigma^2 / n, in the posterior.
         n_rows, scale = self.problem.rows.total_weight, self.problem.rows.targets.scale
-        free = self._model(evaluation, evaluation.normal.coefficients)
+        free, held = (
+            self._model(evaluation, local)
+            for local in (evaluation.normal.coefficients, solved.local)
+        )
         for k, name in enumerate(self.model.output_names):
             guilty = [
                 (one.name, active)
                 for one, active in zip(self.inequalities, solved.active, strict=True)
-                if one.output == k and active and (one.input is None or self._bends(one, free, X))
+                if one.output == k and active and (one.input is None or self._bends(one, free))
             ]
             if not guilty:
                 continue
@@ -257,20 +264,17 @@ class _Exchange:
             count = sum(active for _, active in guilty) + len(self.points.constraints.points)
             if 2.0 * n_rows * solved.paid[k] / noise**2 > chdtri(count, _CHANCE):
                 names = " and ".join(name for name, _ in guilty)
-                models = free, self._model(evaluation, solved.local)
-                squares = [(y[:, k] - model.predict(X)[:, k]) ** 2 for model in models]
-                against = numbers[np.argsort(squares[0] - squares[1])[:_ROWS_TOLD]]
                 warn_user(
                     f"The data contradict {names}: kept, it raises the mean squared error of "
                     f"training from {before:.3g} to {after:.3g} of the variance of {name!r}, far "
-                    f"more than noise would; rows {', '.join(map(str, np.sort(against)))} speak "
-                    "most against it. Leave the constraint out, or look at the data.",
+                    f"more than noise would{_against(rows, k, free, held)}. Leave the "
+                    "constraint out, or look at the data.",
                     ConstraintWarning,
                 )
 
-    def _bends(self, one, free, X):
+    def _bends(self, one, free):
         """Whether much of what the free fit does with an input is against its sign."""
-        slopes = one.sign * free.gradient(X[:: max(len(X) // _SAMPLE, 1)])[:, one.input, one.output]
+        slopes = one.sign * free.gradient(self.some_rows)[:, one.input, one.output]
         return np.maximum(-slopes, 0.0).sum() > _MUCH * np.abs(slopes).sum()
 
     def _add(self, worst):
@@ -353,6 +357,16 @@ class _Exchange:
             worst.append(_worst(places, np.concatenate([one[2] for one in seen]), until))
             is_undecided |= found.bound > until and not len(worst[-1])
         return worst, is_undecided
+
+
+def _against(rows, k, free, held):
+    """Rows whose errors constraints raise the most, as the end of a sentence."""
+    if rows is None:
+        return ""
+    X, y, numbers = rows
+    before, after = ((y[:, k] - model.predict(X)[:, k]) ** 2 for model in (free, held))
+    worst = np.sort(numbers[np.argsort(before - after)[:_ROWS_TOLD]])
+    return f"; rows {', '.join(map(str, worst))} speak most against it"
 
 
 def _worst(points, excess, above):

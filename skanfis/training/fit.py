@@ -260,11 +260,9 @@ class _Fit:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
         in_user_units = self.builder.in_user_units
-        X, y = self.data.X[self.trained_on], self.data.y[self.trained_on]
-        known = (
-            np.arange(len(self.data.X)) if self.data.kept is None else self.data.kept.nonzero()[0]
-        )
-        rows = X, y, known[self.trained_on]
+        # Rows on a cluster have no numbers.
+        is_here = isinstance(self.data, ValidatedData)
+        rows = self.data.numbered(self.trained_on) if is_here else None
         kept, report = constrained(
             fitted.model, evaluation, run.problem, constraints, in_user_units, rows
         )
