@@ -12,6 +12,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from .._validation import warn_user
+from ..antecedent import TreeAntecedent
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..learning.objective import Evaluation
 from ..model import TSKModel
@@ -81,10 +82,12 @@ def constrained(
     }
     if kept.drawn and after > _FAR * before:
         names = ", ".join(one.name for one in exchange.inequalities)
+        is_tree = isinstance(model.antecedent, TreeAntecedent)
+        remedy = "a smaller max_rules" if is_tree else "partition='tree'"
         warn_user(
-            f"To be certain of {names}, the rules were drawn {kept.drawn:.0%} of the way to one "
-            f"line, which raises the error of training by {np.sqrt(after / before) - 1.0:.0%}. Use "
-            "partition='tree', whose rules can be put in order, or Gaussian terms.",
+            f"To be certain of {names}, the rules were drawn {kept.drawn:.0%} of the way to "
+            f"{'rules in order' if ordered else 'one line'}, which raises the error of training by "
+            f"{np.sqrt(after / before) - 1.0:.0%}. Use {remedy}, or leave a constraint out.",
             ConstraintWarning,
         )
     return kept, report
