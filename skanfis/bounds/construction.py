@@ -186,6 +186,18 @@ def _pairs_of_tree(antecedent, j):
     return _both_sums(both, np.concatenate(weight), share[both], 2.0)
 
 
+def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
+    """The same rule base with one width for all Gaussian terms of each of some inputs."""
+    groups = []
+    for group in antecedent.groups:
+        theta = group.theta.copy()
+        for j in inputs if group.family is Gaussian else ():
+            own = group.inputs == j
+            theta[1, own] = theta[1, own].mean() if own.any() else 0.0
+        groups.append(replace(group, theta=theta))
+    return replace(antecedent, groups=tuple(groups))
+
+
 def held_by_order(order, evaluation, problem, k, equal, equal_to, is_line=False):
     """The nearest local consequents of output k that keep an order, (n_columns,).
 

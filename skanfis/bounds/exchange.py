@@ -18,7 +18,7 @@ from ..learning.objective import Evaluation
 from ..model import TSKModel
 from .certified import cuts_of, spread_points
 from .constraints import Constraints
-from .construction import RuleOrder, held_by_order, order_of
+from .construction import RuleOrder, held_by_order, order_of, with_equal_widths
 from .enclosure import Enclosure
 from .inequalities import HeldPoints, InfeasibleError, paid_for
 from .search import largest
@@ -46,6 +46,7 @@ _CORNERS = 8
 class Kept:
     """Consequents that keep all constraints, for certain."""
 
+    free: Evaluation  # the best at the same premises
     evaluation: Evaluation
     coefficients: np.ndarray  # in the user's units
     known: tuple  # what is met with equality, as ``Posterior.given`` takes it
@@ -60,15 +61,16 @@ def constrained(
     ``model`` is in the user's units, ``in_user_units`` brings coefficients on [1, z] to them;
     ``rows`` are X, y and their numbers, to say which contradict what is known, or None. Where
     rules in order cost too little to matter, they are the answer; else what is nearest and proven;
-    else what is drawn as far as it must be.
+    else what is nearest of those. One width for all terms of an input may be what it takes.
     """
     exchange = _Exchange(model, problem, constraints, in_user_units)
-    before = evaluation.mean_squared_error
+    inputs, before = np.flatnonzero(constraints.signs.any(axis=0)), evaluation.mean_squared_error
     ordered = kept = exchange.in_order(evaluation)
     if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
-        found = exchange.nearest(evaluation, ordered)
-        if kept is None or found.evaluation.mean_squared_error < kept.evaluation.mean_squared_error:
-            kept = found
+        equal = with_equal_widths(evaluation.antecedent, inputs)
+        kept = _nearer(kept, exchange.in_order(problem.evaluate(equal.parameters)))
+    if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
+        kept = _nearer(kept, exchange.nearest(evaluation, ordered))
     exchange.warn_of_contradictions(evaluation, kept, rows)
     after = kept.evaluation.mean_squared_error
     report = {
@@ -89,6 +91,12 @@ def constrained(
             ConstraintWarning,
         )
     return kept, report
+
+
+def _nearer(one, other):
+    """Of two, either of which may be None, the one of the smaller error."""
+    found = [kept for kept in (one, other) if kept is not None]
+    return min(found, key=lambda kept: kept.evaluation.mean_squared_error, default=None)
 
 
 class _Exchange:
@@ -149,7 +157,7 @@ class _Exchange:
         known = tuple(
             [*points, (rows * scale).reshape(len(rows), problem.n_columns).T] for rows in met
         )
-        return Kept(self._ended(evaluation, local), model.coefficients, known)
+        return Kept(evaluation, self._ended(evaluation, local), model.coefficients, known)
 
     def nearest(self, evaluation, ordered):
         """The nearest that is proven, or what is drawn as far as it can be."""
@@ -166,7 +174,7 @@ class _Exchange:
     def _kept(self, evaluation, solved, local, drawn=0.0):
         """What is proven as it is."""
         coefficients = self._model(evaluation, local).coefficients
-        return Kept(self._ended(evaluation, local), coefficients, solved.known, drawn)
+        return Kept(evaluation, self._ended(evaluation, local), coefficients, solved.known, drawn)
 
     def _drawn(self, evaluation, solved, ordered):
         """Between what is found and rules in order, or one line, as near as can be proven."""

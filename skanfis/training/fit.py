@@ -230,6 +230,11 @@ class _Fit:
 
         ``weights`` are those of Huber's loss.
         """
+        fitted = self._free(run, weights)
+        return fitted if self.data.constraints is None else self._constrained(fitted, run, weights)
+
+    def _free(self, run, weights):
+        """The model of a run, whatever is known."""
         rows, builder = self.rows, self.builder
         firing = builder.firing(run.evaluation)
         robust = None if weights is None else (weights, self.huber.epsilon)
@@ -239,7 +244,7 @@ class _Fit:
         model = replace(builder.model(run.start, run.evaluation, firing), posterior=posterior)
         model = replace(model, rows_extrapolation=extrapolation_distance(model, rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
-        fitted = Fitted(
+        return Fitted(
             model,
             run.result,
             run.start,
@@ -247,9 +252,8 @@ class _Fit:
             None if weights is None else self.data.spread_over_rows(weights, self.trained_on),
             run.validation_losses,
         )
-        return fitted if self.data.constraints is None else self._constrained(fitted, run)
 
-    def _constrained(self, fitted, run):
+    def _constrained(self, fitted, run, weights):
         """A model next to it that keeps what is known, its result, and a report."""
         evaluation, constraints = run.evaluation, self.data.constraints
         if evaluation.normal is None:
@@ -262,6 +266,9 @@ class _Fit:
         kept, report = constrained(
             fitted.model, evaluation, run.problem, constraints, in_user_units, rows
         )
+        if kept.free is not evaluation:
+            moved = replace(run.result, evaluation=kept.free)
+            fitted = self._free(replace(run, result=moved), weights)
         model = replace(fitted.model, coefficients=kept.coefficients)
         target, posterior = model.target, model.posterior
         return replace(

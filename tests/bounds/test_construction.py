@@ -7,7 +7,7 @@ import pytest
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
 from skanfis.bounds.certified import cuts_of
-from skanfis.bounds.construction import RuleOrder, held_by_order, order_of
+from skanfis.bounds.construction import RuleOrder, held_by_order, order_of, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
 from skanfis.bounds.inequalities import InfeasibleError
 from skanfis.bounds.search import largest
@@ -116,8 +116,7 @@ def test_what_is_in_order_rises(kind):
         order = 1 if kind == "other families" else order
         if not order:
             # Without slopes to help, terms must have one width.
-            for group in antecedent.groups if kind != "tree" else ():
-                group.theta[1] = 0.0
+            antecedent = with_equal_widths(antecedent, [0, 1])
         problem = problem_of(antecedent, rng, order)
         evaluation = problem.evaluate(antecedent.parameters)
         box, slopes = problem.rows.inputs.box, problem.consequent_inputs
