@@ -26,9 +26,10 @@ from .terms import is_known
 
 # Margins, in standard deviations of the target (and of the input): the first, and the last tried.
 _FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.1, 3.0
-# A bound on time: of all proofs of a fit, and of each of those on the way to a line.
-_MOST_ROUNDS, _ROUNDS_A_MARGIN, _MOST_BOXES = 40, 4, 30_000
-_HALVINGS, _MOST_OF_DRAWN = 6, 5_000
+# A bound on time: boxes of all proofs of a fit (fewer where there are more terms than so many),
+# and of each of those on the way to what is certain.
+_MOST_ROUNDS, _ROUNDS_A_MARGIN, _MOST_BOXES, _TERMS = 40, 4, 15_000, 20
+_HALVINGS, _PART_OF_DRAWN = 6, 0.2
 # Squared errors over the free fit's: rules in order may cost 2 % of the error; more than a tenth,
 # drawn, is told; what data contradict raises it by so much.
 _DEAR, _FAR, _PLAIN, _ROWS_TOLD = 1.02**2, 1.1**2, 1.01**2, 5
@@ -64,13 +65,17 @@ def constrained(
     else what is nearest of those. One width for all terms of an input may be what it takes.
     """
     exchange = _Exchange(model, problem, constraints, in_user_units)
-    inputs, before = np.flatnonzero(constraints.signs.any(axis=0)), evaluation.mean_squared_error
-    ordered = kept = exchange.in_order(evaluation)
+    before = evaluation.mean_squared_error
+    kept, free = exchange.in_order(evaluation), evaluation
     if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
-        equal = with_equal_widths(evaluation.antecedent, inputs)
-        kept = _nearer(kept, exchange.in_order(problem.evaluate(equal.parameters)))
+        inputs = np.flatnonzero(constraints.signs.any(axis=0))
+        equal = problem.evaluate(with_equal_widths(free.antecedent, inputs).parameters)
+        other = exchange.in_order(equal)
+        if other and _nearer(kept, other) is other:
+            kept, free = other, equal
+    ordered = kept
     if kept is None or kept.evaluation.mean_squared_error > _DEAR * before:
-        kept = _nearer(kept, exchange.nearest(evaluation, ordered))
+        kept = _nearer(kept, exchange.nearest(free, kept))
     exchange.warn_of_contradictions(evaluation, kept, rows)
     after = kept.evaluation.mean_squared_error
     report = {
@@ -107,6 +112,7 @@ class _Exchange:
         free = replace(model, target=None)
         self.points = HeldPoints(free, problem, constraints, _FIRST_MARGIN)
         self.inequalities = self.points.inequalities
+        self.budget = int(_MOST_BOXES * min(1.0, _TERMS / max(model.antecedent.n_terms, 1)))
         self.is_known = all(is_known(group.family) for group in model.antecedent.groups)
 
     @cached_property
@@ -185,7 +191,7 @@ class _Exchange:
         for step in 0.5 ** np.arange(1, 1 + _HALVINGS) if self.is_known else ():
             way = end.evaluation.normal.coefficients - solved.local
             local = solved.local + (drawn - step) * way
-            self.most_boxes = self.n_boxes + _MOST_OF_DRAWN
+            self.most_boxes = self.n_boxes + int(_PART_OF_DRAWN * self.budget)
             worst, is_undecided = self._prove(self._model(evaluation, local))
             if not is_undecided and not any(map(len, worst)):
                 drawn -= step
@@ -217,7 +223,7 @@ class _Exchange:
 
     def proven(self, evaluation):
         """Consequents without a violation, and whether that is proven."""
-        self.most_boxes = _MOST_BOXES
+        self.most_boxes = self.budget
         while self.points.margin <= _LAST_MARGIN and self.n_boxes < self.most_boxes:
             for _ in range(_ROUNDS_A_MARGIN):
                 solved = self.on_sample(evaluation)
