@@ -11,7 +11,9 @@ tangent as far as L standard deviations h_j of each input (linear),
 
     y(c) + sum_j dy/dx_j(c) clip(x_j - c_j, -L h_j, L h_j) .
 
-Outputs are held within limits as well, see :class:`~skanfis.policies.TargetRange`.
+Where an output rises or falls with some inputs for certain, the tangent by x_j is taken with all
+others of these at their medians: it does not change with them, and turns no slope. Outputs are held
+within limits as well, see :class:`~skanfis.policies.TargetRange`.
 """
 
 from dataclasses import dataclass, replace
@@ -76,6 +78,8 @@ class TSKModel:
         Where not given, see ``naming``.
     rows_extrapolation : float or None
         L for which the outermost training rows speak, see ``training.freezing``.
+    tangent_at : ndarray of shape (n_inputs,) or None
+        Medians of the inputs that outputs are known to rise or fall with, NaN of others.
     """
 
     antecedent: Antecedent
@@ -96,6 +100,7 @@ class TSKModel:
     target: TargetRange | None = None
     posterior: Posterior | None = None
     rows_extrapolation: float | None = None
+    tangent_at: np.ndarray | None = None
 
     def __post_init__(self):
         if not self.term_names:
@@ -223,7 +228,7 @@ class TSKModel:
         def beyond(Z):
             nearest = self._clip(Z)
             way = self._way(Z, nearest)
-            values, slopes = self._linearised(nearest)
+            values, slopes = self._tangent(nearest)
             followed = self._followed(way) if self.out_of_bounds == "linear" else 0.0 * way
             outputs = self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
             # How far the tangent may be from the prediction: what that leaves of it adds in full.
@@ -398,9 +403,30 @@ class TSKModel:
     def _outputs_linear(self, Z):
         """Value and slope of the nearest point in the box."""
         nearest = self._clip(Z)
-        values, slopes = self._linearised(nearest)
+        values, slopes = self._tangent(nearest)
         followed = self._followed(self._way(Z, nearest))
         return self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
+
+    @property
+    def tangent_groups(self):
+        """Inputs whose tangents are found at one place, (n_groups, n_inputs); and what moves there.
+
+        That is a point (n_groups, n_inputs), NaN where an input stays.
+        """
+        if self.tangent_at is None:
+            return np.ones((1, self.n_inputs), dtype=bool), np.full((1, self.n_inputs), np.nan)
+        held = np.isfinite(self.tangent_at)
+        own = np.vstack([~held, np.eye(self.n_inputs, dtype=bool)[held]])
+        return own, np.where(own, np.nan, self.tangent_at)
+
+    def _tangent(self, Z):
+        """As :meth:`_linearised`, of the tangents by which the model goes on."""
+        values, slopes = self._linearised(Z)
+        for own, at in zip(*self.tangent_groups, strict=True):
+            if own.any() and np.isfinite(at).any():
+                there = np.where(np.isfinite(at)[:, None], at[:, None], Z)
+                slopes[own] = self._linearised(there)[1][own]
+        return values, slopes
 
     def _linearised(self, Z):
         """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows).

@@ -122,15 +122,21 @@ class Posterior:
             Whose posterior this is, in the user's units.
         known : list of (ndarray, ndarray or None)
             Of every output points (n_points, n_inputs) in the range; values are known there, or, if
-            others of as many are given, the changes from those.
+            others of as many are given, the changes from those. Or arrays alone: sums over
+            consequents (n_sums, n_rules, 1 + n_inputs) about the reference.
         """
         spans = []
         for k, parts in enumerate(known):
             halves = [np.zeros((sum(self.cross.shape[1:]), 0))]
-            for points, others in parts:
-                rows = self._rows(model, np.array(points.T, order="C"))
-                if others is not None:
-                    rows -= self._rows(model, np.array(others.T, order="C"))
+            for part in parts:
+                if isinstance(part, np.ndarray):
+                    n_changes = self.noise.size * self.premises.shape[1]
+                    rows = np.vstack([part, np.zeros((n_changes, part.shape[1]))])
+                else:
+                    points, others = part
+                    rows = self._rows(model, np.array(points.T, order="C"))
+                    if others is not None:
+                        rows -= self._rows(model, np.array(others.T, order="C"))
                 halves.append(self._halves(rows)[k])
             spans.append(_orthonormal_rows(np.hstack(halves)))
         pinned = np.zeros((self.noise.size, max(map(len, spans)), spans[0].shape[1]))

@@ -98,8 +98,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
     monotonic_cst : array-like of shape (n_features,) or dict, default=None
         1 where the target does not fall as the feature rises, -1 where it does not rise, 0 where
-        nothing is known; or these by name; of several outputs a row for each. Proven to hold all
-        over the range of the training data (:mod:`skanfis.bounds`).
+        nothing is known; or these by name; of several outputs a row for each. Certain to hold in
+        the range of the training data and beyond it (:mod:`skanfis.bounds`).
     constraints : list of OutputLimits and FixedPoint, default=None
         Limits of the output, which hold for every row, and values at points; in the units of X as
         it comes here, behind any scaler. See :mod:`skanfis.bounds`.
@@ -171,7 +171,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Rules that do nothing: "rule", its number; "reason", "never fires" or "repeats rule ...";
         "weight", its part of the data's weight. ``without_rules`` drops them.
     constraints_ : dict or None
-        With constraints: "certified", whether they are proven to hold; "loss_before", and more.
+        With constraints: "certified", that they hold everywhere; "drawn", how much of the way to
+        rules that are certain it took; "loss_before" and "loss_after", of training; "boxes".
     validation_loss_curve_ : ndarray of shape (n_iter,) or None
         With ``early_stopping``: as ``loss_curve_``, of the rows held out.
     robust_weights_ : ndarray of shape (n_samples,) or None
@@ -345,7 +346,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Warns
         -----
         ConvergenceWarning
-            If ``max_iter`` was reached first, or constraints were not proven to hold.
+            If ``max_iter`` was reached first.
+        ConstraintWarning
+            If the data contradict constraints, or these cost much of the fit.
         ConstantInputWarning
             If an input is constant in the training data; it gets no terms and no slope.
         UnderdeterminedWarning

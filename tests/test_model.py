@@ -205,6 +205,26 @@ def test_linear_is_the_tangent_of_the_nearest_row_as_far_as_the_limit(frozen, rn
     assert_allclose(frozen.gradient(X), frozen.gradient(nearest), rtol=1e-12)
 
 
+@pytest.mark.theory
+@ALL
+def test_tangents_do_not_change_with_inputs_that_are_held_elsewhere(frozen, rng):
+    """Every slope is that of the formula with all other held inputs at their places."""
+    at = np.array([0.5, np.nan, -0.2])
+    held = replace(frozen.with_out_of_bounds("linear", 0.7), tangent_at=at)
+    X = around(frozen, rng, 60)
+    nearest = X.clip(frozen.minimum, frozen.maximum)
+    way, expected = held.way_out(X), naive(frozen, nearest)
+    for j in range(3):
+        place = nearest.copy()
+        for i in {0, 2} - {j}:
+            place[:, i] = at[i]
+        expected += way[:, j, None] * frozen.gradient(place)[:, j]
+    assert_allclose(held.predict(X), expected, rtol=1e-10, atol=1e-10)
+    # Next to the edge it is next to the edge's value.
+    edge = nearest + 1e-9 * np.sign(X - nearest)
+    assert_allclose(held.predict(edge), frozen.predict(nearest), atol=1e-6)
+
+
 def test_auto_is_what_the_rows_told_and_what_is_set_where_there_were_none():
     far = build(grid()).with_out_of_bounds("linear", 2.0)
     assert far.with_out_of_bounds("linear", "auto").max_extrapolation == 2.0

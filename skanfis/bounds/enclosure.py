@@ -44,6 +44,7 @@ class _Parts:
     departure: dict[int, tuple[np.ndarray, np.ndarray]]  # of D, broadcast to the shape of f
     curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 log w / dx_j^2, likewise
     way: tuple[np.ndarray, np.ndarray]  # of h, (n_inputs, n_boxes)
+    box: tuple[np.ndarray, np.ndarray]  # the part in the range, likewise
     slack: np.ndarray | None = None  # (n_boxes,), what values are off by
     slope_slack: np.ndarray | None = None  # (n_inputs, n_boxes)
     known: dict = field(default_factory=dict)  # what ``centred`` has found
@@ -62,7 +63,7 @@ class Enclosure:
         self.slopes = np.zeros((model.n_rules, model.n_inputs))
         self.slopes[:, : coefficients.shape[1] - 1] = coefficients[:, 1:]
         self.place = {j: place for place, one in enumerate(self.factors) for j in one}
-        self.reach = reach_of(model)
+        self.reach, self.tangents = reach_of(model), model.tangent_groups
         answers = model.out_of_bounds in ("clip", "linear")
         answering = model if answers else model.with_out_of_bounds("clip")
         # What the rules say is enclosed; that outputs are held comes last, being monotone.
@@ -160,7 +161,7 @@ class Enclosure:
                 for j, ends in of_factor.items():
                     found[j] = tuple(self._placed(end, place) for end in ends)
         middle = self._shaped(centre)
-        parts = _Parts(shares, value, middle, half, departure, curvature, way)
+        parts = _Parts(shares, value, middle, half, departure, curvature, way, (near, far))
         slack, slope_slack = self._slacks(parts, near, far)
         return replace(parts, slack=slack, slope_slack=slope_slack)
 
@@ -232,9 +233,28 @@ class Enclosure:
         """Largest f + sum_j h_j (b_j + D_j (f - phi)) by rule; with end=0 the smallest."""
         furthest = parts.value[end]
         for j in self._ways_out(parts):
-            ahead = parts.way[0][j], parts.way[1][j]
-            furthest = furthest + product(ahead, self._tangent(parts, j))[end]
+            ahead, there = (parts.way[0][j], parts.way[1][j]), self._there(parts, j)
+            tangent = self._tangent(parts, j) if there is parts else self._steepness(there, j)
+            furthest = furthest + product(ahead, tangent)[end]
         return furthest
+
+    def _there(self, parts, j):
+        """Parts of where the tangent along j is found: other inputs may be held elsewhere."""
+        own, at = self.tangents
+        g = int(np.flatnonzero(own[:, j])[0])
+        is_held = np.isfinite(at[g])[:, None]
+        if not is_held.any():
+            return parts
+        if ("there", g) not in parts.known:
+            ends = (np.where(is_held, at[g][:, None], end) for end in parts.box)
+            parts.known["there", g] = self._parts(*ends)
+        return parts.known["there", g]
+
+    def _steepness(self, parts, j):
+        """Range of the slope by x_j where the model is that of its rules."""
+        down, up = self._tangent(parts, j)
+        slack = parts.slope_slack[j]
+        return smallest_mean(down, parts.shares) - slack, largest_mean(up, parts.shares) + slack
 
     def _ways_out(self, parts):
         """Inputs along which some box leaves the range."""
@@ -245,13 +265,15 @@ class Enclosure:
         model, outside = self.model, self._ways_out(parts)
         downs, ups = [], []
         for i in wanted:
-            ends = self._tangent(parts, i)
-            beyond_down = smallest_mean(ends[0], parts.shares) - parts.slope_slack[i]
-            beyond_up = largest_mean(ends[1], parts.shares) + parts.slope_slack[i]
-            down, up = beyond_down, beyond_up
-            for j in outside[outside != i]:
+            down, up = beyond_down, beyond_up = self._steepness(parts, i)
+            if i in outside:
+                beyond_down, beyond_up = self._steepness(self._there(parts, i), i)
+            own, at = self.tangents
+            # A tangent that is found elsewhere along i does not change with x_i.
+            moves = np.isnan(at[own[:, outside].argmax(axis=0), i])
+            for j in outside[(outside != i) & moves]:
                 ahead = parts.way[0][j], parts.way[1][j]
-                least, most = product(ahead, self._mixed(parts, i, j))
+                least, most = product(ahead, self._mixed(self._there(parts, j), i, j))
                 down, up = down + least, up + most
             goes_in = (low[i] <= model.maximum[i]) & (high[i] >= model.minimum[i])
             goes_out = (low[i] < model.minimum[i]) | (high[i] > model.maximum[i])

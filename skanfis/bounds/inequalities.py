@@ -61,10 +61,15 @@ class Solved:
     """Consequents that keep what is held, at some premises."""
 
     local: np.ndarray  # (n_columns, n_outputs)
-    cost: float  # with them, the penalty included
-    paid: np.ndarray  # how much of it each output pays
+    paid: np.ndarray  # what each output adds to the cost
     known: tuple  # by output, what is met with equality: points, and where a slope begins or None
     active: np.ndarray  # how many points of each inequality are met so
+
+
+def paid_for(local, normal):
+    """What each output adds to the cost with local consequents other than the best."""
+    change = local - normal.coefficients
+    return 0.5 * np.sum(change * ((normal.gram + normal.penalty) @ change), axis=0)
 
 
 class HeldPoints:
@@ -109,13 +114,9 @@ class HeldPoints:
 
     def solve(self, evaluation) -> Solved:
         """The nearest consequents."""
-        columns, model = self._columns(evaluation.antecedent), self.model
-        normal, problem = evaluation.normal, self.problem
-        local, targets = normal.coefficients.copy(), problem.rows.targets
-        # By the policy where they lie beyond the range.
-        at_points = columns.with_out_of_bounds(model.out_of_bounds, model.max_extrapolation)
-        equal = self._in_local(at_points.predict(self.standardised(self.constraints.points)))
-        values = (self.constraints.values - targets.offset) / targets.scale
+        columns, normal = self._columns(evaluation.antecedent), evaluation.normal
+        local, problem = normal.coefficients.copy(), self.problem
+        equal, values = self.equalities(evaluation.antecedent)
         known, active = [], np.zeros(len(self.inequalities), dtype=int)
         for k in range(problem.n_outputs):
             own = [p for p, one in enumerate(self.inequalities) if one.output == k]
@@ -128,19 +129,28 @@ class HeldPoints:
                 failure.output = k
                 raise
             known.append(self._known(own, is_active, active))
-        change = local - normal.coefficients
-        paid = 0.5 * np.sum(change * ((normal.gram + normal.penalty) @ change), axis=0)
-        cost = evaluation.cost + float(paid.sum())
-        return Solved(local, cost, paid, tuple(known), active)
+        return Solved(local, paid_for(local, normal), tuple(known), active)
 
-    def _known(self, places, is_active, active):
-        """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
-        model, points, found, start = self.model, self.constraints.points, [], 0
+    def equalities(self, antecedent):
+        """Local rows of the fixed points, and what they are to be, (n_points, n_outputs)."""
+        model, targets = self.model, self.problem.rows.targets
+        # By the policy where they lie beyond the range.
+        columns = self._columns(antecedent)
+        columns = columns.with_out_of_bounds(model.out_of_bounds, model.max_extrapolation)
+        equal = self._in_local(columns.predict(self.standardised(self.constraints.points)))
+        return equal, (self.constraints.values - targets.offset) / targets.scale
+
+    def known_points(self):
+        """What every output is known to be by fixed points, as ``Posterior.given`` takes it."""
+        model, points = self.model, self.constraints.points
         if model.out_of_bounds == "linear":
             # Beyond, a tangent is known, which is more than a value: it is not counted.
             points = points[model.in_bounds(points)]
-        if len(points):
-            found.append((np.clip(points, model.minimum, model.maximum), None))
+        return [(np.clip(points, model.minimum, model.maximum), None)] if len(points) else []
+
+    def _known(self, places, is_active, active):
+        """What one output meets with equality, by ``is_active`` of its rows; counts ``active``."""
+        found, start = self.known_points(), 0
         for p in places:
             chosen = is_active[start : start + len(self.after[p])]
             start, active[p] = start + chosen.size, chosen.sum()
@@ -178,6 +188,8 @@ class HeldPoints:
             coefficients[:, 0] = unit[:, 0]
             coefficients[:, 1 + problem.consequent_inputs] = unit[:, 1:]
         low, high = problem.rows.inputs.box
+        at = self.model.tangent_at
+        at = None if at is None else self.standardised(at)
         return replace(
             self.model,
             antecedent=antecedent,
@@ -189,6 +201,7 @@ class HeldPoints:
             maximum=high,
             support=None,
             out_of_bounds="clip",
+            tangent_at=at,
             output_names=tuple(map(str, range(problem.n_columns))),
         )
 

@@ -139,6 +139,14 @@ class Numbers:
         self.coefficients = _rounded(coefficients, dtype, "a consequent")
         # How far the tangent is followed in each input, so that the sum in deviations is finite.
         self.reach = _reach(model, dtype)
+        # Inputs whose tangents are found at one place: those of group 0 and g, where they are; all
+        # others at ``tangent_at``, about the reference. None where they all are where they are.
+        self.tangent_group = None
+        if model.tangent_at is not None and model.antecedent.n_terms:
+            is_held = np.isfinite(model.tangent_at)
+            self.tangent_group = np.where(is_held, np.cumsum(is_held), 0)
+            at = np.where(is_held, model.tangent_at - model.reference, 0.0)
+            self.tangent_at = _rounded(at, dtype, "a median of an input")
         # (2, n_outputs); None where outputs are not held.
         self.output_limits = None
         if model.out_of_bounds == "linear" or np.isfinite(model.output_limits).any():

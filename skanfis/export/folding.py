@@ -343,7 +343,7 @@ def _reader(inputs, names, is_named):
 def _with_raw_inputs(model, columns, order):
     """The model with its inputs in raw units and in the order of their raw columns."""
     offset, scale = np.array([(column.offset, column.scale) for column in columns]).T
-    support, posterior = model.support, model.posterior
+    support, posterior, at = model.support, model.posterior, model.tangent_at
     coefficients = model.coefficients.copy()
     if model.order:
         coefficients[:, 1:] = (coefficients[:, 1:] / scale[:, None])[:, order]
@@ -368,6 +368,7 @@ def _with_raw_inputs(model, columns, order):
         support=support and support.change_units(offset, scale).reordered(order),
         input_names=tuple(str(columns[j].name) for j in order),
         posterior=posterior and posterior.change_units(model.antecedent, scale, order),
+        tangent_at=at if at is None else np.clip(offset + scale * at, low, high)[order],
     )
     if model.term_names == _default_names(model):
         # Scattered terms are called by where they stand, which is elsewhere in other units.

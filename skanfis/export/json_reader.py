@@ -92,6 +92,7 @@ _FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
     "terms": _list_or_empty,
     "support": _or_null(_list),
     "posterior": _as_it_is,
+    "tangent_at": _or_null(_list),
 }
 INPUT = {
     "name": _text,
@@ -125,7 +126,7 @@ def model_of(document):
             f"the file is of version {shown(version)}, this skanfis reads versions 1 to {VERSION}: "
             "upgrade skanfis to read it."
         )
-    file = _members({"posterior": None} | document, _FILE, "the file")
+    file = _members({"posterior": None, "tangent_at": None} | document, _FILE, "the file")
     n_rules, n_terms = len(file["rules"]), len(file["terms"])
     n_inputs, n_outputs = len(file["inputs"]), len(file["outputs"])
     inputs = _columns(file["inputs"], INPUT, "inputs")
@@ -140,7 +141,9 @@ def model_of(document):
     if posterior is not None:
         n_slopes = n_inputs if rules["consequents"].shape[1] > 1 else 0
         posterior = _posterior(posterior, antecedent, n_inputs, n_slopes, n_outputs)
+    at = file["tangent_at"]
     return TSKModel(
+        tangent_at=None if at is None else _tangent_at(at, minimum, maximum),
         antecedent=antecedent,
         initial_antecedent=_rule_base(file["rule_base"], initial_groups, table),
         coefficients=rules["consequents"],
@@ -300,6 +303,18 @@ def _support(items, n_rules, n_inputs):
     factor = np.zeros((n_rules, n_inputs, n_inputs))
     factor[:, *np.tril_indices(n_inputs)] = found["factor"]
     return RuleSupport(**found | {"factor": factor})
+
+
+def _tangent_at(items, minimum, maximum):
+    """Where tangents by other inputs are taken; null is NaN."""
+    read = _or_null(number, np.nan)
+    found = np.array([read(item, f"tangent_at[{j}]") for j, item in enumerate(items)], dtype=float)
+    if found.size != minimum.size or ((found < minimum) | (found > maximum)).any():
+        raise ValueError(
+            f"tangent_at has {shown(items)}: it must be a number in its range, or null, for each "
+            f"of the {minimum.size} inputs."
+        )
+    return found
 
 
 def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):

@@ -78,6 +78,9 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
             center=support.center,
             factor=support.factor[:, *np.tril_indices(model.n_inputs)],
         )
+    if model.tangent_at is not None:
+        at = [None if np.isnan(one) else float(one) for one in model.tangent_at]
+        document["tangent_at"] = at
     if posterior:
         if model.posterior is None:
             raise ValueError(

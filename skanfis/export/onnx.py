@@ -173,18 +173,23 @@ class _Formula:
             # First along a part of the way, since products could overflow.
             far = (followed.abs() * numbers.inverse_spread).sum() + 1.0
             way_out = followed / far
-        strengths, changes = self._strengths(z, way_out)
-        by_rule = self._slopes(z)
-        values = numbers.coefficients[:, :, 0]
-        by_rule = values[None] if by_rule is None else by_rule + values
-        y = self._weigh(strengths, by_rule) + numbers.offset
-        if way_out is not None:
-            ahead = self._slopes(way_out)
-            if strengths is not None:
-                of_strengths = changes.reshape(numbers.model.n_rules, 1) * by_rule
-                ahead = of_strengths if ahead is None else ahead + of_strengths
-            if ahead is not None:
-                y = y + far * self._weigh(strengths, ahead)
+        group = numbers.tangent_group
+        is_plain = group is None
+        y, ahead = self._rules(z, way_out if is_plain else None)
+        y = y + numbers.offset
+        changes = [ahead]
+        if way_out is not None and not is_plain:
+            changes = [
+                self._rules(
+                    z * np.isin(group, (0, g)).astype(float)
+                    + np.where(np.isin(group, (0, g)), 0.0, numbers.tangent_at),
+                    way_out * (group == g).astype(float),
+                )[1]
+                for g in np.unique(group)
+            ]
+        for change in changes:
+            if change is not None:
+                y = y + far * change
         if numbers.output_limits is not None:
             low, high = numbers.output_limits
             y = y.at_least(low).at_most(high)
@@ -193,6 +198,18 @@ class _Formula:
             is_out = (x - inside).abs().sum() > 0.0
             y = is_out.where(np.full((1, 1), np.nan), y)
         return y
+
+    def _rules(self, z, way_out):
+        """What the rules say about their offset, and its change along the way out, or None."""
+        strengths, changes = self._strengths(z, way_out)
+        by_rule, values = self._slopes(z), self.numbers.coefficients[:, :, 0]
+        by_rule = values[None] if by_rule is None else by_rule + values
+        ahead = None if way_out is None else self._slopes(way_out)
+        if changes is not None:
+            of_strengths = changes.reshape(self.numbers.model.n_rules, 1) * by_rule
+            ahead = of_strengths if ahead is None else ahead + of_strengths
+        change = None if ahead is None else self._weigh(strengths, ahead)
+        return self._weigh(strengths, by_rule), change
 
     def _strengths(self, z, way_out):
         """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""

@@ -48,6 +48,11 @@ class ValidatedData:
         check_scales(rows.inputs, rows.targets, self.input_names, self.output_names)
         return rows
 
+    def numbered(self, indices):
+        """X and y of some rows, and their numbers among all rows given."""
+        numbers = np.arange(len(self.X)) if self.kept is None else np.flatnonzero(self.kept)
+        return self.X[indices], self.y[indices], numbers[indices]
+
     def spread_weights(self, weights):
         """Weights of these rows as weights of all rows given, zero elsewhere."""
         if self.kept is None:

@@ -231,6 +231,11 @@ class _Fit:
 
         ``weights`` are those of Huber's loss.
         """
+        fitted = self._free(run, weights)
+        return fitted if self.data.constraints is None else self._constrained(fitted, run, weights)
+
+    def _free(self, run, weights):
+        """The model of a run, whatever is known."""
         rows, builder = self.rows, self.builder
         firing = builder.firing(run.evaluation)
         robust = None if weights is None else (weights, self.huber.epsilon)
@@ -243,7 +248,7 @@ class _Fit:
         model = replace(model, support=replace(model.support, marginals=marginals))
         model = replace(model, rows_extrapolation=extrapolation_distance(model, rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
-        fitted = Fitted(
+        return Fitted(
             model,
             run.result,
             run.start,
@@ -251,25 +256,33 @@ class _Fit:
             None if weights is None else self.data.spread_over_rows(weights, self.trained_on),
             run.validation_losses,
         )
-        return fitted if self.data.constraints is None else self._constrained(fitted, run)
 
-    def _constrained(self, fitted, run):
-        """The nearest model that keeps what is known, its result, and a report."""
-        evaluation, model, constraints = run.evaluation, fitted.model, self.data.constraints
+    def _constrained(self, fitted, run, weights):
+        """A model next to it that keeps what is known, its result, and a report."""
+        evaluation, constraints = run.evaluation, self.data.constraints
         if evaluation.normal is None:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
         in_user_units = self.builder.in_user_units
-        evaluation, report, solved = constrained(
-            model, evaluation, run.problem, constraints, in_user_units
+        # Rows on a cluster have no numbers.
+        is_here = isinstance(self.data, ValidatedData)
+        rows = self.data.numbered(self.trained_on) if is_here else None
+        kept, report = constrained(
+            fitted.model, evaluation, run.problem, constraints, in_user_units, rows
         )
-        model = replace(model, coefficients=in_user_units(evaluation.coefficients))
-        target = model.target.within(constraints.lower, constraints.upper, constraints.values)
-        posterior = model.posterior.given(model, solved.known)
+        if kept.free is not evaluation:
+            moved = replace(run.result, evaluation=kept.free)
+            fitted = self._free(replace(run, result=moved), weights)
+        model = replace(fitted.model, coefficients=kept.coefficients)
+        target, posterior = model.target, model.posterior
         return replace(
             fitted,
-            model=replace(model, target=target, posterior=posterior),
-            result=replace(run.result, evaluation=evaluation),
+            model=replace(
+                model,
+                target=target.within(constraints.lower, constraints.upper, constraints.values),
+                posterior=posterior and posterior.given(model, kept.known),
+            ),
+            result=replace(run.result, evaluation=kept.evaluation),
             constraints=report,
         )
 

@@ -90,8 +90,21 @@ class ModelBuilder:
             term_names=start.term_names,
             output_names=self.data.output_names,
             target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
+            tangent_at=self._tangent_at(),
         )
         return model.with_out_of_bounds(*policy_of(self.out_of_bounds))
+
+    def _tangent_at(self):
+        """The medians of the inputs that an output is to rise or fall with; None without any."""
+        constraints, rows = self.data.constraints, self.rows.sample or self.rows
+        if constraints is None or not constraints.signs.any():
+            return None
+        table, weight, _ = representative_rows(rows, _MOST_ROWS)
+        held = constraints.signs.any(axis=0)
+        medians = [weighted_quantile(column, weight, 0.5, 1) for column in table.T[: held.size]]
+        found = rows.inputs.offset + rows.inputs.scale * np.array(medians)
+        found = np.clip(found, rows.inputs.minimum, rows.inputs.maximum)
+        return np.where(held, found, np.nan)
 
     def in_user_units(self, coefficients):
         """Consequents about the inputs' means, from those on [1, z] of standardised data."""

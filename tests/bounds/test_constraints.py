@@ -1,12 +1,12 @@
 """Constraints of the estimator: kept everywhere, proven, the least change, and what is refused."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.optimize import lsq_linear
-from sklearn.exceptions import ConvergenceWarning
+from scipy.optimize import lsq_linear, minimize
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
@@ -70,11 +70,49 @@ def test_predictions_rise_everywhere(params, rng):
         assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
 
 
+@pytest.mark.parametrize("kind", ["tree", "grid", "scattered"])
+def test_predictions_rise_beyond_the_range_too(kind):
+    """Steps up, and steps that an optimiser takes, from anywhere; the free fit falls there."""
+    rng = np.random.default_rng(3)
+    X = rng.uniform(-1.0, 1.0, (200, 2)) * [1.0, 30.0]
+    # It rises with the first input where the second is not low: asked is that it does everywhere.
+    y = np.tanh(3.0 * X[:, 0]) * (1.0 + 4.0 / 3.0 * np.tanh(X[:, 1] / 10.0))
+    y += 0.3 * rng.normal(size=200)
+    params = {"partition": kind, "max_rules": 6, "out_of_bounds": LinearExtrapolation(2.0)}
+    free, held = (
+        ANFISRegressor(**params, **known).fit(X, y) for known in ({}, {"monotonic_cst": [1, 0]})
+    )
+    assert held.constraints_["certified"]
+    low, high = 3.0 * X.min(axis=0), 3.0 * X.max(axis=0)
+    box = np.stack([low, high], axis=1)
+    assert_array_equal(monotonicity(held, 0, box), [1])
+    before = rng.uniform(low, high, (100_000, 2))
+    after = before + rng.exponential(0.3, (100_000, 1)) * [1.0, 0.0]
+
+    def fall(model, start, stop):
+        return model.predict(start) - model.predict(stop)
+
+    assert fall(held, before, after).max() <= 1e-12
+    assert fall(free, before, after).max() > 1e-3
+    for start, stop in zip(before[:5], after[:5], strict=True):
+        found = minimize(
+            lambda u: -fall(held, u[None, :2], u[None, :2] + [abs(u[2]), 0.0])[0],
+            [*start, stop[0] - start[0]],
+            method="Nelder-Mead",
+            options={"maxfev": 100},
+        )
+        assert -found.fun <= 1e-12
+
+
 def test_data_that_contradict_are_told(rng):
     X, _, y = planted(rng)
     # Noise that a fit follows is no contradiction: the other tests turn warnings into errors.
-    with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0'"):
+    message = r"contradict monotonic_cst=-1 of 'y' by 'x0': .*; rows [\d, ]+ speak"
+    with pytest.warns(ConstraintWarning, match=message) as told:
         ANFISRegressor(**QUICK, monotonic_cst=[-1, 0]).fit(X, y)
+    rows = re.search("rows (.*) speak", str(told[0].message))[1].split(", ")
+    # The falling model is a constant in x0: rows at either end are the furthest from it.
+    assert (np.abs(X[[int(row) for row in rows], 0]) > 0.3).all()
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
@@ -87,8 +125,8 @@ def test_one_rule_is_bounded_least_squares(rng):
     centred = X - X.mean(axis=0)
     ends = np.where(signs > 0, 0.0, -np.inf), np.where(signs > 0, np.inf, 0.0)
     expected = lsq_linear(centred, y - y.mean(), bounds=ends).x
-    # Slopes are kept off zero by a margin of 0.001 standard deviations.
-    assert_allclose(held.consequents_[0, 1:], expected, atol=3e-3)
+    # A millionth of deviations keeps slopes off zero.
+    assert_allclose(held.consequents_[0, 1:], expected, atol=3e-6)
     assert (held.consequents_[0, 1:] * signs > 0.0).all()
 
 
@@ -158,16 +196,22 @@ def test_points_beyond_the_range_are_met_by_the_policy(rng, policy):
     assert held.score(X, y) > free.score(X, y) - (0.3 if policy == "clip" else 0.1)
 
 
-def test_what_is_not_proven_is_said(rng):
+def test_what_cannot_be_proven_is_drawn_to_a_line(rng):
+    """Of a family that nobody knows only a line is certain, the best one with the right sign."""
+
     class Own(Gaussian):
         name = "own"
 
     X, _, y = planted(rng)
     held = ANFISRegressor(**QUICK, mf=Own, monotonic_cst=[1, 0])
-    with pytest.warns(ConvergenceWarning, match=r"Not proven .*: monotonic_cst=1 of 'y' by 'x0'"):
+    with pytest.warns(ConstraintWarning, match=r"monotonic_cst=1 of 'y' by 'x0', .*'tree'"):
         held.fit(X, y)
-    assert not held.constraints_["certified"]
-    assert falls(held, 0, rng) < 1e-3
+    assert held.constraints_["certified"]
+    assert held.constraints_["drawn"] == 1.0
+    assert_array_equal(held.consequents_, np.broadcast_to(held.consequents_[0], (9, 3)))
+    # Not the line of least squares, for the penalty: but next to it.
+    line = np.linalg.lstsq(np.column_stack([np.ones(len(y)), X]), y, rcond=None)[0]
+    assert_allclose(held.consequents_[0], line, atol=0.1)
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,10 @@ def generate():
         label = f"{name}, {kind}, order {order}, {n_outputs} outputs, {policy} {limit}"
         beyond = {"out_of_bounds": policy, "max_extrapolation": limit}
         target = None if n_outputs == 1 else narrow_target(n_outputs)
-        model = build(antecedent, order, n_outputs, target=target, **beyond)
+        # Inputs that outputs rise with for certain: none, some, all.
+        held = np.array([[0, 0, 0], [0, 1, 0], [0, 0, 0], [1, 0, 1], [1, 1, 1]][i % 5], dtype=bool)
+        at = np.where(held, OFFSET + SCALE * [0.3, -0.2, 0.1], np.nan) if held.any() else None
+        model = build(antecedent, order, n_outputs, target=target, tangent_at=at, **beyond)
         yield Case(label, kind, model)
 
 

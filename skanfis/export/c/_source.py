@@ -87,6 +87,7 @@ class Source:
         # The tangent of a constant is the constant; one of no length is its start.
         is_constant = not self.n_terms and not self.n_slopes
         linear = self.policy == "linear" and not is_constant and bool(numbers.reach.any())
+        moves = linear and numbers.tangent_group is not None
         facts = {
             "shares": self.n_terms > 0 or not self.is_grid,
             # Strengths that have to be made to sum to one.
@@ -97,6 +98,9 @@ class Source:
             "silent": not answers,
             "fades": covers and answers,
             "linear": linear,
+            # Tangents are found where the row is, or where some inputs are held elsewhere.
+            "plain": linear and not moves,
+            "moves": moves,
             "beyond": linear or (covers and answers),
             "held": numbers.output_limits is not None,
             "saturates": self.limits is not None,
@@ -159,6 +163,12 @@ class Source:
             "given": ", ".join(f"const $real *{name}" for name in taken),
             "taken": ", ".join(taken),
             "coverage_indices": ", ".join(["r", *loops]),
+            "tangent_given": "const $real *at, const $real *way, $int g"
+            if "moves" in self.facts
+            else f"{', '.join(f'const $real *{name}' for name in taken)}, const $real *e",
+            "n_groups": str(1 + np.max(self.numbers.tangent_group, initial=0))
+            if "moves" in self.facts
+            else "1",
             "tangent_indices": ", ".join(["i"] * (self.n_terms > 0) + indices),
             "tangent_arrays": _declared(tangent),
             "arrays": _declared(main),
@@ -187,6 +197,9 @@ class Source:
             found["inverse_spread"] = numbers.inverse_spread
         if "linear" in facts:
             found["reach"] = numbers.reach
+        if "moves" in facts:
+            found["tangent_at"] = numbers.tangent_at
+            found["tangent_group"] = numbers.tangent_group
         if "held" in facts:
             found["output_low"], found["output_high"] = numbers.output_limits
         if self.is_tree:
@@ -221,6 +234,9 @@ class Source:
         if not self.is_grid:
             # Of leaves, then of nodes.
             main["w"] = tangent["s"] = self.model.n_rules + self.is_tree * self.n_terms // 2
+        if "moves" in self.facts:
+            own = {name: main[name] for name in ("l", "w") if name in main}
+            tangent |= own | {"z": self.model.n_inputs, "e": self.model.n_inputs}
         return main, tangent
 
     def _memberships(self):

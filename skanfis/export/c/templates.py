@@ -105,16 +105,21 @@ covers        |$add_support
 covers        |    return covered;
 covers        |}
 covers        |
-linear        |/* The derivative of every sum along e. */
-linear        |static void $name_tangent($given, const $real *e, $real *change)
+plain         |/* Adds the derivative of every sum along e. */
+moves         |/* Adds the derivative along the way of inputs of group g, where others but
+moves         |   the first are held elsewhere. */
+linear        |static void $name_tangent($tangent_given, $real *change)
 linear        |{
 linear shares |    $real $tangent_arrays;
 linear        |    $int $tangent_indices;
 linear        |
+moves         |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+moves         |        const $int group = $name_tangent_group[i];
+moves         |        e[i] = group == g ? way[i] : 0.0R;
+moves         |        z[i] = group == 0 || group == g ? at[i] : $name_tangent_at[i];
+moves         |    }
+moves         |$strengths_inside
 linear shares |$strengths_slope
-linear        |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-linear        |        change[o] = 0.0R;
-linear        |    }
 linear        |$add_changes
 linear        |}
 linear        |
@@ -171,7 +176,13 @@ linear        |
  linear       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
  linear       |            e[i] /= scale;
  linear       |        }
- linear       |        $name_tangent($taken, e, change);
+ linear       |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+ linear       |            change[o] = 0.0R;
+ linear       |        }
+ plain        |        $name_tangent($taken, e, change);
+ moves        |        for (i = 0; i < $n_groups; ++i) {
+ moves        |            $name_tangent(z, e, i, change);
+ moves        |        }
  linear       |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
  linear       |            sum[o] += scale * change[o];
  linear       |        }
