@@ -222,14 +222,14 @@ class InfeasibleError(Exception):
 
 def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
     """The u nearest to ``start`` with E u = e and G u >= h, and which of these hold it back."""
-    base, toward = np.empty((start.size, 0)), np.empty(0)
+    half = factor.half_solve(at_least.T)
+    base, toward = np.empty((len(half), 0)), np.empty(0)
     if equal.size:
         base, triangle = np.linalg.qr(factor.half_solve(equal.T))
         sizes = np.abs(np.diagonal(triangle))
         if (sizes <= _DEPENDENT * sizes.max(initial=0.0)).any() or equal.shape[0] > start.size:
             raise InfeasibleError(True)
         toward = solve_triangular(triangle, equal_to - equal @ start, trans="T")
-    half = factor.half_solve(at_least.T)
     short = least - at_least @ start - half.T @ (base @ toward)
     free = half - base @ (base.T @ half)
     length = np.sqrt(np.sum(free**2, axis=0))

@@ -18,6 +18,7 @@ from ..learning.data import StandardisedData
 from ..membership import Membership
 from .clusters import clustered_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
+from .sample import counting_weight
 from .splits import Split
 from .tuning import Tuned
 
@@ -139,8 +140,7 @@ def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):
     in deviations from what noise alone would give it.
     """
     rows = tuned.problem.rows
-    weight = rows.sample_weight
-    assert weight is not None  # a search sample has them
+    weight = counting_weight(rows)
     residual = tuned.residual - np.average(tuned.residual, axis=0, weights=weight)
     variance = np.average(residual**2, axis=0, weights=weight)
     varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]

@@ -37,6 +37,13 @@ def effective_weight(rows: StandardisedData):
     return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
 
 
+def counting_weight(rows: StandardisedData):
+    """The weights of a search sample in rows, of which the sum is :func:`effective_weight`."""
+    weight = rows.sample_weight
+    assert weight is not None
+    return weight * (effective_weight(rows) / weight.sum())
+
+
 def _fingerprints(rows: StandardisedData):
     """A number for every row of standardised inputs and target."""
     numbers = np.empty(rows.n_rows)

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..antecedent.tree import CRISP, LEAST_WIDTH
+from .sample import counting_weight
 from .tuning import Tuned
 
 # Cuts that are looked at are next to so many quantiles of a leaf.
@@ -41,13 +42,14 @@ class Split:
 def best_splits(tuned: Tuned, inputs, n_most):
     """Those that the residual asks for most, best first; one of every leaf and input."""
     rows, residual = tuned.problem.rows, tuned.residual
-    variance = np.average(residual**2, axis=0, weights=rows.sample_weight)
+    weight = counting_weight(rows)
+    variance = np.average(residual**2, axis=0, weights=weight)
     varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
     if varying.shape[1] > _MOST_CROSSED:
         varying = varying[:, :0]
     found = []
     for leaf, strength in enumerate(tuned.evaluation.antecedent.strengths(rows.X.T)):
-        own = rows.sample_weight * strength
+        own = weight * strength
         center = np.average(varying, axis=0, weights=own)
         basis = np.column_stack([np.ones(rows.n_rows), varying - center])
         along = own[:, None, None] * basis[:, :, None] * residual[:, None]

@@ -40,6 +40,8 @@ def assert_same(read, model):
                 assert_array_equal(read_group.inputs, group.inputs)
         elif field.name in ("support", "target", "posterior") and ours is not None:
             for part in fields(ours):
+                if part.name == "marginals":
+                    continue  # of effects: what the file does not have
                 assert_array_equal(getattr(theirs, part.name), getattr(ours, part.name))
         elif field.name == "rows_extrapolation":
             assert theirs is None  # what came of it is in the file

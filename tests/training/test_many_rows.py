@@ -57,8 +57,8 @@ def test_weights_that_are_all_alike_are_of_no_account_below_one(few_are_many, se
     assert light.n_rules_ == plain.n_rules_
     told, deviation = light.predict(X[:200], return_std=True)
     expected, expected_deviation = plain.predict(X[:200], return_std=True)
-    assert_allclose(told, expected, rtol=0, atol=1e-4)
-    assert_allclose(deviation, expected_deviation, rtol=1e-3)
+    assert_allclose(told, expected, rtol=0, atol=1e-6)
+    assert_allclose(deviation, expected_deviation, rtol=1e-5)
 
 
 @pytest.mark.theory
