@@ -286,8 +286,8 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
 
 def with_common_slopes(tuned: Tuned, free) -> Tuned:
     """The same with one slope for as many rules as the evidence allows, by every input."""
-    problem = tuned.problem
-    if "alpha" not in free or problem.n_columns > MOST_COLUMNS:
+    problem, is_line = tuned.problem, tuned.problem.antecedent.n_rules == 1
+    if is_line or "alpha" not in free or problem.n_columns > MOST_COLUMNS:
         return tuned
     common = common_slopes(tuned.posterior, tuned.solved.normal.coefficients)
     penalty, n_rows = replace(tuned.penalty, common=common), tuned.posterior.n_rows
