@@ -117,7 +117,9 @@ class _Fit:
         if rows.sample is not None:
             start = self.request.for_all(start, rows.sample, rows)
         if not self.solver.goes_on_from_tuning:
-            start = replace(start, displacement=None)
+            # Nor do descents keep slopes in common: every rule has its own.
+            penalty = replace(start.penalty, common=())
+            start = replace(start, displacement=None, penalty=penalty)
         if self.printer is not None:
             self.printer.tell_start(start)
         return start

@@ -1,11 +1,13 @@
 """Slopes that rules have in common: against the marginal likelihood, planted ones, and the text."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import stats
+from sklearn.exceptions import ConvergenceWarning
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
@@ -132,3 +134,14 @@ class TestFit:
         model.partial_fit(X[500:], y[500:])
         assert_array_equal(model.model_.common_slopes, common)
         assert_allclose(model.predict(X), before, atol=0.05)
+
+    @pytest.mark.parametrize("solver", ["varpro", "hybrid", "gradient", "lse"])
+    def test_every_solver_keeps_the_model_that_it_has_trained(self, rng, solver):
+        X, y = planted(rng, 300)
+        model = ANFISRegressor(partition="tree", solver=solver, max_iter=20)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            model.fit(X, y)
+        residual = (y - model.predict(X)) / y.std()
+        assert_allclose(np.mean(residual**2), model.loss_curve_[-1], rtol=1e-9)
+        assert model.model_.common_slopes.any() == (solver == "varpro")
