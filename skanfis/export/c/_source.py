@@ -6,14 +6,13 @@ the strength that comes to a node, from the root on: one exponential per node, n
 "linear" is worked out only outside the box, by the derivative along the way back.
 """
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...policies import SILENT
 from . import templates
-from ._families import BODIES, COSTS, HELPERS
+from ._expressions import body_of, cost_of
 from .dialect import index_type, kept_lines
 
 # C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
@@ -112,7 +111,7 @@ class Source:
         numbers, itemsize = self.numbers, self.numbers.dtype.itemsize
         n_inputs = self.model.n_inputs
         of_terms = [
-            len(terms.constants) * np.array(COSTS[terms.family.name]) for terms in numbers.terms
+            len(terms.constants) * np.array(cost_of(terms.family)) for terms in numbers.terms
         ]
         exponentials, logarithms, multiply_adds = map(int, sum(of_terms, np.zeros(3)))
         n_shares = self.n_terms if self.is_grid else self.model.n_rules
@@ -240,24 +239,16 @@ class Source:
         return main, tangent
 
     def _memberships(self):
-        """Functions of the families in use, after those that they call."""
+        """Functions of the families in use."""
         if self.is_tree:
-            return []
-        functions = []
+            return
         for family in {terms.family: None for terms in self.numbers.terms}:
-            suffixes = ["", "_slope"] if "linear" in self.facts else [""]
-            for suffix, body in zip(suffixes, BODIES[family], strict=False):
+            for suffix in ["", "_slope"] if "linear" in self.facts else [""]:
                 what = "Derivative of the logarithm" if suffix else "Logarithm"
                 head = f"/* {what} of a membership: {family.name}. */\n"
-                head += f"static $real $name_{family.name}{suffix}($real x, const $real *p)\n"
-                functions.append(self.dialect.write(f"{head}{{{body}}}\n"))
-        calls = "".join(functions)
-        helpers = [
-            self.dialect.write(code).lstrip()
-            for name, code in HELPERS.items()
-            if re.search(rf"\b{self.dialect.name}_{name}\(", calls)
-        ]
-        return helpers + functions
+                head += f"static $real $name_{family.name}{suffix}($real x, const $real *p)\n{{\n"
+                body = _indented(body_of(family, self.dialect, bool(suffix)))
+                yield f"{self.dialect.write(head)}{body}\n}}\n"
 
     def _strengths(self, logarithms, rules, slope):
         """Terms, then shares (of a grid, in place) or strengths; or their derivatives along e."""
