@@ -69,91 +69,67 @@ def _bell(x, p):
     return lambda: _log_sigmoid(-exponent), slope
 
 
-def _two_sided_gaussian_constants(theta):
-    location, log_left, log_right, log_plateau = theta
-    return [location, 0.5 * np.exp(log_plateau), np.exp(-log_left), np.exp(-log_right)]
+# Flanks: t, the distance from the shoulder in lengths of the flank, and its derivative by x; then
+# log mu and its derivative by t, as in ``membership.profiles``.
 
 
-def _two_sided_gaussian(x, p):
+def _two_sided_constants(theta):
+    location, log_left, log_right, *log_plateau = theta
+    half = 0.5 * np.exp(log_plateau[0]) if log_plateau else 0.0 * location
+    return [location, half, np.exp(-log_left), np.exp(-log_right)]
+
+
+def _two_sided(x, p):
     d = x - p[0]
     on_left = d < 0.0
-    per_length = on_left.where(p[2], p[3])
-    t = (d.abs() - p[1]).at_least(0.0) * per_length
-    return lambda: t * t * -0.5, lambda: t * per_length * on_left.where(1.0, -1.0)
+    t = (d.abs() - p[1]).at_least(0.0) * on_left.where(p[2], p[3])
+    return t, lambda: on_left.where(-p[2], p[3])
 
 
-def _two_feet_constants(theta):
-    """The feet, one over the lengths of the flanks, and the location, a triangle's corner."""
-    location, log_left, log_right, *log_plateau = theta
-    left, right = np.exp(log_left), np.exp(log_right)
-    half = 0.5 * np.exp(log_plateau[0]) if log_plateau else 0.0
-    return [location - half - left, location + half + right, 1.0 / left, 1.0 / right, location]
+def _one_sided(x, p):
+    return ((x - p[0]) * p[1]).at_least(0.0), lambda: p[1]
 
 
-def _linear(s):
-    return s, lambda: (s > 0.0).where((s < 1.0).where(1.0, 0.0), 0.0)
+def _gaussian_profile(t):
+    return lambda: t * t * -0.5, lambda: -t
 
 
-def _spline(s):
-    """Two parabolas, 2 s^2 and 1 - 2 (1 - s)^2, for s between zero and one; and the slope."""
-    t = -(s - 1.0)
-    return (s < 0.5).where(s * s * 2.0, -(t * t * 2.0 - 1.0)), lambda: s.at_most(t) * 4.0
+def _linear(t):
+    return -(t - 1.0), lambda: (t > 0.0).where((t < 1.0).where(-1.0, 0.0), 0.0)
 
 
-def _flank(profile, s):
-    """Log mu of a flank over a floor, and its derivative by s; zero at the foot, one at the top."""
-    near = s.at_least(0.0).at_most(1.0)
-    mu, mu_slope = profile(near)
-    t, t_near = -(s.at_most(1.0) - 1.0), -(near - 1.0)
-    gaussian = (t_near * t_near * -0.5).exp()
-    mixture = mu + (gaussian - mu) * _FLOOR
-
-    def value():
-        return mixture.log() - (t - t_near) * (t + t_near) * 0.5
-
-    def slope():
-        # Not times 1 - _FLOOR: onnxruntime takes that for one and leaves it out.
-        steep = mu_slope()
-        return (steep + (t_near * gaussian - steep) * _FLOOR) / mixture + (t - t_near)
-
-    return value, slope
+def _spline(t):
+    """Two parabolas, 1 - 2 t^2 and 2 (1 - t)^2, for t between zero and one; and the slope."""
+    s = -(t - 1.0)
+    return (t < 0.5).where(-(t * t * 2.0 - 1.0), s * s * 2.0), lambda: t.at_most(s) * -4.0
 
 
-def _on_two_flanks(profile, x, p):
-    """Whether x is nearer to the left foot; log mu of the lower flank, and its slope."""
-    left, right = (x - p[0]) * p[2], -((x - p[1]) * p[3])
-    on_left = left < right
-    return on_left, *_flank(profile, on_left.where(left, right))
+def _with_foot(profile):
+    """A profile that is zero from t = 1 on, over a floor."""
+
+    def of(t):
+        near = t.at_most(1.0)
+        mu, mu_slope = profile(near)
+        gaussian = (near * near * -0.5).exp()
+        mixture = mu + (gaussian - mu) * _FLOOR
+
+        def slope():
+            # Not times 1 - _FLOOR: onnxruntime takes that for one and leaves it out.
+            steep = mu_slope()
+            return (steep - (near * gaussian + steep) * _FLOOR) / mixture - (t - near)
+
+        return lambda: mixture.log() - (t - near) * (t + near) * 0.5, slope
+
+    return of
 
 
-def _two_feet(profile):
+def _flanked(place, profile):
     def formula(x, p):
-        on_left, value, slope = _on_two_flanks(profile, x, p)
-        return value, lambda: slope() * on_left.where(p[2], -p[3])
+        t, way = place(x, p)
+        value, slope = profile(t)
+        return value, lambda: slope() * way()
 
     return formula
-
-
-def _triangle(x, p):
-    # The corner says on which side x lies, and the slope is zero there: an input that is held at
-    # the edge of the box may lie on it.
-    _, value, slope = _on_two_flanks(_linear, x, p)
-    d = x - p[4]
-    return value, lambda: (d.abs() > 0.0).where(slope() * (d < 0.0).where(p[2], -p[3]), 0.0)
-
-
-def _one_foot_constants(side):
-    def constants(theta):
-        shoulder, log_width = theta
-        width = np.exp(log_width)
-        return [shoulder + side * width, -side / width]
-
-    return constants
-
-
-def _one_foot(x, p):
-    value, slope = _flank(_spline, (x - p[0]) * p[1])
-    return value, lambda: slope() * p[1]
 
 
 def _sigmoid_difference_constants(theta):
@@ -187,7 +163,7 @@ def _two_sigmoids(x, p):
     return value, lambda: _sigmoid(-rise) * per_left - _sigmoid(-fall) * per_right
 
 
-def _side_constants(sign):
+def _one_sided_constants(sign):
     return lambda theta: [theta[0], sign * np.exp(-theta[1])]
 
 
@@ -199,19 +175,19 @@ def _side(x, p):
 _BY_NAME = {
     "gaussian": (_gaussian_constants, _gaussian),
     "bell": (_bell_constants, _bell),
-    "triangular": (_two_feet_constants, _triangle),
-    "trapezoidal": (lambda theta: _two_feet_constants(theta)[:4], _two_feet(_linear)),
-    "two_sided_gaussian": (_two_sided_gaussian_constants, _two_sided_gaussian),
-    "pi_shaped": (lambda theta: _two_feet_constants(theta)[:4], _two_feet(_spline)),
-    "s_shaped": (_one_foot_constants(-1.0), _one_foot),
-    "z_shaped": (_one_foot_constants(1.0), _one_foot),
+    "triangular": (_two_sided_constants, _flanked(_two_sided, _with_foot(_linear))),
+    "trapezoidal": (_two_sided_constants, _flanked(_two_sided, _with_foot(_linear))),
+    "two_sided_gaussian": (_two_sided_constants, _flanked(_two_sided, _gaussian_profile)),
+    "pi_shaped": (_two_sided_constants, _flanked(_two_sided, _with_foot(_spline))),
+    "s_shaped": (_one_sided_constants(-1.0), _flanked(_one_sided, _with_foot(_spline))),
+    "z_shaped": (_one_sided_constants(1.0), _flanked(_one_sided, _with_foot(_spline))),
     "sigmoid_difference": (_sigmoid_difference_constants, _two_sigmoids),
     **{
         one.name: (_sigmoid_product_constants(*signs), _two_sigmoids)
         for signs, one in PRODUCTS.items()
     },
-    "sigmoid_rising": (_side_constants(1.0), _side),
-    "sigmoid_falling": (_side_constants(-1.0), _side),
+    "sigmoid_rising": (_one_sided_constants(1.0), _side),
+    "sigmoid_falling": (_one_sided_constants(-1.0), _side),
 }
 
 # By the class, since another class may go by the same name.
