@@ -73,8 +73,6 @@ class Source:
         self.model, self.n_terms = numbers.model, numbers.model.antecedent.n_terms
         self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
         self.is_tree = numbers.nodes is not None
-        # Whether the terms of a table of rules follow from the order of its rules.
-        self.is_in_order = np.array_equal(numbers.rule_terms.ravel(), np.arange(self.n_terms))
         # Logarithms of terms, and the zero of "none".
         self.n_logarithms = self.n_terms + int((numbers.rule_terms == self.n_terms).any())
         self.facts = self._facts()
@@ -212,7 +210,7 @@ class Source:
         found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
         if self.n_terms and not self.is_tree:
             found["term_input"] = numbers.term_inputs
-        if not self.is_grid and not self.is_tree and not self.is_in_order:
+        if not self.is_grid and not self.is_tree:
             found["rule_terms"] = numbers.rule_terms
         if 0 < self.n_slopes < self.model.n_inputs:
             found["slope_input"] = numbers.slope_inputs
@@ -277,8 +275,8 @@ class Source:
             if self.n_logarithms > self.n_terms:
                 lines.append(f"{logarithms}[{self.n_terms}] = 0.0R;")
             n_each = numbers.rule_terms.shape[1]
-            term = f"r * {n_each} + k" if self.is_in_order else "$name_rule_terms[r][k]"
-            total = _loop("k", n_each, [f"{rules}[r] += {logarithms}[{term}];"])
+            term = f"{logarithms}[$name_rule_terms[r][k]]"
+            total = _loop("k", n_each, [f"{rules}[r] += {term};"])
             lines += _loop("r", self.model.n_rules, [f"{rules}[r] = 0.0R;", *total])
             lines.append(finish.format(rules, "w", self.model.n_rules))
         return _indented(lines)
