@@ -45,8 +45,10 @@ class Numbers:
         # Terms per input of a grid, and where those of each input start; None where there is none.
         self.counts = model.antecedent.grid_counts
         self.block_starts = np.cumsum([0, *(self.counts or ())])[:-1]
-        # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
+        # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none: where no
+        # rule has any, of one column.
         rule_terms, n_terms = model.antecedent.rule_terms, model.antecedent.n_terms
+        rule_terms = rule_terms if rule_terms.size else np.full((model.n_rules, 1), -1)
         self.rule_terms = np.where(rule_terms < 0, n_terms, rule_terms)
         # Of a tree, its nodes from the root on: their constants, inputs, and what is below each.
         self.nodes = None

@@ -1,9 +1,9 @@
 """The .c file: constant tables, and the functions that read them.
 
 The order of work is that of ``skanfis.model``. A grid normalises each input by itself and
-multiplies shares in nested loops: one exponential per term, not per rule and input. A tree parts
-the strength that comes to a node, from the root on: one exponential per node, nothing to normalise.
-"linear" is worked out only outside the box, by the derivative along the way back.
+multiplies shares: one exponential per term, not per rule and input. A tree parts the strength that
+comes to a node, from the root on: one exponential per node, nothing to normalise. "linear" is
+worked out only outside the box, by the derivative along the way back.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,6 @@ from . import templates
 from ._expressions import body_of, cost_of
 from .dialect import index_type, kept_lines
 
-# C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
-_MOST_LOOPS = 12
 # What there is nearly everywhere.
 _INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 
@@ -64,15 +62,11 @@ class Source:
     def __init__(self, numbers, dialect, policy, min_coverage, limits=None, is_part=False):
         self.numbers, self.dialect, self.policy = numbers, dialect, policy
         self.min_coverage, self.limits, self.is_part = min_coverage, limits, is_part
-        n_loops = len(numbers.counts or ())
-        if dialect.std == "c89" and n_loops > _MOST_LOOPS:
-            raise ValueError(
-                f"std='c89' has {_MOST_LOOPS} loops in one another at most, and the grid has "
-                f"terms on {n_loops} inputs. Export as 'c99', or put terms on fewer inputs."
-            )
         self.model, self.n_terms = numbers.model, numbers.model.antecedent.n_terms
         self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
         self.is_tree = numbers.nodes is not None
+        # Whether a table has the terms of every rule.
+        self.has_terms_of_rules = not self.is_tree and numbers.counts != ()
         # Logarithms of terms, and the zero of "none".
         self.n_logarithms = self.n_terms + int((numbers.rule_terms == self.n_terms).any())
         self.facts = self._facts()
@@ -118,8 +112,8 @@ class Source:
             # The place on the sigmoid, its other side, and what goes above and below.
             n_shares, divisions = 0, self.n_terms // 2
             exponentials, logarithms, multiply_adds = divisions, 0, 4 * divisions
-        # Of a grid, products of shares: after two inputs, after three, ...
-        products = int(np.cumprod(numbers.counts or (), dtype=int)[1:].sum())
+        # Of a grid, products of shares.
+        products = self.model.n_rules * max(len(numbers.counts or ()) - 1, 0)
         # The strongest rule is asked, then all that have data.
         asked = "covers" in self.facts and 1 + int(np.count_nonzero(numbers.support[:, 0]))
         main, tangent = self.arrays()
@@ -148,9 +142,7 @@ class Source:
         """What follows the lines that include other files."""
         dialect, indices = self.dialect, ["r", "o"]
         main, tangent = self.arrays()
-        loops = [f"i{k}" for k in range(len(self.numbers.counts or ()))]
-        indices += ["j"] * (self.n_slopes > 0) + loops
-        indices += ["k"] * (not self.is_grid and not self.is_tree)
+        indices += ["j"] * (self.n_slopes > 0) + ["k"] * self.has_terms_of_rules
         # What the place of a row is told by: z, and what the strengths are made of.
         taken = ["z", "l" if self.is_grid else "w"] if "shares" in self.facts else ["z"]
         words = {
@@ -159,7 +151,7 @@ class Source:
             "linkage": "static " if self.is_part else "",
             "given": ", ".join(f"const $real *{name}" for name in taken),
             "taken": ", ".join(taken),
-            "coverage_indices": ", ".join(["r", *loops]),
+            "coverage_indices": "r, k" if self.numbers.counts else "r",
             "tangent_given": "const $real *at, const $real *way, $int g"
             if "moves" in self.facts
             else f"{', '.join(f'const $real *{name}' for name in taken)}, const $real *e",
@@ -210,7 +202,7 @@ class Source:
         found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
         if self.n_terms and not self.is_tree:
             found["term_input"] = numbers.term_inputs
-        if not self.is_grid and not self.is_tree:
+        if self.has_terms_of_rules:
             found["rule_terms"] = numbers.rule_terms
         if 0 < self.n_slopes < self.model.n_inputs:
             found["slope_input"] = numbers.slope_inputs
@@ -288,22 +280,17 @@ class Source:
         body = body.replace("$n_slopes", str(self.n_slopes))
         selects = 0 < self.n_slopes < self.model.n_inputs
         body = body.replace("$input", "$name_slope_input[j]" if selects else "j")
-        if not self.is_grid:
-            body = body.replace("$w", "w[r]").replace("$s", "s[r]")
-            return _indented(_loop("r", self.model.n_rules, body.splitlines()))
-        if not numbers.counts:
-            body = body.replace("$w", "1.0R").replace("$s", "0.0R")
-            return _indented(["r = 0;", *body.splitlines()])
-        last = len(numbers.counts) - 1
-        lines = body.replace("$w", f"w{last}").replace("$s", f"s{last}").splitlines()
-        lines.append("++r;")
-        for k in reversed(range(last + 1)):
-            at = _at(numbers.block_starts[k], f"i{k}")
-            declared = [f"const $real w{k} = {f'w{k - 1} * ' if k else ''}l[{at}];"]
-            if "$s" in template:
-                declared.append(f"const $real s{k} = {f's{k - 1} + ' if k else ''}t[{at}];")
-            lines = _loop(f"i{k}", numbers.counts[k], declared + lines)
-        return _indented(["r = 0;", *lines])
+        head, words = [], ("w[r]", "s[r]")
+        if self.is_grid:
+            words = ("w", "s") if numbers.counts else ("1.0R", "0.0R")
+        if numbers.counts:
+            # The product of the shares of a rule's terms, and the sum of their changes.
+            product = ["w *= l[$name_rule_terms[r][k]];"]
+            change = ["s += t[$name_rule_terms[r][k]];"] if "$s" in template else []
+            head = ["$real w = 1.0R, s = 0.0R;" if change else "$real w = 1.0R;"]
+            head += _loop("k", len(numbers.counts), product + change)
+        body = body.replace("$w", words[0]).replace("$s", words[1])
+        return _indented(_loop("r", self.model.n_rules, [*head, *body.splitlines()]))
 
 
 def _at(start, index):
