@@ -80,7 +80,6 @@ class Source:
         linear = self.policy == "linear" and not is_constant and bool(numbers.reach.any())
         moves = linear and numbers.tangent_group is not None
         facts = {
-            "shares": self.n_terms > 0 or not self.is_grid,
             # Strengths that have to be made to sum to one.
             "normal": (self.n_terms > 0 or not self.is_grid) and not self.is_tree,
             "slopes": self.n_slopes > 0,
@@ -143,18 +142,16 @@ class Source:
         dialect, indices = self.dialect, ["r", "o"]
         main, tangent = self.arrays()
         indices += ["j"] * (self.n_slopes > 0) + ["k"] * self.has_terms_of_rules
-        # What the place of a row is told by: z, and what the strengths are made of.
-        taken = ["z", "l" if self.is_grid else "w"] if "shares" in self.facts else ["z"]
+        # What the place of a row is told by: z, the shares of a grid's terms, and the strengths.
+        taken = ["z", "l", "w"] if self.numbers.counts else ["z", "w"]
         words = {
             "rejection": templates.rejection(self.policy, dialect.std).strip("\n"),
             "finite_input": templates.FINITE_INPUT.strip("\n"),
             "linkage": "static " if self.is_part else "",
-            "given": ", ".join(f"const $real *{name}" for name in taken),
             "taken": ", ".join(taken),
-            "coverage_indices": "r, k" if self.numbers.counts else "r",
             "tangent_given": "const $real *at, const $real *way, $int g"
             if "moves" in self.facts
-            else f"{', '.join(f'const $real *{name}' for name in taken)}, const $real *e",
+            else ", ".join(f"const $real *{name}" for name in [*taken, "e"]),
             "n_groups": str(1 + np.max(self.numbers.tangent_group, initial=0))
             if "moves" in self.facts
             else "1",
@@ -220,9 +217,8 @@ class Source:
             main["change"] = self.model.n_outputs
         if "normal" in self.facts:
             main["l"] = tangent["t"] = self.n_logarithms
-        if not self.is_grid:
-            # Of leaves, then of nodes.
-            main["w"] = tangent["s"] = self.model.n_rules + self.is_tree * self.n_terms // 2
+        # Of a tree those of its leaves, then of its nodes.
+        main["w"] = tangent["s"] = self.model.n_rules + self.is_tree * self.n_terms // 2
         if "moves" in self.facts:
             own = {name: main[name] for name in ("l", "w") if name in main}
             tangent |= own | {"z": self.model.n_inputs, "e": self.model.n_inputs}
@@ -241,7 +237,7 @@ class Source:
                 yield f"{self.dialect.write(head)}{body}\n}}\n"
 
     def _strengths(self, logarithms, rules, slope):
-        """Terms, then shares (of a grid, in place) or strengths; or their derivatives along e."""
+        """Terms, then strengths; or the derivatives of their logarithms along e."""
         if self.is_tree:
             body = kept_lines(templates.TREE_SLOPE if slope else templates.TREE, self.facts)
             words = {"$n_nodes": self.n_terms // 2, "$n_rules": self.model.n_rules}
@@ -249,6 +245,8 @@ class Source:
                 body = body.replace(word, str(number))
             return _indented(body.splitlines())
         numbers, lines = self.numbers, []
+        if numbers.counts == ():
+            return _indented([f"{rules}[0] = {'0.0R' if slope else '1.0R'};"])
         for k, terms in enumerate(numbers.terms):
             at = _at(terms.start, "i")
             value = (
@@ -257,40 +255,27 @@ class Source:
             value += f" * e[$name_term_input[{at}]]" if slope else ""
             lines += _loop("i", len(terms.constants), [f"{logarithms}[{at}] = {value};"])
         finish = "$name_centre({0}, {1}, {2});" if slope else "$name_normalise({0}, {2});"
-        if self.is_grid:
-            for start, count in zip(numbers.block_starts, numbers.counts, strict=True):
-                of_input = (
-                    (f"{logarithms} + {start}", f"l + {start}") if start else (logarithms, "l")
-                )
-                lines.append(finish.format(*of_input, count))
-        else:
-            if self.n_logarithms > self.n_terms:
-                lines.append(f"{logarithms}[{self.n_terms}] = 0.0R;")
-            n_each = numbers.rule_terms.shape[1]
-            term = f"{logarithms}[$name_rule_terms[r][k]]"
-            total = _loop("k", n_each, [f"{rules}[r] += {term};"])
-            lines += _loop("r", self.model.n_rules, [f"{rules}[r] = 0.0R;", *total])
+        for start, count in zip(numbers.block_starts, numbers.counts or (), strict=True):
+            of_input = (f"{logarithms} + {start}", f"l + {start}") if start else (logarithms, "l")
+            lines.append(finish.format(*of_input, count))
+        if self.n_logarithms > self.n_terms:
+            lines.append(f"{logarithms}[{self.n_terms}] = 0.0R;")
+        # Strengths of a grid are products of shares; the rest is sums of logarithms.
+        first, join = ("1.0R", "*=") if self.is_grid and not slope else ("0.0R", "+=")
+        each = f"{rules}[r] {join} {logarithms}[$name_rule_terms[r][k]];"
+        of_rule = [f"{rules}[r] = {first};", *_loop("k", numbers.rule_terms.shape[1], [each])]
+        lines += _loop("r", self.model.n_rules, of_rule)
+        if not self.is_grid:
             lines.append(finish.format(rules, "w", self.model.n_rules))
         return _indented(lines)
 
     def _over_rules(self, template):
-        """What a template does with every rule r, its strength $w and its change $s."""
-        numbers = self.numbers
+        """What a template does with every rule r."""
         body = kept_lines(template, self.facts)
         body = body.replace("$n_slopes", str(self.n_slopes))
         selects = 0 < self.n_slopes < self.model.n_inputs
         body = body.replace("$input", "$name_slope_input[j]" if selects else "j")
-        head, words = [], ("w[r]", "s[r]")
-        if self.is_grid:
-            words = ("w", "s") if numbers.counts else ("1.0R", "0.0R")
-        if numbers.counts:
-            # The product of the shares of a rule's terms, and the sum of their changes.
-            product = ["w *= l[$name_rule_terms[r][k]];"]
-            change = ["s += t[$name_rule_terms[r][k]];"] if "$s" in template else []
-            head = ["$real w = 1.0R, s = 0.0R;" if change else "$real w = 1.0R;"]
-            head += _loop("k", len(numbers.counts), product + change)
-        body = body.replace("$w", words[0]).replace("$s", words[1])
-        return _indented(_loop("r", self.model.n_rules, [*head, *body.splitlines()]))
+        return _indented(_loop("r", self.model.n_rules, body.splitlines()))
 
 
 def _at(start, index):
