@@ -65,8 +65,6 @@ class Source:
         self.model, self.n_terms = numbers.model, numbers.model.antecedent.n_terms
         self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
         self.is_tree = numbers.nodes is not None
-        # Whether a table has the terms of every rule.
-        self.has_terms_of_rules = not self.is_tree and numbers.counts != ()
         # Logarithms of terms, and the zero of "none".
         self.n_logarithms = self.n_terms + int((numbers.rule_terms == self.n_terms).any())
         self.facts = self._facts()
@@ -80,8 +78,8 @@ class Source:
         linear = self.policy == "linear" and not is_constant and bool(numbers.reach.any())
         moves = linear and numbers.tangent_group is not None
         facts = {
-            # Strengths that have to be made to sum to one.
-            "normal": (self.n_terms > 0 or not self.is_grid) and not self.is_tree,
+            # Strengths, of terms that a table has of every rule, have to be made to sum to one.
+            "normal": not self.is_tree and numbers.counts != (),
             "slopes": self.n_slopes > 0,
             "covers": covers,
             # Rows outside the box get no answer; are less covered; are followed along the tangent.
@@ -141,7 +139,7 @@ class Source:
         """What follows the lines that include other files."""
         dialect, indices = self.dialect, ["r", "o"]
         main, tangent = self.arrays()
-        indices += ["j"] * (self.n_slopes > 0) + ["k"] * self.has_terms_of_rules
+        indices += ["j"] * (self.n_slopes > 0) + ["k"] * ("normal" in self.facts)
         # What the place of a row is told by: z, the shares of a grid's terms, and the strengths.
         taken = ["z", "l", "w"] if self.numbers.counts else ["z", "w"]
         words = {
@@ -199,7 +197,7 @@ class Source:
         found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
         if self.n_terms and not self.is_tree:
             found["term_input"] = numbers.term_inputs
-        if self.has_terms_of_rules:
+        if "normal" in facts:
             found["rule_terms"] = numbers.rule_terms
         if 0 < self.n_slopes < self.model.n_inputs:
             found["slope_input"] = numbers.slope_inputs
