@@ -6,7 +6,7 @@ value and its place in the file.
 
 import json
 from functools import partial
-from itertools import groupby
+from itertools import chain, groupby
 from math import inf, nan, prod
 
 import numpy as np
@@ -126,6 +126,8 @@ def model_of(document):
             f"the file is of version {shown(version)}, this skanfis reads versions 1 to {VERSION}: "
             "upgrade skanfis to read it."
         )
+    if version == 1:
+        document = _of_version_1(document)
     file = _members({"posterior": None} | document, _FILE, "the file")
     n_rules, n_terms = len(file["rules"]), len(file["terms"])
     n_inputs, n_outputs = len(file["inputs"]), len(file["outputs"])
@@ -197,6 +199,23 @@ def _check_all(holds, message):
     """Raise ValueError with the place of the first for which a condition does not hold."""
     if not np.all(holds):
         raise ValueError(message.format(np.argmin(holds)))
+
+
+def _of_version_1(document):
+    """The same in the present form: no tangents of their own, a triangle as one list."""
+    found = dict(document)
+    if isinstance(found.get("inputs"), list):
+        no_tangent = {"tangent_at": None}
+        found["inputs"] = [
+            one | no_tangent if isinstance(one, dict) else one for one in found["inputs"]
+        ]
+    posterior = found.get("posterior")
+    if isinstance(posterior, dict) and isinstance(posterior.get("consequents"), list):
+        rows = [row if isinstance(row, list) else [row] for row in posterior["consequents"]]
+        n_outputs = len(_list(found.get("outputs"), "outputs"))
+        triangle = {"consequents": list(chain.from_iterable(rows))}
+        found["posterior"] = {"pinned": [[]] * n_outputs} | posterior | triangle
+    return found
 
 
 def _inputs(inputs):
