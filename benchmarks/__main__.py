@@ -9,16 +9,16 @@ from shlex import join
 from .fresh import alone, run_benchmark
 from .report import Results, machine, markdown
 
-ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "file_size", "command")
+ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "command")
 ON_REQUEST = (
     "structure",
+    "trees",
     "real_sets",
     "battery",
     "small_problems",
     "how_sure",
     "certain",
     "compensation",
-    "solvers",
     "c_code",
     "large_data",
     "long_logs",
