@@ -48,7 +48,9 @@ def parse():
         metavar="N",
         help="long_logs: rows of a log",
     )
-    many = parser.add_argument_group("structure, real_sets, battery, small_problems, how_sure")
+    many = parser.add_argument_group(
+        "structure, trees, real_sets, battery, small_problems, how_sure"
+    )
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
     many.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")
