@@ -334,6 +334,16 @@ class Reader:
                 found[name] = (*found.get(name, ()), j)
         return {name: own for name, own in found.items() if len(own) > 1}
 
+    @property
+    def levels(self) -> dict[str, tuple[str, str]]:
+        """By the name of an indicator its raw column and level: "fibre_PM", ("fibre", "PM")."""
+        encoded = [one for one in self.inputs if one.encode is not None]
+        columns = [str(self.names[one.source]) for one in encoded]
+        return {
+            one.name: (column, one.name.removeprefix(f"{column}_"))
+            for one, column in zip(encoded, columns, strict=True)
+        }
+
     def __call__(self, X) -> np.ndarray:
         """The rows; ValueError for other columns, and for numbers that are not finite."""
         given = getattr(X, "columns", None)

@@ -26,18 +26,26 @@ def conditions(model):
     return [dict(sorted(rule.items())) for rule in rules]
 
 
-def premise_texts(model):
+def premise_texts(model, levels=None):
     """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" of a rule that asks nothing."""
     names = model.input_names
     return [
-        " AND ".join(condition(names[j], term) for j, term in rule.items()) or "anything"
+        " AND ".join(condition(names[j], term, levels) for j, term in rule.items()) or "anything"
         for rule in conditions(model)
     ]
 
 
-def condition(name, term):
-    """Say "temperature is low" or "rate > 6.8 ± 0.3"."""
-    return f"{name} {term}" if term.startswith(("<", ">")) else f"{name} is {term}"
+def condition(name, term, levels=None):
+    """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator.
+
+    ``levels`` are the raw columns and levels of indicators (``Reader.levels``).
+    """
+    if term.startswith(("<", ">")):
+        return f"{name} {term}"
+    if term in ("0", "1") and levels and name in levels:
+        column, level = levels[name]
+        return f"{column} is {'' if term == '1' else 'not '}{level}"
+    return f"{name} is {term}"
 
 
 def weightiest(model, max_shown):

@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..export import fold
+from ..export.folding import fold_with_reader
+from ..policies import policy_in_words
 from .rules import (
-    conditions,
+    condition,
     has_training_data,
     premise_texts,
     readability_in_training,
@@ -24,6 +25,12 @@ from .sentences import MOST_DIGITS, PRECISION, Sentences
 
 # Letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 3
+_HOW = (
+    "A prediction is the mean of what the rules say, weighted by how true their conditions are: "
+    "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; AND multiplies. A "
+    "rule says its value, less the common line's part in it, plus the common line, plus its own "
+    "slopes. What it errs is its RMSE alone, on the rows on which it is the strongest."
+)
 _IN_PLACE = (
     "A part of every value is from this line; a slope that a rule states stands in its place."
 )
@@ -94,20 +101,22 @@ def export_text(
     Rules go different ways, beyond chance: by hours up in rule 1 and down in rule 0.
     """
     check_count("precision", precision, 1, MOST_DIGITS)
-    model = rename(fold(estimator), feature_names, output_names)
+    folded, reader = fold_with_reader(estimator)
+    model = rename(folded, feature_names, output_names)
     said, found = Sentences.of(model, precision), readability_in_training(estimator, model)
+    levels = reader.levels
     chosen = weightiest(model, max_shown)
     parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
-    common = _common_lines(said)
+    common = _common_lines(said, levels)
     parts += [fill(f"Common to the rules, {line}.", _WIDTH) for line in common]
     if common:
         parts[-1] += f"\n{_IN_PLACE}"
-    premises = premise_texts(said.model)
+    premises = premise_texts(said.model, levels)
     for r in chosen:
         heading = ", ".join([f"Rule {r}", *_on_rows(model, found, r)])
         then = "\n".join(
             fill(f"{word} {sentence}", _WIDTH, initial_indent="  ", subsequent_indent="       ")
-            for word, sentence in zip(_words(model), _conclusions(said, r), strict=True)
+            for word, sentence in zip(_words(model), _conclusions(said, r, levels), strict=True)
         )
         parts.append(f"{heading}:\n  IF {premises[r]}\n{then}")
     if len(chosen) < model.n_rules:
@@ -150,26 +159,24 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = PRECISIO
     11
     """
     check_count("precision", precision, 1, MOST_DIGITS)
-    model = writable(fold(estimator))
+    folded, reader = fold_with_reader(estimator)
+    model, levels = writable(folded), reader.levels
     said, found = Sentences.of(model, precision), readability_in_training(estimator, model)
-    chosen, asked = weightiest(model, max_shown), conditions(said.model)
+    chosen, premises = weightiest(model, max_shown), premise_texts(said.model, levels)
     cells: dict = {}
     if has_training_data(model):
         cells["data", "rows"] = [_share(model, r) for r in chosen]
         if found is not None:
             cells["data", "error"] = [_errors(found, r) for r in chosen]
-    for j in sorted({j for rule in asked for j in rule}):
-        low, high = range_text(model, j)
-        heading = "if", f"{model.input_names[j]}, {low} to {high}"
-        cells[heading] = [asked[r].get(j, "any") for r in chosen]
+    cells["rule", "if"] = [premises[r] for r in chosen]
     for k, name in enumerate(model.output_names):
-        cells["then", name] = [_conclusion(said, r, k) for r in chosen]
+        cells["then", name] = [_conclusion(said, r, k, levels) for r in chosen]
     with pd.option_context("display.max_colwidth", None):
         table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}"
     parts = [f"<div>{counts}</div>", table]
-    lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
+    lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said, levels)]
     if len(chosen) < model.n_rules:
         lines.append(f"and {_left_out(model, chosen)}")
     numbers, *findings = _last_lines(said, found, precision)
@@ -181,11 +188,11 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = PRECISIO
     return f'<div style="{style}">{"".join(parts)}</div>'
 
 
-def _common_lines(said):
+def _common_lines(said, levels):
     """Of every output that has one: "y: -0.12 per rate from 20, ..."."""
     model = said.model
     slopes = [
-        _slopes(said, said.common[:, k], said.common_place, said.common[:, k] != 0.0)
+        _slopes(said, said.common[:, k], said.common_place, said.common[:, k] != 0.0, levels)
         for k in range(model.n_outputs)
     ]
     pairs = zip(model.output_names, slopes, strict=True)
@@ -196,14 +203,14 @@ def _words(model):
     return ["THEN", *[" AND"] * (model.n_outputs - 1)]
 
 
-def _conclusions(said, r):
+def _conclusions(said, r, levels):
     """Of every output what rule r says: "y is about 33.6, of it +4.2 from the common line: ..."."""
     names = said.model.output_names
-    return [f"{name} is {_conclusion(said, r, k)}" for k, name in enumerate(names)]
+    return [f"{name} is {_conclusion(said, r, k, levels)}" for k, name in enumerate(names)]
 
 
-def _conclusion(said, r, k):
-    own = _slopes(said, said.slopes[r, :, k], said.places[r], said.is_own[r, :, k])
+def _conclusion(said, r, k, levels):
+    own = _slopes(said, said.slopes[r, :, k], said.places[r], said.is_own[r, :, k], levels)
     has_common = (said.model.common_slopes[r] & (said.common[:, k] != 0.0)).any()
     text = f"{'about ' if own or has_common else ''}{plain(said.values[r, k])}"
     if said.of_common[r, k]:
@@ -211,14 +218,15 @@ def _conclusion(said, r, k):
     return f"{text}: {', '.join(own)}" if own else text
 
 
-def _slopes(said, slopes, places, is_said):
+def _slopes(said, slopes, places, is_said, levels):
     """Say "+5.8 per rooms from 6.3", or "-2.1 if private is 1"."""
     parts = []
     for j in np.flatnonzero(is_said):
         name, slope, place = said.model.input_names[j], slopes[j], places[j]
         if said.two_valued[j]:
             other = 1.0 - place
-            parts.append(f"{_signed(slope * (other - place))} if {name} is {plain(other)}")
+            case = condition(name, plain(other), levels)
+            parts.append(f"{_signed(slope * (other - place))} if {case}")
         else:
             parts.append(f"{_signed(slope)} per {name} from {plain(place)}")
     return parts
@@ -263,7 +271,8 @@ def _legend(said, precision):
         terms = [term for term in named if term["input"] == name]
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term)}" for term in terms]
-    lines.append(f"Outside these ranges: {model.policy}.")
+    words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
+    lines.append(fill(f"Outside these ranges {words}: {model.policy}.", _WIDTH))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         ends = [low, high]
         if np.isfinite(ends).all():
@@ -277,7 +286,11 @@ def _legend(said, precision):
         noise = zip(model.output_names, model.posterior.noise, strict=True)
         values = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)
         lines.append(f"Standard deviation of the noise about the rules: {values}.")
-    return "\n".join(lines)
+    if model.target is not None:
+        spread = zip(model.output_names, model.target.spread, strict=True)
+        values = ", ".join(f"{name} {number(value, precision)}" for name, value in spread)
+        lines.append(f"Standard deviation of the target: {values}.")
+    return "\n".join([*lines, "", fill(_HOW, _WIDTH)])
 
 
 def _term_text(term):

@@ -6,10 +6,12 @@ from html.parser import HTMLParser
 from textwrap import dedent
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.preprocessing import StandardScaler
+from sklearn.compose import TransformedTargetRegressor, make_column_transformer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import OneHotEncoder, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
@@ -162,6 +164,20 @@ def test_a_column_of_zeros_and_ones_is_a_case():
     )
 
 
+def test_a_level_of_a_category_is_called_by_its_column():
+    rng = np.random.default_rng(0)
+    X = pd.DataFrame({"rate": rng.normal(size=400), "fibre": rng.choice(["PM", "SM", "HB"], 400)})
+    y = 2 * X["rate"] * (X["fibre"] == "PM") + (X["fibre"] == "SM") + 0.1 * rng.normal(size=400)
+    encoder = make_column_transformer((OneHotEncoder(), ["fibre"]), remainder="passthrough")
+    pipe = make_pipeline(encoder, ANFISRegressor(partition="tree", max_rules=2)).fit(X, y)
+    told = export_text(pipe).partition("Inputs")[0]
+    assert "\n  IF fibre is PM\n" in told
+    assert "\n  IF fibre is not PM\n" in told
+    assert re.search(r"[-+]0\.\d+ if fibre is SM", told)
+    assert "fibre_" not in told
+    assert "fibre is not PM" in rules_html(pipe)
+
+
 @ALL
 def test_every_rule_is_told_once_the_weightiest_first(model):
     labels = [label for label, _, _ in read_text(export_text(model), NAMES).rules]
@@ -184,7 +200,8 @@ def test_a_grid_in_words():
     assert lines[0] == "12 rules, 3 inputs."
     start = [line.partition(",")[0] for line in lines].index("Rule 0")
     assert lines[start + 1] == "  IF time is low AND chip temperature is low AND rate is low"
-    assert lines[-3:] == ["Outside these ranges: out_of_bounds='clip'.", "", "84 numbers."]
+    assert "Outside these ranges the value at the edge is held: out_of_bounds='clip'." in lines
+    assert lines[-1] == "84 numbers."
 
 
 def test_places_are_told_to_digits_of_their_widths():
