@@ -22,7 +22,7 @@ from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .sample import effective_weight, n_distinct_inputs
 from .search import StructureSearch
-from .size import check_clusters_fit, check_grid_fits, term_counts
+from .size import check_clusters_fit, check_columns_fit, check_grid_fits, term_counts
 from .start import Start, imported_antecedent, tuned_start
 from .trials import Plan
 from .tuning import FIRST_PENALTY, scaled
@@ -81,6 +81,7 @@ class StructureRequest:
     def start(self, rows: StandardisedData) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
+        check_columns_fit(len(self.names), _memory_limit())
         if self.is_searched:
             return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
         if isinstance(self.partition, TSKModel):

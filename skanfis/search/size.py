@@ -12,11 +12,27 @@ _MOST_PREMISE_PARAMETERS = 4
 _SQUARES = 14
 
 
+# Of the products of all pairs of columns, rows that are worked out at one time.
+_ROWS_OF_PAIRS = 128
+
+
 def n_bytes(n_rules: int, n_terms: int, n_basis: int, n_outputs: int) -> int:
     """What training so many rules takes, of ``n_terms`` of all inputs."""
     n_columns, n_premise = n_rules * n_basis, _MOST_PREMISE_PARAMETERS * n_terms
     squares = _SQUARES * (n_columns + n_outputs) ** 2 + 4 * n_premise**2
     return 8 * (squares + n_terms * n_rules + 2 * n_premise * n_columns)
+
+
+def check_columns_fit(n_inputs, limit):
+    """Raise ValueError where the products of all pairs of columns need more than ``limit`` bytes."""
+    needed = 8 * _ROWS_OF_PAIRS * (1 + n_inputs) ** 2 // 2
+    if needed > limit:
+        raise ValueError(
+            f"X has {n_inputs:,} columns: products of all their pairs would take {_bytes(needed)}, "
+            f"and the limit is {_bytes(limit)} (sklearn.set_config(working_memory=...), in MiB). "
+            "Choose some of them first, as by make_pipeline(SelectKBest(f_regression, k=50), "
+            "ANFISRegressor())."
+        )
 
 
 def check_clusters_fit(what, n_rules, n_premise_inputs, n_basis, n_outputs, limit):

@@ -53,3 +53,16 @@ def test_clusters_that_are_too_many_are_refused_before_memory_is_asked_for(rng, 
         tracemalloc.stop()
     # Clustering itself takes distances of all rows to all centres.
     assert peak < max(8 * n_columns**2, 8e6)
+
+
+def test_more_columns_than_pairs_have_room_for_are_refused_at_once():
+    X = np.zeros((30, 20_000))
+    X[:, 0] = np.arange(30.0)
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match=r"X has 20,000 columns: .* 205 GB, and the limit"):
+            ANFISRegressor().fit(X, X[:, 0])
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 20 * X.nbytes
