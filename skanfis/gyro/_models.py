@@ -9,14 +9,14 @@ import numpy as np
 from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import GridSearchCV, GroupKFold
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
 from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
 # Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
-_ROUNDS = 3
+ROUNDS = 3
 # As in scikit-learn's cross-validation, and enough rows to tell two degrees apart.
 _N_FOLDS, _ROWS_FOR_DEGREE = 5, 6_000
 # Terms are looked for among so many rows, and fitted to all. More rules than three terms of three
@@ -52,7 +52,7 @@ def fit_model(X, target, groups, recipe):
         return rules if is_done else _make_rules(recipe, terms).fit(X, target), choice
     # In every round the same terms: looked for once, in what the law leaves.
     law, rules = make_law(recipe.inputs, degree, recipe.outside), _make_rules(recipe, choice.terms)
-    return ResidualRegressor(law, rules, n_rounds=_ROUNDS).fit(X, target), choice
+    return ResidualRegressor(law, rules, n_rounds=ROUNDS).fit(X, target), choice
 
 
 def _shared_rows(X, groups):
@@ -96,8 +96,9 @@ def _law_degree(X, target, groups, recipe):
     grid = [
         {"base__amplitude_degree": [degree], "base__bias_degree": [degree]} for degree in (1, 2)
     ]
+    law = make_law(recipe.inputs, 1, "linear")
     search = GridSearchCV(
-        make_law_and_line(recipe.inputs),
+        ResidualRegressor(law, LinearRegression(), n_rounds=ROUNDS),
         grid,
         scoring="neg_mean_squared_error",
         cv=GroupKFold(min(_N_FOLDS, n_groups)),
@@ -128,17 +129,4 @@ def make_law(inputs, degree, outside):
         amplitude_degree=degree,
         bias_degree=degree,
         out_of_bounds=outside,
-    )
-
-
-def make_law_and_line(inputs, outside="linear"):
-    """The law and a straight line in all inputs, in turns, as a single rule beside it is fitted."""
-    law = make_law(inputs, 1, outside)
-    return ResidualRegressor(law, make_polynomial(1), n_rounds=_ROUNDS)
-
-
-def make_polynomial(degree):
-    """All products of the inputs up to a degree."""
-    return make_pipeline(
-        StandardScaler(), PolynomialFeatures(degree, include_bias=False), LinearRegression()
     )

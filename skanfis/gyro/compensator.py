@@ -144,10 +144,7 @@ class GyroCompensator:
             status, the sum of 1 (an input is out of range), 4 (the coverage is below
             ``min_coverage``) and 8 (the policy gives no rate: NaN). Zero: all is well.
         """
-        return self._compensated(self.features(log), self.indicated(log))
-
-    def _compensated(self, X, indicated):
-        """What :meth:`apply` gives, of the estimator's inputs."""
+        X, indicated = self.features(log), self.indicated(log)
         with warnings.catch_warnings():
             # The status tells, row by row.
             warnings.simplefilter("ignore", OutOfBoundsWarning)
@@ -369,13 +366,13 @@ def _read_polynomial(document, rule, inputs):
         raise ValueError(f"its polynomial must be an object of {', '.join(_OF_POLYNOMIAL)}")
     if not isinstance(rule, FrozenRules) or rule.positions.tolist() != list(range(len(inputs))):
         raise ValueError("a polynomial goes with a rule on all inputs, and no law")
-    powers = cubic_powers(len(inputs))
-    sizes = zip(_OF_POLYNOMIAL, (len(inputs), len(inputs), len(powers)), strict=True)
+    n_terms = len(cubic_powers(len(inputs)))
+    sizes = zip(_OF_POLYNOMIAL, (len(inputs), len(inputs), n_terms), strict=True)
     lists = {k: _list_of_numbers(document[k], k, n, n, "polynomial") for k, n in sizes}
     for j, value in enumerate(document["scale"]):
         _divisor(value, f"polynomial.scale[{j}]")
     box, names = (rule.model.minimum, rule.model.maximum), np.array(inputs, dtype=object)
-    return Polynomial(*box, **lists, powers=powers, feature_names_in_=names)
+    return Polynomial(*box, **lists, feature_names_in_=names)
 
 
 def _divisor(value, where):

@@ -1,13 +1,15 @@
 """Two regressors in a row: the second learns what the first leaves."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.pipeline import Pipeline
-from sklearn.preprocessing import PolynomialFeatures
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 from sklearn.utils.validation import (
     check_is_fitted,
     check_scalar,
@@ -251,17 +253,30 @@ class FrozenRules:
 class Polynomial:
     """sum_k c_k prod_j z_j^p_kj with z = (x - center) / scale, x held in a box; a fitted base.
 
-    ``powers`` are of shape (n_terms, n_inputs); all columns of X are inputs.
+    The terms are all up to the third degree, in the order of scikit-learn; all columns of X are
+    inputs.
     """
 
     minimum_: np.ndarray
     maximum_: np.ndarray
     center: np.ndarray
     scale: np.ndarray
-    powers: np.ndarray
     coefficients: np.ndarray
     feature_names_in_: np.ndarray
     out_of_bounds = "clip"
+
+    @classmethod
+    def fitted(cls, X, y, box):
+        """That of least squares, of a table X; ``box`` are the ends of its columns."""
+        scaler, line = StandardScaler(), LinearRegression()
+        make_pipeline(scaler, PolynomialFeatures(3, include_bias=False), line).fit(X, y)
+        coefficients, names = [line.intercept_, *line.coef_], np.array(X.columns, dtype=object)
+        return cls(*box, scaler.mean_, scaler.scale_, np.array(coefficients), names)
+
+    @property
+    def powers(self):
+        """Of shape (n_terms, n_inputs)."""
+        return cubic_powers(self.center.size)
 
     @property
     def columns_(self):
@@ -287,6 +302,7 @@ class Polynomial:
         return self.coefficients @ ~varies + np.array([-1.0, 1.0]) * (1.0 + 1e-12) * most
 
 
+@cache
 def cubic_powers(n_inputs):
     """Of all terms up to the third degree, in the order of scikit-learn."""
     return PolynomialFeatures(3).fit(np.zeros((1, n_inputs))).powers_

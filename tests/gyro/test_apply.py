@@ -1,4 +1,4 @@
-"""``--apply`` piece by piece gives what it gives of a log that is read at once."""
+"""``--apply`` gives what the compensator gives, however the log is read, and names bad rows."""
 
 import re
 
@@ -77,7 +77,7 @@ def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatc
         else:
             assert whole[name].tolist() == pieces[name].tolist()
     if "run" in kind(log):
-        # By the compensator itself, which knows nothing of files.
+        # By the compensator itself, which knows nothing of files and pieces.
         direct = GyroCompensator.read_json(model).apply(read_log(path))
         np.testing.assert_allclose(
             pieces["rate_compensated"], direct["rate_compensated"], rtol=1e-9, atol=1e-11

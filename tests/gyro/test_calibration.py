@@ -92,8 +92,8 @@ def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended(monkeyp
     # Law and line are fitted in turns: what is left is a little more than the noise.
     assert verdict.rms["arcsine law and a line"] < 0.5 * verdict.rms["arcsine law"]
     assert verdict.rms["arcsine law and a line"] < 3.0 * NOISE
-    every = _simpler._kinds
-    monkeypatch.setattr(_simpler, "_kinds", lambda *given: islice(every(*given), 1))
+    every = _simpler.kinds
+    monkeypatch.setattr(_simpler, "kinds", lambda *given: islice(every(*given), 1))
     # The single rule of --physics --terms 1,1,1 is that line.
     alone = calibrate(log, split, replace(recipe, physics=True), lambda text: None)
     assert alone.verdict.rms["this model"] == pytest.approx(
@@ -106,7 +106,7 @@ def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended(monkeyp
         variable, _, value = step.partition(" = ")
         names[variable] = eval(value, {}, names)
     simple = next(each for each in calibration.simpler if each.name == "arcsine law and a line")
-    added = simple.model.predict(calibration.X) - simple.model.base_.predict(calibration.X)
+    added = simple.estimator.residual_.predict(calibration.X)
     np.testing.assert_allclose(names["line"], added, atol=1e-8)
 
 

@@ -11,13 +11,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from sklearn.dummy import DummyRegressor
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 pytest.importorskip("matplotlib")
 
 from skanfis import __version__
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, command
-from skanfis.gyro._models import make_polynomial
 from skanfis.gyro._options import make_parser
 from skanfis.gyro.command import main
 
@@ -108,7 +110,7 @@ def test_what_is_refused_once_there_is_a_compensator(calibrated, tmp_path, log, 
         (tmp_path / "model.json", "is no gyro compensator"),
     ):
         with pytest.raises(SystemExit, match="2"):
-            main(["--apply", str(model), path])
+            main(["--apply", str(model), path, "--units", "temperature=degC", "time=s"])
         assert told in capsys.readouterr().err
     arguments = [str(calibrated / "raw.csv"), *RENAMED, *UNITS, "--output"]
     before = (out / "report.html").stat().st_mtime_ns
@@ -161,11 +163,12 @@ def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind,
     compensator = GyroCompensator.read_json(out / "compensator.json")
     X, rate = log[["temperature", "output"]], log["rate"]
     error = log["output"] - rate
+    cubic = StandardScaler(), PolynomialFeatures(3)
     expected = {
         "recommended": lambda: OpenLoopArcsineRegressor("output", "temperature").fit(X, rate),
         "none": lambda: DummyRegressor(strategy="constant", constant=0.0).fit(X, error),
-        "cubic": lambda: make_polynomial(3).fit(X, error),
-        "line": lambda: make_polynomial(1).fit(X, error),
+        "cubic": lambda: make_pipeline(*cubic, LinearRegression()).fit(X, error),
+        "line": lambda: LinearRegression().fit(X, error),
     }[write]().predict(X)
     expected = expected if write == "recommended" else log["output"] - expected
     found = compensator.apply(log)

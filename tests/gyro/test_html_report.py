@@ -191,7 +191,7 @@ def test_the_verdict_comes_first(page, calibration):
     assert f"leaves {figures(verdict.rms['arcsine law'])} °/s RMS" in text
     simple = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="recommended")
     text = "".join(Outline(report_page(simple, TITLE)).text)
-    model = next(each for each in simple.simpler if each.name == "arcsine law").model
+    model = next(each for each in simple.simpler if each.name == "arcsine law").estimator.base_
     assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What is written") :]
     assert "are of the arcsine law." in text
     assert "Can the rules be read?" not in text
