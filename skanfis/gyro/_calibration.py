@@ -51,7 +51,6 @@ class Recipe:
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
-    box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
     units: dict[str, str] = field(default_factory=dict)
     assumed: dict[str, str] = field(default_factory=dict)
 

@@ -24,7 +24,7 @@ from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._formulas import rules_text
-from ._headline import errors_and_verdict, proven_bounds
+from ._headline import errors_and_verdict
 from ._on_board import export_c_compensator
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._source import open_source
@@ -100,11 +100,8 @@ def _calibrate(options, tell):
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     check_once("--inputs", options.inputs or ())
-    check_once("--box", [name for name, *_ in options.box])
     targets = [text.partition(":")[0] for text in options.target]
     check_once("--target", targets)
-    if options.saturate and not options.c:
-        raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
     if folder.exists() and not folder.is_dir():
@@ -172,9 +169,6 @@ def _recipe(options, reading, at_rest):
         raise UsageError(
             f"--terms has {len(options.terms)} numbers for the {len(inputs)} inputs {named}."
         )
-    for name, *_ in options.box:
-        if name not in inputs:
-            raise UsageError(f"--box: {name!r} is no input; these are {named}.")
     if options.scale_factor is not None and not (at_rest and unit in SIGNALS):
         raise UsageError("--scale-factor is for a raw signal at rest: else the rate tells it.")
     if at_rest and unit in SIGNALS and options.scale_factor is None:
@@ -191,7 +185,6 @@ def _recipe(options, reading, at_rest):
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
-        box=tuple(options.box),
         units=reading.units,
         assumed=reading.assumed,
     )
@@ -228,12 +221,7 @@ def _write(calibration, options, files, folder):
     joblib.dump(same, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
-        export_c_compensator(
-            compensator,
-            folder / "compensator",
-            std=options.c,
-            saturate=proven_bounds(calibration).limits if options.saturate else None,
-        )
+        export_c_compensator(compensator, folder / "compensator", std=options.c)
 
 
 def _summary(calibration, folder, notes):

@@ -101,34 +101,6 @@ class GyroCompensator:
     units: dict[str, str] = field(default_factory=dict)
     assumed: dict[str, str] = field(default_factory=dict)
 
-    def features(self, log: pd.DataFrame) -> pd.DataFrame:
-        """The estimator's inputs.
-
-        Parameters
-        ----------
-        log : DataFrame of shape (n_rows, n_parts)
-            With the columns that the inputs are made from, and "run" where it has several.
-
-        Returns
-        -------
-        X : DataFrame of shape (n_rows, n_inputs)
-        """
-        return features(log, self.inputs, self.time_constant)
-
-    def indicated(self, log: pd.DataFrame) -> np.ndarray:
-        """The rate that the gyro indicates without compensation.
-
-        Parameters
-        ----------
-        log : DataFrame of shape (n_rows, n_parts)
-
-        Returns
-        -------
-        rate : ndarray of shape (n_rows,)
-            [deg/s]
-        """
-        return log["output"].to_numpy() / self.scale_factor
-
     def apply(self, log: pd.DataFrame) -> pd.DataFrame:
         """Compensate a log, and flag the rows in which that cannot be trusted.
 
@@ -144,11 +116,13 @@ class GyroCompensator:
             status, the sum of 1 (an input is out of range), 4 (the coverage is below
             ``min_coverage``) and 8 (the policy gives no rate: NaN). Zero: all is well.
         """
-        X, indicated = self.features(log), self.indicated(log)
+        X = features(log, self.inputs, self.time_constant)
+        indicated = log["output"].to_numpy() / self.scale_factor
         with warnings.catch_warnings():
             # The status tells, row by row.
             warnings.simplefilter("ignore", OutOfBoundsWarning)
-            compensated = self.compensate(indicated, self.estimator.predict(X))
+            predicted = self.estimator.predict(X)
+        compensated = indicated - predicted if self.predicts == "error" else predicted.copy()
         inside, coverage = (ask(self.estimator, name, X) for name in ("in_bounds", "coverage"))
         refused = ~np.isfinite(compensated)
         compensated[refused] = np.nan
@@ -166,21 +140,6 @@ class GyroCompensator:
             },
             index=X.index,
         )
-
-    def compensate(self, indicated: np.ndarray, predicted: np.ndarray) -> np.ndarray:
-        """The compensated rate from what the estimator predicts.
-
-        Parameters
-        ----------
-        indicated, predicted : ndarray of shape (n_rows,)
-            [deg/s]
-
-        Returns
-        -------
-        rate : ndarray of shape (n_rows,)
-            [deg/s]
-        """
-        return indicated - predicted if self.predicts == "error" else predicted
 
     def write_json(self, path: str | PathLike[str]) -> None:
         """Write it as text that runs nothing when it is read.

@@ -9,6 +9,7 @@ import pytest
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
 from skanfis.gyro.command import main
+from skanfis.gyro.compensator import features
 from skanfis.gyro.log import read_log
 
 from ..quick import quick
@@ -25,8 +26,8 @@ def log():
 
 @pytest.fixture(scope="module")
 def model(log, tmp_path_factory):
-    compensator = GyroCompensator(None, INPUTS)
-    X = compensator.features(log.assign(run=log["device"].astype(str) + log["run"].astype(str)))
+    runs = log["device"].astype(str) + log["run"].astype(str)
+    X = features(log.assign(run=runs), INPUTS, time_constant=60.0)
     error = log["output"] - log["rate"]
     estimator = quick([2, 2, 2, 1]).fit(X, error)
     path = tmp_path_factory.mktemp("model") / "compensator.json"

@@ -191,17 +191,6 @@ def test_answers_as_predict(log, case, dtype, tolerance, std, tmp_path):
 
 
 @needs_compiler
-def test_what_rules_add_is_held(tmp_path):
-    model, X = whole()
-    limits = np.quantile(model.residual_.predict(X), [0.3, 0.7])
-    code = export_c_physics(model, name="gyro", saturate=limits[None])
-    rows = np.ascontiguousarray(X.to_numpy()[::50])
-    [(y, _)] = evaluate_all([code], rows, tmp_path, "c99", [1])
-    wanted = model.base_.predict(X[::50]) + np.clip(model.residual_.predict(X[::50]), *limits)
-    np.testing.assert_allclose(y[:, 0], wanted, rtol=1e-10, atol=1e-12)
-
-
-@needs_compiler
 def test_no_answer_to_what_is_not_finite_or_has_no_rate(tmp_path):
     model, X = whole()
     rows = np.repeat(X.to_numpy()[:1], 5, axis=0)

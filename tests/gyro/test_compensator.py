@@ -18,12 +18,14 @@ from skanfis.gyro import (
     ResidualRegressor,
     export_c_physics,
 )
+from skanfis.gyro.compensator import features
 
 from ..export.json_mutations import mutated_numbers, with_number
 from ..quick import quick
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 FACTOR = -27_000.0  # counts per deg/s
+LAG = 60.0  # s
 # Next to none, for data next to without noise.
 WEIGHTS = {"agreement": 1e-8, "alpha": 1e-9}
 
@@ -37,10 +39,9 @@ def log():
 
 
 def fitted(log, **options):
-    shell = GyroCompensator(None, INPUTS, scale_factor=FACTOR, output_unit="counts")
-    X = shell.features(log)
+    X = features(log, INPUTS, LAG)
     model = make_pipeline(StandardScaler(), quick([1, 2, 1, 3], **WEIGHTS, **options))
-    model.fit(X, shell.indicated(log) - log["rate"])
+    model.fit(X, log["output"] / FACTOR - log["rate"])
     return GyroCompensator(model, INPUTS, scale_factor=FACTOR, output_unit="counts")
 
 
@@ -75,8 +76,8 @@ def test_rows_out_of_range_are_flagged_and_follow_the_policy(log, policy):
     if policy == "nan":
         assert (status[outside] & 8 != 0).all()
     if policy == "clip":
-        low, high = compensator.features(log).min(), compensator.features(log).max()
-        at_edge = compensator.features(hotter).clip(low, high, axis=1)
+        known = features(log, INPUTS, LAG)
+        at_edge = features(hotter, INPUTS, LAG).clip(known.min(), known.max(), axis=1)
         expected = hotter["output"] / FACTOR - compensator.estimator.predict(at_edge)
         np.testing.assert_allclose(compensated["rate_compensated"], expected, rtol=1e-12)
 
@@ -91,11 +92,10 @@ def test_rows_hardly_covered_are_flagged(log):
 
 def with_physics(log, **parameters):
     """Law and rules; the rules on chosen columns, in another order than the inputs."""
-    shell = GyroCompensator(None, INPUTS, predicts="rate", scale_factor=FACTOR)
     law = OpenLoopArcsineRegressor("output", **{"temperature": "temperature"} | parameters)
     chosen = make_column_transformer((StandardScaler(), ["output", "time"]))
     rules = make_pipeline(chosen, quick([1, 2]))
-    model = ResidualRegressor(law, rules).fit(shell.features(log), log["rate"])
+    model = ResidualRegressor(law, rules).fit(features(log, INPUTS, LAG), log["rate"])
     return GyroCompensator(model, INPUTS, predicts="rate", scale_factor=FACTOR)
 
 
