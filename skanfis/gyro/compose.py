@@ -257,7 +257,7 @@ class Polynomial:
         z = np.clip(np.asarray(X, dtype=float), self.minimum_, self.maximum_) - self.center
         terms = np.tile(self.coefficients, (len(z), 1))
         for column, powers in zip((z / self.scale).T, self.powers.T, strict=True):
-            terms *= column[:, None] ** powers
+            terms *= np.vander(column, 4, increasing=True)[:, powers]
         return terms.sum(axis=1)
 
     def bounds(self, box):

@@ -231,22 +231,24 @@ class LogFile:
         """All rows, in the units of a log."""
         places = self.layout.places
         labels = [places[part] for part in LABELS if part in places]
-        pieces = [pd.DataFrame(columns=list(places), dtype=float)]
+        columns: dict = {part: [] for part in places}
         for table in self.source.pieces(list(places.values()), _ROWS, labels):
             self.n_rows += len(table)
-            piece = pd.DataFrame(index=table.index)
             try:
                 for part, place in places.items():
-                    is_label = part in LABELS
-                    column = table[place]
-                    piece[part] = column.astype(object) if is_label else self._numbers(column, part)
-                    check_values(piece[part], part, self._is_command)
+                    values = table[place]
+                    if part not in LABELS:
+                        values = pd.Series(self._numbers(values, part), table.index)
+                    check_values(values, part, self._is_command)
+                    columns[part].append(values)
             except LogError as error:
                 raise self.located(error, table.index) from error
-            pieces.append(piece)
         if self._clock is not None:
             self.notes += self._clock.notes
-        return pd.concat(pieces[1:] or pieces)
+        nothing = [pd.Series(dtype=float)]
+        # One by one, and not copied again: a long log is held once.
+        parts = {part: pd.concat(columns.pop(part) or nothing) for part in places}
+        return pd.DataFrame(parts, copy=False)
 
     def _in_order(self, log):
         """The rows, but those that occur a second time, with the first row first."""

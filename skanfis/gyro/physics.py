@@ -30,7 +30,7 @@ _SMALLEST_PHASE, _LARGEST_PHASE = 0.01, np.pi / 2.0
 # A tenth of a radian apart: the fit goes the rest of the way.
 _STARTING_PHASES = np.linspace(0.1, 1.5, 15)
 # A dozen coefficients at most: the start needs few rows, and the fit to all begins with some.
-_ROWS_FOR_START, _ROWS_FOR_TRIAL = 2_000, 10_000
+_FEW_ROWS = 2_000
 _MAX_EVALUATIONS = 200
 _NEARBY = 1e-5  # how far a finished fit may still move, in standardised units
 
@@ -409,12 +409,12 @@ def _jacobian(parameters, columns, log):
 def _fit_law(log):
     """The solver's vector at the minimum, the number of evaluations, and whether it settled."""
     n_rows = log.columns.shape[1]
-    start = _start(log.columns[:, :: max(1, n_rows // _ROWS_FOR_START)], log)
+    start = _start(log.columns[:, :: max(1, n_rows // _FEW_ROWS)], log)
     lower, upper = np.full((2, start.size), [[-np.inf], [np.inf]])
     first_of_sagnac = log.degrees[0] + 1
     lower[first_of_sagnac], upper[first_of_sagnac] = _SMALLEST_PHASE, _LARGEST_PHASE
     # Of a long log some rows show the way; few steps on all are left then.
-    for step in sorted({max(1, n_rows // _ROWS_FOR_TRIAL), 1}, reverse=True):
+    for step in sorted({max(1, n_rows // _FEW_ROWS), 1}, reverse=True):
         fitted = least_squares(
             _misfit,
             start,
@@ -430,7 +430,7 @@ def _fit_law(log):
         )
         start = fitted.x
     # On a large log the noise is far above the eighth digit, and every pass has its price.
-    if n_rows <= _ROWS_FOR_TRIAL:
+    if n_rows <= _FEW_ROWS:
         start = _polished(start, log)
     return start, fitted.nfev, fitted.status != 0
 
