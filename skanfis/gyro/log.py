@@ -28,6 +28,7 @@ _ROWS = 100_000  # of a piece, which is all that is held of a file's texts
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
 _FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
+_SHORTEST_RUN = 3  # rows, at the end of a file
 _BEGINNING = 0.1  # part of a run, where a clock is again that has been set anew
 
 
@@ -215,7 +216,8 @@ class LogFile:
         for part in LABELS:
             log[part] = log[part].astype("category") if part in log else ""
         if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
-            log["run"] = self._told_by_clock(log["time"].to_numpy())
+            runs = self._told_by_clock(log["time"].to_numpy())
+            log = log[: len(runs)].assign(run=runs)
         is_whole = ~missing.any(axis=1)
         if not is_whole.all():
             self._note_gaps(missing)
@@ -266,7 +268,10 @@ class LogFile:
             return log
         twice = log.duplicated() & log["time"].notna()
         # Runs of one value all through are alike, and two runs.
-        if twice.any() and not log[twice].drop(columns="time").duplicated()[1:].all():
+        if log[twice].drop(columns="time").duplicated()[1:].all():
+            # A row that follows itself is no run.
+            twice &= log["time"].diff() == 0.0
+        if twice.any():
             first, last = map(self._time_as_written, log.index[twice][[0, -1]])
             self.notes.append(
                 f"{self.path}: {twice.sum():,} rows occur twice, from time {first} to {last}; the "
@@ -281,15 +286,24 @@ class LogFile:
         return next(piece[place][row] for piece in pieces if row in piece.index)
 
     def _told_by_clock(self, time):
-        """Labels of runs: "1", "2" and so on, where the time begins anew or steps far."""
+        """Labels of runs: "1", "2" and so on, where the time begins anew or steps far.
+
+        A few rows at the end whose clock jumps are no run, and have none.
+        """
         steps, longest = np.diff(time, prepend=time[0]), _longest_step(time)
         starts, begin = steps > longest, time[0]
         for row in np.flatnonzero(steps < 0.0):
             if time[row] <= begin + _BEGINNING * (time[row - 1] - begin):
                 starts[row], begin = True, time[row]
         code = np.cumsum(starts)
+        n_last = np.count_nonzero(code == code[-1])
+        if code[-1] and n_last < _SHORTEST_RUN:
+            self.notes.append(
+                f"{self.path}: the clock jumps at the last {n_last} row(s), which are left out"
+            )
+            code = code[:-n_last]
         if not code[-1]:
-            return ""
+            return [""] * code.size
         self.notes.append(
             f"{self.path}: is split into {code[-1] + 1} runs, where the time begins anew or steps "
             f"by more than {longest:.4g} s"
