@@ -101,8 +101,7 @@ class Calibration:
     ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
     the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
     rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
-    of the model that had not seen it. ``choice`` is of the model's structure, ``fold_choices`` of
-    those held out, each from its fold's training rows; None where it was given. ``simpler`` are
+    of the model that had not seen it. ``choice`` is of the model's structure. ``simpler`` are
     compensations without rules, judged with the model by ``verdict`` on the rows in range.
     ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
     ``n_rows`` is how many rows there were, of which ``log`` has some.
@@ -119,7 +118,6 @@ class Calibration:
     after: np.ndarray
     inside: np.ndarray
     choice: Choice
-    fold_choices: list[Choice] | None
     simpler: list[Simpler]
     verdict: Verdict
     n_fit_rows: int
@@ -190,7 +188,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
     found = _held_out(X, target, groups, split, recipe, tell, rng)
-    predicted, inside, folds, choices, fold_models = found
+    predicted, inside, folds, fold_models = found
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
@@ -226,7 +224,6 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         after=chosen.after,
         inside=judged,
         choice=choice,
-        fold_choices=choices if recipe.physics or isinstance(recipe.terms, str) else None,
         simpler=simpler,
         verdict=verdict,
         n_fit_rows=rows.size,
@@ -238,9 +235,9 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
 
 
 def _held_out(X, target, groups, split, recipe, tell, rng):
-    """Predictions of every row by a model new to it, which are in range, folds, choices, models."""
+    """Predictions of every row by a model new to it, which are in range, folds, models."""
     predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
-    folds, choices, models = [], [], []
+    folds, models = [], []
     for number, (train, test) in enumerate(split.folds, 1):
         tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
         rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
@@ -248,10 +245,9 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
         with warnings.catch_warnings():
             # The final fit warns of the same.
             warnings.simplefilter("ignore")
-            model, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
+            model, _ = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
             predicted[test] = model.predict(X.iloc[test])
             inside[test] = ask(model, "in_bounds", X.iloc[test])
-        choices.append(choice)
         models.append(model)
     if not (inside & np.isfinite(predicted)).any():
         raise LogError(
@@ -259,7 +255,7 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
             f"that the model had seen while its group was held out ({split.kind}). Log groups that "
             "overlap in temperature, rate and time."
         )
-    return predicted, inside, folds, choices, models
+    return predicted, inside, folds, models
 
 
 def _fit(X, target, groups, recipe, tell):

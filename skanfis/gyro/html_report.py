@@ -220,12 +220,6 @@ def _check(results):
             "from each run. Figures that need every row, of bias stability and Allan's deviation, "
             "are left out."
         )
-    if calibration.fold_choices is not None and calibration.writes_model:
-        found = Counter(_terms_text(choice.terms) for choice in calibration.fold_choices)
-        several = ", ".join(f"{text} ({count})" for text, count in found.most_common())
-        texts.append(
-            f"Each fold's training rows alone chose its structure (number of folds): {several}."
-        )
     blocks = [Block("text", text) for text in texts]
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
