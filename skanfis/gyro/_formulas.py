@@ -48,7 +48,7 @@ def law_text(law, recipe):
     names = [recipe.inputs[j] for j in law.columns_]
     amplitude, sagnac, bias = map(_in_powers, (law.amplitude_, law.sagnac_factor_, law.bias_))
     formula = (
-        f"rate [deg/s] = arcsin(({names[0]} [{recipe.output_unit}]{_term(-law.offset_)}) "
+        f"rate [deg/s] = arcsin({names[0]} [{recipe.output_unit}] "
         f"/ ({amplitude})) / ({sagnac}) - ({bias})"
     )
     if len(names) > 1:

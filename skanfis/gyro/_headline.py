@@ -1,4 +1,4 @@
-"""What report and command tell of a calibration: which compensation to use, and how sure it is."""
+"""What report and command tell of a calibration: which compensation to use, and what is proven."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""The models of a calibration: law, rules with terms chosen by groups held out, polynomials."""
+"""The models of a calibration: the law, and rules with terms chosen by groups held out."""
 
 from collections import Counter
 from dataclasses import dataclass

@@ -83,7 +83,7 @@ _LAW = """    for (i = 0; i < $n_law; ++i) {
     t = $temperature;
     amplitude = $name_polynomial($name_amplitude, $n_amplitude, t);
     sagnac = $name_polynomial($name_sagnac, $n_sagnac, t);
-    sine = x[$output] - $offset;
+    sine = x[$output];
     if (sagnac == 0.0R) {
         return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
     }
@@ -310,7 +310,6 @@ def _law_code(dialect, whole):
     words = {
         "n_law": inputs.size,
         "output": inputs[0],
-        "offset": number(law.offset_),
         "limit": number(np.sin(law.max_phase)),
         "max_phase": number(law.max_phase),
         "slope": number(1.0 / np.cos(law.max_phase)),
@@ -393,7 +392,7 @@ def _known_answers(whole):
     if not whole.is_cubic:
         output = law.columns_[0]
         swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
-        X[:, output] = np.where(kind == 3, law.offset_ + swing, X[:, output])
+        X[:, output] = np.where(kind == 3, swing, X[:, output])
     X = np.vstack([low, high, X]).astype(whole.dtype).astype(float)
     # NaN past the amplitude.
     phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (law.phase(X), law.max_phase)

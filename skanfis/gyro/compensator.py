@@ -37,7 +37,7 @@ _KEYS = (
 )  # fmt: skip
 # Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
-_NUMBERS = ("offset", "thermometer_lag", "reference_temperature")
+_NUMBERS = ("thermometer_lag", "reference_temperature")
 _RANGE = ("minimum", "maximum")
 _OF_POLYNOMIAL = ("center", "scale", "coefficients")
 _PARAMETERS = ("max_phase", "out_of_bounds")
@@ -307,7 +307,6 @@ def _read_law(document, inputs):
     law = OpenLoopArcsineRegressor(
         **dict(zip(ROLES, [*columns, None, None], strict=False)),
         **dict(zip(DEGREES, degrees, strict=True)),
-        reference_temperature=fitted["reference_temperature"],
         **{key: document[key] for key in _PARAMETERS},
     )
     check_parameters(law)

@@ -64,7 +64,7 @@ def whole():
 
 @cache
 def everything():
-    """A lag, an offset, high degrees, rules on chosen and scaled columns, three rounds, linear."""
+    """A lag, high degrees, rules on chosen and scaled columns, three rounds, linear."""
     law = OpenLoopArcsineRegressor(
         "output",
         "temperature",
@@ -72,8 +72,6 @@ def everything():
         amplitude_degree=2,
         sagnac_degree=2,
         bias_degree=3,
-        fit_offset=True,
-        reference_temperature=20.1,
         max_phase=0.9,
         out_of_bounds="linear",
     )

@@ -210,7 +210,7 @@ def test_physics_and_policy(tmp_path, log, capsys):
         [*FILES, "compensator.c", "compensator.h"]
     )
     rules = (out / "rules.txt").read_text(encoding="utf-8")
-    assert rules.startswith("rate [deg/s] = arcsin((output [deg/s]")
+    assert rules.startswith("rate [deg/s] = arcsin(output [deg/s]")
     assert "rate beyond the law = " in rules
     compensator = GyroCompensator.read_json(out / "compensator.json")
     assert compensator.predicts == "rate"

@@ -104,9 +104,9 @@ def with_physics(log, **parameters):
     [
         None,  # rules alone
         {},
-        {"temperature_rate": "temperature_rate", "amplitude_degree": 3, "fit_offset": True},
+        {"temperature_rate": "temperature_rate", "amplitude_degree": 3},
         {"temperature": None, "max_phase": 0.5, "out_of_bounds": "nan"},
-        {"reference_temperature": 20, "max_phase": 0.5, "out_of_bounds": "linear"},
+        {"max_phase": 0.5, "out_of_bounds": "linear"},
     ],
 )
 def test_json_gives_the_same_compensator(log, compensator, parameters, tmp_path):
@@ -162,8 +162,11 @@ def of_law(**changes):
         (of_law(amplitude=[1.0] * 7), r"law\.amplitude: .* must be a list of 1 to 6 number"),
         (of_law(sagnac_factor=[float("nan")]), r"law\.sagnac_factor\[0\]: nan is not a number"),
         (of_law(sagnac_factor=[0.0, 1.0]), r"law\.sagnac_factor\[0\], in size: 0.0 is not"),
-        (of_law(offset=True), r"law\.offset: True is not a number"),
-        (of_law(offset=1e60), r"law\.offset: 1e\+60 is not a number of size up to 1e\+50"),
+        (of_law(thermometer_lag=True), r"law\.thermometer_lag: True is not a number"),
+        (
+            of_law(thermometer_lag=1e60),
+            r"law\.thermometer_lag: 1e\+60 is not a number of size up to 1e\+50",
+        ),
         (of_law(minimum=[0.0]), r"law\.minimum: .* must be a list of 2 number"),
         (of_law(minimum=[1e30, 0.0]), "the law's minimum is above its maximum"),
         (of_law(thermometer_lag=5.0), "no column for the temperature's rate"),
