@@ -20,7 +20,7 @@ from scipy.stats import t as student
 from ..exceptions import OutOfBoundsWarning
 from ._checks import find_glitches
 from ._columns import SIGNALS, ask
-from ._models import Choice, fit_model, some_rows
+from ._models import fit_model, some_rows
 from ._simpler import NAMES, Simpler, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, features
@@ -101,9 +101,9 @@ class Calibration:
     ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
     the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
     rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
-    of the model that had not seen it. ``choice`` is of the model's structure. ``simpler`` are
-    compensations without rules, judged with the model by ``verdict`` on the rows in range.
-    ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
+    of the model that had not seen it. ``terms`` are the model's, None of rules that are no grid.
+    ``simpler`` are compensations without rules, judged with the model by ``verdict`` on the rows in
+    range. ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
     ``n_rows`` is how many rows there were, of which ``log`` has some.
     """
 
@@ -117,7 +117,7 @@ class Calibration:
     before: np.ndarray
     after: np.ndarray
     inside: np.ndarray
-    choice: Choice
+    terms: tuple[int, ...] | None
     simpler: list[Simpler]
     verdict: Verdict
     n_fit_rows: int
@@ -192,7 +192,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
-    estimator, choice, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
+    estimator, terms, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
     predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
     model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
     # The same rows for all: those that the model answered in range.
@@ -223,7 +223,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         before=before,
         after=chosen.after,
         inside=judged,
-        choice=choice,
+        terms=terms,
         simpler=simpler,
         verdict=verdict,
         n_fit_rows=rows.size,
@@ -259,16 +259,15 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
 
 
 def _fit(X, target, groups, recipe, tell):
-    """The model of all rows, its choice, and what warnings said."""
+    """The model of all rows, its terms, and what warnings said."""
     tell(f"fitting to {len(X):,} rows")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         # Of rows that trial fits have not seen; the final one is asked of none.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
-        estimator, choice = fit_model(X, target, groups, recipe)
-    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
-    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
-    return estimator, choice, sorted({str(warning.message) for warning in caught})
+        estimator, terms = fit_model(X, target, groups, recipe)
+    tell(f"terms {','.join(map(str, terms or ['of another kind']))}")
+    return estimator, terms, sorted({str(warning.message) for warning in caught})
 
 
 def _glitches(log, error, name_row, tell):

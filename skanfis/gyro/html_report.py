@@ -340,7 +340,7 @@ def _rules(results):
     blocks.append(Block("pictures", list(results.memberships())))
     found = readability_of(calibration)
     text = rules_text(calibration, found)
-    n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
+    n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.terms)
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         *blocks,

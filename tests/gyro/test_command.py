@@ -143,7 +143,7 @@ def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path
     assert "before" not in out
 
 
-@pytest.mark.usefixtures("no_pictures", "law_of_degree_one")
+@pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize(
     ("write", "kind"),
     [
@@ -198,7 +198,7 @@ def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
     assert "held-out rows in range" in out
 
 
-@pytest.mark.usefixtures("no_report", "law_of_degree_one")
+@pytest.mark.usefixtures("no_report")
 def test_physics_and_policy(tmp_path, log, capsys):
     log = log[log["run"] < 3]
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"

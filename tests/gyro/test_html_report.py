@@ -51,7 +51,7 @@ class Outline(HTMLParser):
         self.text.append(data)
 
 
-pytestmark = pytest.mark.usefixtures("given_weights", "law_of_degree_one", "coarse_report")
+pytestmark = pytest.mark.usefixtures("given_weights", "coarse_report")
 
 
 def calibration_of(log, inputs=("time", "temperature", "temperature_rate", "output"), **options):
