@@ -19,6 +19,7 @@ _DEGREE = 2
 # Terms are looked for among so many rows, and fitted to all. More rules than three terms of three
 # inputs make were taken on no log that was tried, and looking at them takes half of the time.
 _ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 27
+_FEWEST_GROUPS = 4  # whose range is that of the others when one is left out
 
 
 def fit_model(X, target, groups, recipe):
@@ -28,7 +29,7 @@ def fit_model(X, target, groups, recipe):
     """
     terms, rules, rows = recipe.terms, None, np.arange(len(X))
     if isinstance(terms, str):
-        rows = some_rows(rows, _ROWS_FOR_SEARCH, X, np.random.default_rng(0))
+        rows = some_rows(_shared_rows(X, groups), _ROWS_FOR_SEARCH, X, np.random.default_rng(0))
         left = target
         if recipe.physics:
             left = target - make_law(recipe.inputs, _DEGREE, "linear").fit(X, target).predict(X)
@@ -42,6 +43,20 @@ def fit_model(X, target, groups, recipe):
     # In every round the same terms: looked for once, in what the law leaves.
     law, rules = make_law(recipe.inputs, _DEGREE, recipe.outside), _make_rules(recipe, terms)
     return ResidualRegressor(law, rules, n_rounds=ROUNDS).fit(X, target), terms
+
+
+def _shared_rows(X, groups):
+    """Rows in the range that two groups or more reach, of every input; all rows where few are.
+
+    What a model makes of other rows while their group is held out is its tangent, and no figure of
+    a calibration is of such rows: they shall not choose its terms.
+    """
+    by_group = X.groupby(groups)
+    if by_group.ngroups < _FEWEST_GROUPS:
+        return np.arange(len(X))
+    low, high = np.sort(by_group.min(), axis=0)[1], np.sort(by_group.max(), axis=0)[-2]
+    rows = np.flatnonzero(((low <= X) & (high >= X)).all(axis=1))
+    return rows if 2 * rows.size >= len(X) else np.arange(len(X))
 
 
 def _make_rules(recipe, terms):

@@ -12,7 +12,7 @@ from skanfis.gyro import _calibration, _simpler
 from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._formulas import formula_of
 from skanfis.gyro._headline import errors_and_verdict, headline
-from skanfis.gyro._models import fit_model
+from skanfis.gyro._models import _shared_rows, fit_model
 from skanfis.gyro._split import Split
 
 pytestmark = pytest.mark.theory
@@ -165,3 +165,19 @@ def test_terms_are_for_what_the_law_leaves():
     # An amplitude that is curved in temperature.
     curved = X.assign(output=X["output"] * (1 - 2e-5 * (X["temperature"] - 25.0) ** 2))
     assert fit_model(curved, rate, groups, recipe)[1] == (1, 1)
+
+
+def test_rows_that_one_group_alone_reaches_do_not_choose_terms():
+    # Four groups, each of eleven temperatures; the first begins 2 lower, the last ends 3 higher.
+    first = np.array([-2.0, 0.0, 0.0, 0.0])
+    last = np.array([10.0, 10.0, 10.0, 13.0])
+    heat = np.concatenate([np.linspace(*ends, 11) for ends in zip(first, last, strict=True)])
+    X, groups = pd.DataFrame({"temperature": heat, "output": 1.0}), np.repeat(list("abcd"), 11)
+    found = _shared_rows(X, groups)
+    np.testing.assert_array_equal(found, np.flatnonzero((heat >= 0.0) & (heat <= 10.0)))
+    assert 0 < len(X) - found.size < 10
+    # Of three groups, and where most rows would go, all stay.
+    assert _shared_rows(X[:33], groups[:33]).size == 33
+    far, other = (np.repeat(places, 11) for places in ([0.0, 1, 2, 3], [1.0, 0, 3, 2]))
+    apart = X.assign(temperature=heat + 100.0 * far, output=other)
+    assert _shared_rows(apart, groups).size == len(X)
