@@ -211,7 +211,7 @@ def test_physics_and_policy(tmp_path, log, capsys):
     )
     rules = (out / "rules.txt").read_text(encoding="utf-8")
     assert rules.startswith("rate [deg/s] = arcsin(output [deg/s]")
-    assert "rate beyond the law = " in rules
+    assert "THEN rate beyond the law is " in rules
     compensator = GyroCompensator.read_json(out / "compensator.json")
     assert compensator.predicts == "rate"
     hot = compensator.apply(log.assign(temperature=log["temperature"] + 100.0))
