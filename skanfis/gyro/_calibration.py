@@ -20,7 +20,7 @@ from scipy.stats import t as student
 from ..exceptions import OutOfBoundsWarning
 from ._checks import find_glitches
 from ._columns import SIGNALS, ask
-from ._models import Choice, fit_model, some_rows
+from ._models import fit_model, some_rows
 from ._simpler import NAMES, Simpler, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, features
@@ -51,7 +51,6 @@ class Recipe:
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
     outside: str = "linear"
-    box: tuple[tuple[str, float, float], ...] = ()  # of proven bounds: input, low, high
     units: dict[str, str] = field(default_factory=dict)
     assumed: dict[str, str] = field(default_factory=dict)
 
@@ -102,10 +101,9 @@ class Calibration:
     ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
     the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
     rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
-    of the model that had not seen it. ``choice`` is of the model's structure, ``fold_choices`` of
-    those held out, each from its fold's training rows; None where it was given. ``simpler`` are
-    compensations without rules, judged with the model by ``verdict`` on the rows in range.
-    ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
+    of the model that had not seen it. ``terms`` are the model's, None of rules that are no grid.
+    ``simpler`` are compensations without rules, judged with the model by ``verdict`` on the rows in
+    range. ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
     ``n_rows`` is how many rows there were, of which ``log`` has some.
     """
 
@@ -119,8 +117,7 @@ class Calibration:
     before: np.ndarray
     after: np.ndarray
     inside: np.ndarray
-    choice: Choice
-    fold_choices: list[Choice] | None
+    terms: tuple[int, ...] | None
     simpler: list[Simpler]
     verdict: Verdict
     n_fit_rows: int
@@ -191,11 +188,11 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
     found = _held_out(X, target, groups, split, recipe, tell, rng)
-    predicted, inside, folds, choices, fold_models = found
+    predicted, inside, folds, fold_models = found
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
-    estimator, choice, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
+    estimator, terms, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
     predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
     model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
     # The same rows for all: those that the model answered in range.
@@ -226,8 +223,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         before=before,
         after=chosen.after,
         inside=judged,
-        choice=choice,
-        fold_choices=choices if recipe.physics or isinstance(recipe.terms, str) else None,
+        terms=terms,
         simpler=simpler,
         verdict=verdict,
         n_fit_rows=rows.size,
@@ -239,9 +235,9 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
 
 
 def _held_out(X, target, groups, split, recipe, tell, rng):
-    """Predictions of every row by a model new to it, which are in range, folds, choices, models."""
+    """Predictions of every row by a model new to it, which are in range, folds, models."""
     predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
-    folds, choices, models = [], [], []
+    folds, models = [], []
     for number, (train, test) in enumerate(split.folds, 1):
         tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
         rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
@@ -249,10 +245,9 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
         with warnings.catch_warnings():
             # The final fit warns of the same.
             warnings.simplefilter("ignore")
-            model, choice = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
+            model, _ = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
             predicted[test] = model.predict(X.iloc[test])
             inside[test] = ask(model, "in_bounds", X.iloc[test])
-        choices.append(choice)
         models.append(model)
     if not (inside & np.isfinite(predicted)).any():
         raise LogError(
@@ -260,20 +255,19 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
             f"that the model had seen while its group was held out ({split.kind}). Log groups that "
             "overlap in temperature, rate and time."
         )
-    return predicted, inside, folds, choices, models
+    return predicted, inside, folds, models
 
 
 def _fit(X, target, groups, recipe, tell):
-    """The model of all rows, its choice, and what warnings said."""
+    """The model of all rows, its terms, and what warnings said."""
     tell(f"fitting to {len(X):,} rows")
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         # Of rows that trial fits have not seen; the final one is asked of none.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
-        estimator, choice = fit_model(X, target, groups, recipe)
-    degree = f", law of degree {choice.degree} in temperature" if recipe.physics else ""
-    tell(f"terms {','.join(map(str, choice.terms or ['of another kind']))}{degree}")
-    return estimator, choice, sorted({str(warning.message) for warning in caught})
+        estimator, terms = fit_model(X, target, groups, recipe)
+    tell(f"terms {','.join(map(str, terms or ['of another kind']))}")
+    return estimator, terms, sorted({str(warning.message) for warning in caught})
 
 
 def _glitches(log, error, name_row, tell):

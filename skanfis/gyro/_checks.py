@@ -21,7 +21,6 @@ _PLAUSIBLE = {
 }
 _LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _LONGEST_RUN = 31 * 86_400.0  # s
-_OF_A_RUN = {"begin": "first", "end": "last", "coldest": "min", "hottest": "max"}
 _FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
 _LEAST_SPAN = 10.0  # degC, to learn from
 _NOISE = 5.0  # degC by which a few rows may differ
@@ -92,7 +91,7 @@ def check_log(
     if len(log) < (_FEWEST_ROWS if len(inputs) else 1):
         rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
         raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
-    RowChecks(units).add(log)
+    check_rows(log, units, [log["run"]] if "run" in log else [])
     n_runs = log["run"].nunique() if "run" in log and len(inputs) else 1
     if n_runs * _FEWEST_ROWS_PER_RUN > len(log):
         raise LogError(
@@ -114,67 +113,56 @@ def check_log(
     return log
 
 
-class RowChecks:
-    """Checks of the rows of a log that comes whole or in pieces."""
-
-    def __init__(self, units):
-        self._units = units
-        self._runs = pd.DataFrame()
-
-    def add(self, log):
-        """LogError for the first bad row of the next piece."""
-        for part in QUANTITIES:
-            if part not in log:
-                continue
-            check_values(log[part], part)
-            if part in _PLAUSIBLE and self._units[part] not in SIGNALS:
-                _check_plausible(log[part].to_numpy(), part, self._units[part])
-        if "output" in log and self._units["output"] in SIGNALS:
-            largest = np.abs(log["output"]).max()
-            if not 1.0 / _LARGEST_SIGNAL < largest < _LARGEST_SIGNAL:
-                unit = self._units["output"]
-                raise LogError(f"signals up to {largest:.3g} {unit} are not plausible.", "output")
-        if "time" in log:
-            self._check_time(log)
-
-    def _check_time(self, log):
-        time = log["time"].reset_index(drop=True)
-        run = pd.Series(log["run"].to_numpy() if "run" in log else 0, time.index)
-        before = time.groupby(run, sort=False).shift()
-        if len(self._runs):
-            before = before.fillna(run.map(self._runs["end"]).astype(float))
-        bad = time <= before
-        if bad.any():
-            row = int(bad.idxmax())
+def check_rows(log, units, runs):
+    """LogError for the first bad row; ``runs`` are the columns that tell runs apart."""
+    for part in QUANTITIES:
+        if part not in log:
+            continue
+        check_values(log[part], part)
+        if part in _PLAUSIBLE and units[part] not in SIGNALS:
+            _check_plausible(log[part].to_numpy(), part, units[part])
+    if "output" in log and units["output"] in SIGNALS and len(log):
+        largest = np.abs(log["output"]).max()
+        if not 1.0 / _LARGEST_SIGNAL < largest < _LARGEST_SIGNAL:
             raise LogError(
-                f"time does not increase within a run: {time[row]:.10g} s after {before[row]:.10g} "
-                f"s ({bad.sum()} such rows). Rows must be in the order of time; if several runs "
-                "follow each other, say which column tells them apart (run=NAME).",
-                "time",
-                row,
+                f"signals up to {largest:.3g} {units['output']} are not plausible.", "output"
             )
-        temperature = log["temperature"].to_numpy() if "temperature" in log else np.nan
-        columns = {"begin": time, "end": time, "coldest": temperature, "hottest": temperature}
-        found = pd.DataFrame(columns).groupby(run, sort=False).agg(_OF_A_RUN)
-        self._runs = pd.concat([self._runs, found]).groupby(level=0, sort=False).agg(_OF_A_RUN)
-        runs, unit = self._runs.loc[found.index], self._units["time"]
-        duration = (runs["end"] - runs["begin"]).to_numpy()
-        if duration.max() > _LONGEST_RUN:
-            raise LogError(
-                f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a "
-                f"smaller unit than {unit}?",
-                "time",
-            )
-        heating = (runs["hottest"] - runs["coldest"]).to_numpy()
-        fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
-        if fast.any():
-            first = int(np.argmax(fast))
-            raise LogError(
-                f"the temperature changes by {heating[first]:.3g} degC within "
-                f"{duration[first]:.3g} s, which is not plausible; is time in a larger unit than "
-                f"{unit}?",
-                "time",
-            )
+    if "time" in log and len(log):
+        _check_time(log, units["time"], runs)
+
+
+def _check_time(log, unit, runs):
+    by_run = log.groupby(runs or np.zeros(len(log)), sort=False, observed=True)
+    time, before = log["time"].to_numpy(), by_run["time"].shift().to_numpy()
+    bad = time <= before
+    if bad.any():
+        row = int(bad.argmax())
+        raise LogError(
+            f"time does not increase within a run: {time[row]:.10g} s after {before[row]:.10g} "
+            f"s ({bad.sum()} such rows). Rows must be in the order of time; if several runs "
+            "follow each other, say which column tells them apart (run=NAME).",
+            "time",
+            row,
+        )
+    duration = (by_run["time"].last() - by_run["time"].first()).to_numpy()
+    if duration.max() > _LONGEST_RUN:
+        raise LogError(
+            f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a "
+            f"smaller unit than {unit}?",
+            "time",
+        )
+    if "temperature" not in log:
+        return
+    heating = (by_run["temperature"].max() - by_run["temperature"].min()).to_numpy()
+    fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
+    if fast.any():
+        first = int(np.argmax(fast))
+        raise LogError(
+            f"the temperature changes by {heating[first]:.3g} degC within "
+            f"{duration[first]:.3g} s, which is not plausible; is time in a larger unit than "
+            f"{unit}?",
+            "time",
+        )
 
 
 def check_at_rest(log, unit):

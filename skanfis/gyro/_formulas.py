@@ -3,23 +3,23 @@
 from ..export import fold
 from ..inspection import export_text
 from ._headline import readability_of
-from ._simpler import LAW_AND_LINE, NOTHING
+from ._simpler import LAW_AND_LINE
+from .compose import FrozenRules
 from .physics import past_phase
 
 
 def formula_of(calibration, name):
     """The formula of a simpler compensation, as lines of text."""
     simple = next(each for each in calibration.simpler if each.name == name)
-    recipe = calibration.recipe
+    recipe, estimator = calibration.recipe, simple.estimator
+    law = getattr(estimator, "base_", None)
     if name == LAW_AND_LINE:
-        line = _polynomial("line", simple.model.residual_, recipe.inputs)
-        return f"{law_text(simple.model.base_, recipe)}\n\nTo this rate is added the line:\n{line}"
+        line = _line("line", estimator.residual_, recipe.inputs)
+        return f"{law_text(law, recipe)}\n\nTo this rate is added the line:\n{line}"
     if simple.predicts == "rate":
-        return law_text(simple.model, recipe)
-    rate = f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n"
-    if name in (NOTHING, "constant"):
-        return f"{rate}error = {simple.model:.9g}"
-    return rate + _polynomial("error", simple.model, recipe.inputs)
+        return law_text(law, recipe)
+    text = _line("error", estimator, recipe.inputs) if law is None else _cubic(law, recipe.inputs)
+    return f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n{text}"
 
 
 def rules_text(calibration, found=None):
@@ -48,7 +48,7 @@ def law_text(law, recipe):
     names = [recipe.inputs[j] for j in law.columns_]
     amplitude, sagnac, bias = map(_in_powers, (law.amplitude_, law.sagnac_factor_, law.bias_))
     formula = (
-        f"rate [deg/s] = arcsin(({names[0]} [{recipe.output_unit}]{_term(-law.offset_)}) "
+        f"rate [deg/s] = arcsin({names[0]} [{recipe.output_unit}] "
         f"/ ({amplitude})) / ({sagnac}) - ({bias})"
     )
     if len(names) > 1:
@@ -71,20 +71,28 @@ def _term(value, factor=""):
     return f" {'-' if value < 0 else '+'} {abs(value):.8g}{factor}" if value else ""
 
 
-def _polynomial(what, pipeline, inputs):
-    """In standardised inputs, which keep the digits that count in a cubic."""
-    scaler, powers, line = (step for _, step in pipeline.steps)
+def _line(what, estimator, inputs):
+    """What a single rule gives: a constant or a line."""
+    model = FrozenRules.of(estimator, len(inputs)).model
+    constant, *slopes = model.coefficients.ravel()
+    lines = [f"{what} = {constant:.9g}"]
+    for name, slope, reference in zip(inputs, slopes, model.reference, strict=False):
+        lines.append(f"    {slope:+.9g} * ({name} - ({reference:.9g}))")
+    return "\n".join(lines)
+
+
+def _cubic(cubic, inputs):
+    """In standardised inputs, which keep the digits that count."""
     names = [f"z{j + 1}" for j in range(len(inputs))]
     lines = [
-        f"{name} = ({column} - {mean:.9g}) / {scale:.9g}"
-        for name, column, mean, scale in zip(
-            names, inputs, scaler.mean_, scaler.scale_, strict=True
+        f"{name} = ({column} - ({center:.9g})) / {scale:.9g}"
+        for name, column, center, scale in zip(
+            names, inputs, cubic.center, cubic.scale, strict=True
         )
     ]
-    lines.append(f"{what} = {float(line.intercept_):.9g}")
-    for value, row in zip(line.coef_, powers.powers_, strict=True):
-        factors = [
-            f"{name}^{k}" if k > 1 else name for name, k in zip(names, row, strict=True) if k
-        ]
-        lines.append(f"    {value:+.9g} * {' * '.join(factors)}")
+    for value, row in zip(cubic.coefficients, cubic.powers, strict=True):
+        powers = zip(names, row, strict=True)
+        factors = [f"{name}^{k}" if k > 1 else name for name, k in powers if k]
+        term = "    {:+.9g} * {}" if factors else "error = {:.9g}"
+        lines.append(term.format(value, " * ".join(factors)))
     return "\n".join(lines)

@@ -1,25 +1,8 @@
-"""What report and command tell of a calibration: which compensation to use, and how sure it is.
+"""What report and command tell of a calibration: which compensation to use, and what is proven."""
 
-The uncertainty of one compensated row has three parts.
-
-Noise: W is the sum of squares of the final model's n residuals e about the means of their G groups
-(runs, devices). The rules' own estimate s of the noise has paid for the effective number of
-parameters, but takes what groups differ by for noise of rows; without that,
-noise^2 = s^2 (W / (n - G)) / (sum e^2 / n).
-
-Scatter: held-out residuals have the mean m_g and n_g rows in group g, and the mean square w^2
-within groups. What is not repeatable is scatter^2 = var(m_g) - w^2 mean(1 / n_g), the random
-effects of a one-way analysis of variance, with the chi^2 interval of G - 1 degrees of freedom.
-
-Model: the root mean square over the rows of the posterior's deviation without its noise.
-"""
-
-from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
-from scipy.stats import chi2
 
 from ..bounds import bounds, gradient_bounds
 from ..inspection import readability
@@ -31,8 +14,7 @@ from .metrics import rms
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
-_MOST_ROWS = 20_000  # evenly chosen, for the rules, the noise and the model
-_CONFIDENCE = 0.95  # of every interval in the report
+_MOST_ROWS = 20_000  # evenly chosen, to see whether the rules can be read
 _MANY_FLAGGED = 0.2  # of the rows
 _MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter
 
@@ -150,109 +132,35 @@ def readability_of(calibration):
     return readability(calibration.rules, X[known], left[known])
 
 
-class Budget(NamedTuple):
-    """Standard deviations [deg/s], NaN where unknown; ends of a 95 % interval."""
-
-    noise: float
-    scatter: float
-    scatter_low: float
-    scatter_high: float
-    model: float
-
-    @property
-    def combined(self):
-        """Of all parts that are known."""
-        return float(np.sqrt(np.nansum(np.square([self.noise, self.scatter, self.model]))))
-
-
-def budget_of(calibration):
-    """The budget of a calibration."""
-    rules = calibration.rules[-1]
-    rows = evenly_chosen(len(calibration.X), _MOST_ROWS)
-    X, estimator = calibration.X.iloc[rows], calibration.compensator.estimator
-    rate, before = calibration.rate[rows], calibration.before[rows]
-    residual = calibration.compensator.compensate(before, estimator.predict(X)) - rate
-    answered = np.isfinite(residual)
-    groups, in_range = calibration.split.labels.astype(str), calibration.in_range
-    of_fit = rules.noise_std_ if calibration.writes_model else None
-    noise = noise_within(residual[answered], groups[rows][answered], of_fit)
-    errors = (calibration.after - calibration.rate)[in_range]
-    model = np.nan
-    if of_fit is not None:
-        deviation = calibration.rules.predict(X[answered], return_std=True)[1]
-        # Of the difference of two squares rounding may leave less than nothing.
-        beyond = np.maximum(deviation**2 - of_fit**2, 0.0)
-        model = float(np.sqrt(np.mean(beyond)))
-    scatter, low, high = scatter_between(errors, groups[in_range])
-    return Budget(noise, scatter, low, high, model)
-
-
-def noise_within(residual, groups, noise_of_fit=None):
-    """Deviation of residuals about the means of their groups; ``noise_of_fit`` is that of all."""
-    off = residual - pd.Series(residual).groupby(groups).transform("mean").to_numpy()
-    freedom = residual.size - np.unique(groups).size
-    if freedom < 1:
-        return np.nan
-    within = np.sum(off**2) / freedom
-    share = 1.0 if noise_of_fit is None else noise_of_fit**2 / (np.mean(residual**2) or np.inf)
-    return float(np.sqrt(within * share))
-
-
-def scatter_between(errors, groups):
-    """Deviation between groups of what the means of errors would be without noise, and its ends."""
-    table = pd.Series(errors).groupby(groups).agg(["size", "mean", "var"])
-    n_groups = len(table)
-    if n_groups < 2:
-        return np.nan, np.nan, np.nan
-    squares = (table["var"].fillna(0.0) * (table["size"] - 1)).sum()
-    of_noise = squares / max(len(errors) - n_groups, 1) * np.mean(1.0 / table["size"])
-    between = table["mean"].var()
-    tails = chi2.ppf(0.5 + np.array([0.5, -0.5]) * _CONFIDENCE, n_groups - 1)
-    found = np.array([between, *((n_groups - 1) * between / tails)]) - of_noise
-    return tuple(np.sqrt(np.maximum(found, 0.0)).tolist())
-
-
 class Proven(NamedTuple):
-    """What is proven over a box, of what the rules give [deg/s].
+    """What is proven in the range of the calibration, of what the rules, or a cubic, give [deg/s].
 
-    It lies between ``limits``; ``met`` is the largest size that was met, and the inputs where it
-    was. ``rate_rises`` is whether the compensated rate is proven to go with the output, in the
-    sense of the scale factor; None where the output is no input, or what is beside the rules is not
-    bounded. ``box`` is by ``names``.
+    No compensation is larger in size than ``largest``; ``met`` is the largest that was met.
+    ``rate_rises`` is whether the compensated rate is proven to go with the output, in the sense of
+    the scale factor; None where the output is no input, or what is beside the rules is not bounded.
     """
 
-    limits: np.ndarray
-    met: tuple
+    largest: float
+    met: float
     rate_rises: bool | None
-    names: tuple
-    box: np.ndarray
-
-    @property
-    def largest(self):
-        """No compensation in the box exceeds it in size."""
-        return float(np.abs(self.limits).max())
 
 
 def proven_bounds(calibration):
-    """Bounds over the box of the recipe, other inputs in the range of the calibration."""
-    recipe, compensator = calibration.recipe, calibration.compensator
-    own, given = 1.0 / compensator.scale_factor, {name: ends for name, *ends in recipe.box} or None
-    rules, rises = compensator.estimator, None
+    """Bounds in the range of the calibration."""
+    compensator, X = calibration.compensator, calibration.X
+    own, rules, rises = 1.0 / compensator.scale_factor, compensator.estimator, None
     if isinstance(cubic := getattr(rules, "base_", None), Polynomial):
-        X = calibration.X
-        box = np.array([(given or {}).get(name, [X[name].min(), X[name].max()]) for name in X])
-        rows = X.to_numpy()[((box[:, 0] <= X) & (box[:, 1] >= X)).all(axis=1)]
-        sizes = np.abs(cubic.predict(rows))
-        met = max(zip(sizes, rows, strict=True), key=itemgetter(0), default=(np.nan, None))
-        return Proven(cubic.bounds(box), met, None, recipe.inputs, box)
+        limits = cubic.bounds(X.agg(["min", "max"]).to_numpy().T)
+        return Proven(float(np.abs(limits).max()), float(np.abs(cubic.predict(X)).max()), rises)
     rules = getattr(rules, "residual_", rules)
     rules = rules.model if isinstance(rules, FrozenRules) else rules
-    found = bounds(rules, given, max_boxes=_MOST_BOXES)
-    ends = (found.lowest[0], found.at_lowest[0]), (found.highest[0], found.at_highest[0])
-    size, place = max(((abs(value), at) for value, at in ends), key=itemgetter(0))
-    if compensator.predicts == "error" and "output" in recipe.inputs:
+    found = bounds(rules, max_boxes=_MOST_BOXES)
+    if compensator.predicts == "error" and "output" in X:
         # rate = output / factor - error: its slope has the factor's sign where the error's is less.
-        slope = gradient_bounds(rules, "output", given, max_boxes=_MOST_BOXES)
+        slope = gradient_bounds(rules, "output", max_boxes=_MOST_BOXES)
         rises = bool(np.all(slope.upper[0] < own if own > 0.0 else slope.lower[0] > own))
-    limits = np.array([found.lower[0], found.upper[0]])
-    return Proven(limits, (float(size), place), rises, found.input_names, found.box)
+    largest, met = (
+        max(abs(float(ends[0])) for ends in sides)
+        for sides in ((found.lower, found.upper), (found.lowest, found.highest))
+    )
+    return Proven(largest, met, rises)

@@ -1,58 +1,48 @@
-"""The models of a calibration: law, rules with terms chosen by groups held out, polynomials."""
+"""The models of a calibration: the law, and rules with terms chosen by groups held out."""
 
 from collections import Counter
-from dataclasses import dataclass
 from math import prod
 from typing import Any
 
 import numpy as np
-from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import GridSearchCV, GroupKFold
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
 from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
 # Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
-_ROUNDS = 3
-# As in scikit-learn's cross-validation, and enough rows to tell two degrees apart.
-_N_FOLDS, _ROWS_FOR_DEGREE = 5, 6_000
+ROUNDS = 3
+# Of the law beside rules, in temperature: of degree 1 rules would have to bend for it.
+_DEGREE = 2
 # Terms are looked for among so many rows, and fitted to all. More rules than three terms of three
 # inputs make were taken on no log that was tried, and looking at them takes half of the time.
 _ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 27
 _FEWEST_GROUPS = 4  # whose range is that of the others when one is left out
 
 
-@dataclass(frozen=True)
-class Choice:
-    """Degree of the law in temperature, terms of each input or None for rules of other kinds."""
-
-    degree: int
-    terms: tuple[int, ...] | None
-
-
 def fit_model(X, target, groups, recipe):
-    """The estimator of a recipe, fitted, and its choice; what is not given is told by groups."""
-    degree = _law_degree(X, target, groups, recipe) if recipe.physics else 1
+    """The estimator of a recipe, fitted, and its numbers of terms; groups tell what is not given.
+
+    The terms are None for rules of other kinds than a grid.
+    """
     terms, rules, rows = recipe.terms, None, np.arange(len(X))
     if isinstance(terms, str):
         rows = some_rows(_shared_rows(X, groups), _ROWS_FOR_SEARCH, X, np.random.default_rng(0))
         left = target
         if recipe.physics:
-            left = target - make_law(recipe.inputs, degree, "linear").fit(X, target).predict(X)
+            left = target - make_law(recipe.inputs, _DEGREE, "linear").fit(X, target).predict(X)
         rules = _make_rules(recipe, terms)
         rules.fit(X.iloc[rows], left[rows], anfisregressor__groups=groups[rows])
         terms = _terms_of(rules[-1])
-    choice = Choice(degree, terms)
     if not recipe.physics:
         # What was found in all rows is fitted to them.
         is_done = rules is not None and rows.size == len(X)
-        return rules if is_done else _make_rules(recipe, terms).fit(X, target), choice
+        return rules if is_done else _make_rules(recipe, terms).fit(X, target), terms
     # In every round the same terms: looked for once, in what the law leaves.
-    law, rules = make_law(recipe.inputs, degree, recipe.outside), _make_rules(recipe, choice.terms)
-    return ResidualRegressor(law, rules, n_rounds=_ROUNDS).fit(X, target), choice
+    law, rules = make_law(recipe.inputs, _DEGREE, recipe.outside), _make_rules(recipe, terms)
+    return ResidualRegressor(law, rules, n_rounds=ROUNDS).fit(X, target), terms
 
 
 def _shared_rows(X, groups):
@@ -86,27 +76,6 @@ def _terms_of(anfis):
     return terms if prod(terms) == anfis.n_rules_ else None
 
 
-def _law_degree(X, target, groups, recipe):
-    """Degree of the law in temperature that errs least, a line beside it, in groups held out."""
-    rows = some_rows(np.arange(len(X)), _ROWS_FOR_DEGREE, X, np.random.default_rng(0))
-    X, target, groups = X.iloc[rows], target[rows], groups[rows]
-    n_groups = np.unique(groups).size
-    if n_groups < 2:
-        return 1
-    grid = [
-        {"base__amplitude_degree": [degree], "base__bias_degree": [degree]} for degree in (1, 2)
-    ]
-    search = GridSearchCV(
-        make_law_and_line(recipe.inputs),
-        grid,
-        scoring="neg_mean_squared_error",
-        cv=GroupKFold(min(_N_FOLDS, n_groups)),
-        refit=False,
-        error_score="raise",
-    )
-    return search.fit(X, target, groups=groups).best_params_["base__bias_degree"]
-
-
 def some_rows(rows, n_rows, X, rng):
     """At most so many of the rows in their order, with those at the ends of every input's range."""
     if rows.size <= n_rows:
@@ -128,17 +97,4 @@ def make_law(inputs, degree, outside):
         amplitude_degree=degree,
         bias_degree=degree,
         out_of_bounds=outside,
-    )
-
-
-def make_law_and_line(inputs, outside="linear"):
-    """The law and a straight line in all inputs, in turns, as a single rule beside it is fitted."""
-    law = make_law(inputs, 1, outside)
-    return ResidualRegressor(law, make_polynomial(1), n_rounds=_ROUNDS)
-
-
-def make_polynomial(degree):
-    """All products of the inputs up to a degree."""
-    return make_pipeline(
-        StandardScaler(), PolynomialFeatures(degree, include_bias=False), LinearRegression()
     )

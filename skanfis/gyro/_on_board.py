@@ -2,8 +2,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from ..export.c import CCode, export_c
 from ..export.folding import found_by_search
 from .c_code import export_c_physics
@@ -24,11 +22,8 @@ _NOTES = {
 }
 
 
-def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
+def export_c_compensator(compensator, path, *, std) -> CCode:
     """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
-    if saturate is not None:
-        # A constant's limits are the same: a hair is between them.
-        saturate = (saturate + [-1e-12, 1e-12] * (1.0 + np.abs(saturate)))[None]
     found, units = found_by_search(compensator.estimator), units_of(compensator)
     export: Any = export_c_physics
     if not isinstance(found, ResidualRegressor):
@@ -40,7 +35,6 @@ def export_c_compensator(compensator, path, *, std, saturate=None) -> CCode:
         path,
         std=std,
         min_coverage=compensator.min_coverage,
-        saturate=saturate,
         units=units,
         notes=notes_on(compensator) + assumed,
     )

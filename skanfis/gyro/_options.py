@@ -99,8 +99,6 @@ def make_parser():
     add("--physics", told, action="store_true")
     group = parser.add_argument_group("where it holds, and how it is checked")
     add("--outside", _OF_OUTSIDE, choices=("clip", "linear", "nan"), default=Recipe.outside)
-    told = "where the report proves how large the compensation can be"
-    add("--box", told, type=parse_box, metavar="INPUT=LOW:HIGH", **several)
     add("--groups", "what to hold out", choices=KINDS, default="auto")
     group = parser.add_argument_group("the report")
     add("--serial", "serial number of the gyro", default="")
@@ -117,8 +115,6 @@ def make_parser():
     told = "what is recommended (default), or another: the rules of the model, or what is simpler"
     add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
-    told = "with --c: hold what the rules give between the proven limits"
-    add("--saturate", told, action="store_true")
     add("--target", _OF_TARGETS, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
@@ -194,20 +190,6 @@ def _terms(text):
             "fewer terms"
         )
     return numbers
-
-
-def parse_box(text):
-    """A range such as ``temperature=-40:85``; ArgumentTypeError where it is none."""
-    name, _, ends = text.partition("=")
-    try:
-        low, high = map(float, ends.split(":"))
-    except ValueError:
-        low = high = math.nan
-    if not (name and -math.inf < low <= high < math.inf):
-        raise ArgumentTypeError(
-            f"{shortened(text)} must be INPUT=LOW:HIGH, two numbers, such as temperature=-40:85"
-        )
-    return name, low, high
 
 
 class Limit(NamedTuple):

@@ -64,7 +64,7 @@ $base
         return $NAME_REJECT(y, status);
     }
     rate += left[0];
-$held    /* Not (a and b): NaN fails every comparison. */
+    /* Not (a and b): NaN fails every comparison. */
     if (!(rate >= -$MAX && rate <= $MAX)) {
         return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
     }
@@ -83,7 +83,7 @@ _LAW = """    for (i = 0; i < $n_law; ++i) {
     t = $temperature;
     amplitude = $name_polynomial($name_amplitude, $n_amplitude, t);
     sagnac = $name_polynomial($name_sagnac, $n_sagnac, t);
-    sine = x[$output] - $offset;
+    sine = x[$output];
     if (sagnac == 0.0R) {
         return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
     }
@@ -120,9 +120,6 @@ _CUBIC = """    for (i = 0; i < $NAME_N_INPUTS; ++i) {
         rate += term;
     }
 """
-_HELD = """    rate = rate < $least ? $least : rate;
-    rate = rate > $most ? $most : rate;
-"""
 _BEYOND = {
     "clip": "phase = $max_phase;",
     "linear": "phase = $max_phase + (sine - $limit) * $slope;",
@@ -143,7 +140,6 @@ def export_c_physics(
     dtype: str = "double",
     std: str = "c99",
     min_coverage: float | None = 0.1,
-    saturate: Any = None,
     units: Mapping[str, str] | None = None,
     notes: Sequence[str] = (),
 ) -> CCode:
@@ -161,8 +157,6 @@ def export_c_physics(
         that either part takes, in the order of X; the header names them.
     path, name, dtype, std, min_coverage
         As of :func:`skanfis.export.export_c`; ``name`` has at most 14 characters.
-    saturate : Bounds or array-like of shape (1, 2), default=None
-        Limits between which what the rules add to the law is held. None holds nothing.
     units, notes
         As of :func:`skanfis.export.export_c`; the output is called "rate".
 
@@ -196,7 +190,6 @@ def export_c_physics(
     longest = LONGEST_NAME - len(_SUFFIX)
     stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
     law, rules = law_and_rules(estimator)
-    is_cubic = isinstance(law, Polynomial)
     policies = {law.out_of_bounds, rules.model.out_of_bounds}
     if policies >= set(SILENT):
         raise ValueError(
@@ -204,10 +197,8 @@ def export_c_physics(
             "leaves y as it is or writes NaN. Set both to one of the two."
         )
     dialect = Dialect(name, dtype, std)
-    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage, None if is_cubic else saturate)
+    part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage)
     whole = _Composition(law, rules, part, dialect.dtype)
-    if is_cubic and saturate is not None:
-        whole.limits = np.ravel(saturate).astype(dialect.dtype)
     code = "".join(
         [
             f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
@@ -227,10 +218,8 @@ class _Composition:
     """Both parts on the inputs of the function, ``names``, and what of the law is rounded.
 
     Rounded to the type are the law's range, the model of the rules, ``reference`` and ``tables``;
-    not the law's coefficients. A Polynomial may stand for the law; ``limits`` hold its sum.
+    not the law's coefficients. A Polynomial may stand for the law.
     """
-
-    limits: Any = None
 
     def __init__(self, law, rules, part, dtype):
         self.part, self.dtype = part, dtype
@@ -300,14 +289,10 @@ def _source_of(dialect, whole, silent):
         parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
     parts += [dialect.write(rejection(silent, dialect.std)).lstrip() + "\n"]
     parts += [] if whole.is_cubic else [dialect.write(_POLYNOMIAL).lstrip()]
-    held = ""
-    if whole.limits is not None:
-        held, ends = _HELD, map(dialect.number, whole.limits)
-        words |= zip(("least", "most"), ends, strict=True)
     template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
     for key in ("variables", "counters", "zero"):
         template = template.replace(f"${key}", words.pop(key))
-    template = template.replace("$base", base).replace("$held", held)
+    template = template.replace("$base", base)
     words |= {"rules": dialect.name + _SUFFIX, "n_rules_inputs": places.size}
     return "".join([*parts, dialect.write(template, **words)])
 
@@ -325,7 +310,6 @@ def _law_code(dialect, whole):
     words = {
         "n_law": inputs.size,
         "output": inputs[0],
-        "offset": number(law.offset_),
         "limit": number(np.sin(law.max_phase)),
         "max_phase": number(law.max_phase),
         "slope": number(1.0 / np.cos(law.max_phase)),
@@ -358,11 +342,6 @@ def _header(whole, dialect, price, units, notes):
     ]
     if part.min_coverage is not None:
         lines.append(f"A row is uncovered where its coverage is below {part.min_coverage:g}.")
-    if part.limits is not None:
-        low, high = part.limits[0]
-        lines.append(f"What the rules add to the law is held between {low:.9g} and {high:.9g}.")
-    if whole.limits is not None:
-        lines.append("The output is held between {:.9g} and {:.9g}.".format(*whole.limits))
     title = "A cubic" if whole.is_cubic else "An arcsine law"
     title += " and Takagi-Sugeno-Kang fuzzy rules" if model.n_rules > 1 else ""
     return header_of(title, lines, dialect, len(whole.names), 1)
@@ -413,7 +392,7 @@ def _known_answers(whole):
     if not whole.is_cubic:
         output = law.columns_[0]
         swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
-        X[:, output] = np.where(kind == 3, law.offset_ + swing, X[:, output])
+        X[:, output] = np.where(kind == 3, swing, X[:, output])
     X = np.vstack([low, high, X]).astype(whole.dtype).astype(float)
     # NaN past the amplitude.
     phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (law.phase(X), law.max_phase)
@@ -432,16 +411,13 @@ def _known_answers(whole):
         of_law = answering.predict(X)
     model, z = rules.model.with_out_of_bounds(_answering(rules.model)), X[:, rules.positions]
     of_rules = model.predict(z)
-    if part.limits is not None:
-        of_rules = np.clip(of_rules, *part.limits.T.astype(float))
     silent |= ~np.isfinite(of_law.astype(whole.dtype))
     inside = ((low <= X) & (high >= X)).all(axis=1) & ~beyond
     status = STATUS["OUT_OF_RANGE"] * ~inside
     status |= STATUS["NO_OUTPUT"] * silent
     if part.min_coverage is not None:
         status |= STATUS["UNCOVERED"] * (~silent & (coverage < part.min_coverage))
-    held = np.array([-np.inf, np.inf]) if whole.limits is None else whole.limits.astype(float)
-    y = np.where(silent, 0.0, np.clip(of_law + of_rules[:, 0], *held))[:, None]
+    y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
     tolerance = TOLERANCE[whole.dtype] * (size_of_sum(model, z, of_rules) + _steepest(whole, y))
     return X.astype(whole.dtype), y.astype(whole.dtype), status, tolerance.astype(whole.dtype)
 

@@ -1,6 +1,6 @@
 """The command ``python -m skanfis.gyro``: from a calibration log to a checked compensator.
 
-It writes files all together or not at all. ``--apply`` compensates logs piece by piece.
+It writes files all together or not at all.
 """
 
 import contextlib
@@ -16,24 +16,24 @@ from datetime import datetime
 from pathlib import Path
 
 import joblib
-import numpy as np
 import pandas as pd
 
 from ..export.c.dialect import STATUS
 from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
-from ._checks import LABELS, RowChecks, check_at_rest, check_log
+from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._formulas import rules_text
-from ._headline import errors_and_verdict, proven_bounds
+from ._headline import errors_and_verdict
 from ._on_board import export_c_compensator
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._source import open_source
 from ._split import choose_split
-from .compensator import INPUTS, GyroCompensator, features
+from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, write_pdf
-from .log import LogFile, RunFinder, digests_of, find_logs, read
+from .log import find_logs, read
+from .metrics import rms
 from .targets.write import FILES, write_targets
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
@@ -42,7 +42,6 @@ INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 _FILES = ("compensator.json", "compensator.joblib", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
-_ON_BOARD = ["time", "temperature", "output", "run"]
 _MOST_ROWS = 200_000  # that are held
 _PICKLES = (".joblib", ".pkl", ".pickle")
 _STAGED = f".skanfis-{platform.node()}-"  # of folders that hold files until all are written
@@ -101,11 +100,8 @@ def _calibrate(options, tell):
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     check_once("--inputs", options.inputs or ())
-    check_once("--box", [name for name, *_ in options.box])
     targets = [text.partition(":")[0] for text in options.target]
     check_once("--target", targets)
-    if options.saturate and not options.c:
-        raise UsageError("--saturate is of the model in C: give --c c99 or --c c89 with it.")
     folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
     if folder.exists() and not folder.is_dir():
@@ -173,9 +169,6 @@ def _recipe(options, reading, at_rest):
         raise UsageError(
             f"--terms has {len(options.terms)} numbers for the {len(inputs)} inputs {named}."
         )
-    for name, *_ in options.box:
-        if name not in inputs:
-            raise UsageError(f"--box: {name!r} is no input; these are {named}.")
     if options.scale_factor is not None and not (at_rest and unit in SIGNALS):
         raise UsageError("--scale-factor is for a raw signal at rest: else the rate tells it.")
     if at_rest and unit in SIGNALS and options.scale_factor is None:
@@ -192,7 +185,6 @@ def _recipe(options, reading, at_rest):
         terms=options.terms,
         physics=options.physics,
         outside=options.outside,
-        box=tuple(options.box),
         units=reading.units,
         assumed=reading.assumed,
     )
@@ -229,12 +221,7 @@ def _write(calibration, options, files, folder):
     joblib.dump(same, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
-        export_c_compensator(
-            compensator,
-            folder / "compensator",
-            std=options.c,
-            saturate=proven_bounds(calibration).limits if options.saturate else None,
-        )
+        export_c_compensator(compensator, folder / "compensator", std=options.c)
 
 
 def _summary(calibration, folder, notes):
@@ -262,23 +249,28 @@ def _apply(options, tell):
     units = dict(compensator.units)
     if units.get("output") in SIGNALS and "output" not in compensator.assumed:
         del units["output"]  # which is asked for again
-    request = request_of(options, sorted(needed), units)
-    digests_of(paths)
-    tallies: list = []
+    tell(f"compensating {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
+    reading = read(paths, request_of(options, sorted(needed), units), tell=tell)
+    unit, due = reading.units["output"], compensator.output_unit
+    if (unit if unit in SIGNALS else "deg/s") != due:
+        raise UsageError(
+            f"the model was calibrated for an output in {due}; this is in {unit} "
+            f"(--units output={due})."
+        )
+    assumed = [f"units as in the calibration: {text}" for text in reading.assumed.values()]
+    for note in [*reading.notes, *assumed]:
+        tell(f"note: {note}")
+    log = reading.log
+    tell(f"{len(log):,} rows")
+    # Run by run, for the memory that this takes.
+    runs = log.groupby("run", sort=False, observed=True) if "run" in log else [("", log)]
+    rates = pd.concat([compensator.apply(part) for _, part in runs]).sort_index()
+    labels = [name for name in ("device", "run", "time") if name in log]
+    tell(f"writing {target}")
     with _staged(target.parent) as folder:
-        with open(folder / target.name, "w", encoding="utf-8", newline="") as written:
-            for number, path in enumerate(paths, start=1):
-                tell(f"compensating {path} ({number} of {len(paths)})")
-                file, stem = LogFile(path, request), Path(path).stem if len(paths) > 1 else ""
-                for log, rates in _compensated(file, compensator, stem, tell):
-                    labels = [name for name in ("device", "run", "time") if name in log]
-                    # Twelve digits are beyond any gyro, and short beside the 17 of a double.
-                    log[labels].join(rates).to_csv(
-                        written, index=False, header=not tallies, float_format="%.12g"
-                    )
-                    tallies.append(_tally(log, rates))
-        tell(f"writing {target}")
-    _say(_summary_of_rates(target, tallies))
+        # Twelve digits are beyond any gyro, and short beside the 17 of a double.
+        log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
+    _say(_summary_of_rates(target, rates, log.get("rate")))
     tell("done")
     return DONE
 
@@ -302,79 +294,17 @@ def _compensator_of(options):
     return found
 
 
-def _compensated(file, compensator, stem, tell):
-    """Pieces of a log, with labels of their runs, and what the compensator makes of them."""
-    unit, due = file.layout.units["output"], compensator.output_unit
-    if (unit if unit in SIGNALS else "deg/s") != due:
-        raise UsageError(
-            f"the model was calibrated for an output in {due}; this is in {unit} "
-            f"(--units output={due})."
-        )
-    finder, checks = RunFinder(by_clock=True), RowChecks(file.layout.units)
-    inputs_of = _Inputs(compensator.inputs, compensator.time_constant)
-    for log in file.pieces(finder, checks):
-        compensated = compensator._compensated(inputs_of(log), compensator.indicated(log))
-        labels = finder.runs["run"]
-        if "run" not in file.layout.places and stem:
-            labels = labels.map(lambda number: stem if number in "1" else f"{stem} / {number}")
-        log["run"] = labels.to_numpy()[log["run"]]
-        yield log if any(labels) else log.drop(columns="run"), compensated
-    assumed = [f"units as in the calibration: {text}" for text in file.layout.assumed.values()]
-    for note in [*file.notes, *assumed, *filter(None, [finder.note])]:
-        tell(f"note: {note}")
-    tell(f"{file.n_rows:,} rows")
-
-
-class _Inputs:
-    """Inputs of a compensator, piece by piece, whose runs go on from one piece to the next.
-
-    A run that goes on begins with two rows made up: the second is its last one, and between them
-    the temperature rises by what leaves the low-pass at the rate that it had there.
-    """
-
-    def __init__(self, inputs, time_constant):
-        self._inputs, self._lag = inputs, time_constant
-        self._ends = None  # the last row of each run, when the run began, and its rate then
-
-    def __call__(self, log):
-        if not {"time", "temperature_rate"} & set(self._inputs):
-            return features(log, self._inputs, self._lag)
-        log = log.assign(temperature=log.get("temperature", 0.0))[_ON_BOARD]
-        if self._ends is None:
-            self._ends = log.iloc[:0].assign(begin=0.0, rate=0.0)
-        ends = self._ends[self._ends["run"].isin(log["run"])]
-        rise = ends["rate"] * self._lag / np.expm1(-1.0)
-        before = ends.assign(time=ends["time"] - self._lag, temperature=ends["temperature"] + rise)
-        joined = pd.concat([before[_ON_BOARD], ends[_ON_BOARD], log])
-        X = features(joined, self._inputs, self._lag).iloc[2 * len(ends) :].set_axis(log.index)
-        begin = log["run"].map(ends.set_index("run")["begin"])
-        begin = begin.fillna(log.groupby("run")["time"].transform("first"))
-        if "time" in X:
-            X["time"] = log["time"] - begin
-        state = log.assign(begin=begin, rate=X.get("temperature_rate", 0.0))
-        self._ends = pd.concat([self._ends, state]).groupby("run").tail(1)
-        return X
-
-
-def _tally(log, rates):
-    """Numbers of rows by status; where the true rate is known, sums of squared errors too."""
-    tally = pd.DataFrame({"rows": 1}, index=rates.index)
-    if "rate" in log:
-        for name in ("indicated", "compensated"):
-            tally[name] = (rates[f"rate_{name}"] - log["rate"]) ** 2
-    return tally.groupby(rates["status"]).sum()
-
-
-def _summary_of_rates(target, tallies):
-    counts = pd.concat(tallies).groupby(level=0).sum() if tallies else pd.DataFrame({"rows": []})
-    rows, status = counts["rows"], counts.index
-    n_flagged = rows[status != 0].sum()
-    yield f"written        {target}: {rows.sum():,} rows, {n_flagged:,} flagged"
+def _summary_of_rates(target, rates, rate=None):
+    status = rates["status"]
+    yield f"written        {target}: {len(rates):,} rows, {(status != 0).sum():,} flagged"
     for name, bit in STATUS.items():
-        if len(rows) and (count := rows[(status & bit) != 0].sum()):
+        if count := ((status & bit) != 0).sum():
             yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}"
-    if "compensated" in counts and 0 in status:
-        before, after = np.sqrt(counts.loc[0, ["indicated", "compensated"]] / rows.loc[0])
+    good = status == 0
+    if rate is not None and good.any():
+        before, after = (
+            rms((rates[f"rate_{k}"] - rate)[good]) for k in ("indicated", "compensated")
+        )
         yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after (rows with status 0)"
 
 

@@ -37,7 +37,7 @@ _KEYS = (
 )  # fmt: skip
 # Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
-_NUMBERS = ("offset", "thermometer_lag", "reference_temperature")
+_NUMBERS = ("thermometer_lag", "reference_temperature")
 _RANGE = ("minimum", "maximum")
 _OF_POLYNOMIAL = ("center", "scale", "coefficients")
 _PARAMETERS = ("max_phase", "out_of_bounds")
@@ -101,34 +101,6 @@ class GyroCompensator:
     units: dict[str, str] = field(default_factory=dict)
     assumed: dict[str, str] = field(default_factory=dict)
 
-    def features(self, log: pd.DataFrame) -> pd.DataFrame:
-        """The estimator's inputs.
-
-        Parameters
-        ----------
-        log : DataFrame of shape (n_rows, n_parts)
-            With the columns that the inputs are made from, and "run" where it has several.
-
-        Returns
-        -------
-        X : DataFrame of shape (n_rows, n_inputs)
-        """
-        return features(log, self.inputs, self.time_constant)
-
-    def indicated(self, log: pd.DataFrame) -> np.ndarray:
-        """The rate that the gyro indicates without compensation.
-
-        Parameters
-        ----------
-        log : DataFrame of shape (n_rows, n_parts)
-
-        Returns
-        -------
-        rate : ndarray of shape (n_rows,)
-            [deg/s]
-        """
-        return log["output"].to_numpy() / self.scale_factor
-
     def apply(self, log: pd.DataFrame) -> pd.DataFrame:
         """Compensate a log, and flag the rows in which that cannot be trusted.
 
@@ -144,14 +116,13 @@ class GyroCompensator:
             status, the sum of 1 (an input is out of range), 4 (the coverage is below
             ``min_coverage``) and 8 (the policy gives no rate: NaN). Zero: all is well.
         """
-        return self._compensated(self.features(log), self.indicated(log))
-
-    def _compensated(self, X, indicated):
-        """What :meth:`apply` gives, of the estimator's inputs."""
+        X = features(log, self.inputs, self.time_constant)
+        indicated = log["output"].to_numpy() / self.scale_factor
         with warnings.catch_warnings():
             # The status tells, row by row.
             warnings.simplefilter("ignore", OutOfBoundsWarning)
-            compensated = self.compensate(indicated, self.estimator.predict(X))
+            predicted = self.estimator.predict(X)
+        compensated = indicated - predicted if self.predicts == "error" else predicted.copy()
         inside, coverage = (ask(self.estimator, name, X) for name in ("in_bounds", "coverage"))
         refused = ~np.isfinite(compensated)
         compensated[refused] = np.nan
@@ -169,21 +140,6 @@ class GyroCompensator:
             },
             index=X.index,
         )
-
-    def compensate(self, indicated: np.ndarray, predicted: np.ndarray) -> np.ndarray:
-        """The compensated rate from what the estimator predicts.
-
-        Parameters
-        ----------
-        indicated, predicted : ndarray of shape (n_rows,)
-            [deg/s]
-
-        Returns
-        -------
-        rate : ndarray of shape (n_rows,)
-            [deg/s]
-        """
-        return indicated - predicted if self.predicts == "error" else predicted
 
     def write_json(self, path: str | PathLike[str]) -> None:
         """Write it as text that runs nothing when it is read.
@@ -351,7 +307,6 @@ def _read_law(document, inputs):
     law = OpenLoopArcsineRegressor(
         **dict(zip(ROLES, [*columns, None, None], strict=False)),
         **dict(zip(DEGREES, degrees, strict=True)),
-        reference_temperature=fitted["reference_temperature"],
         **{key: document[key] for key in _PARAMETERS},
     )
     check_parameters(law)
@@ -369,13 +324,13 @@ def _read_polynomial(document, rule, inputs):
         raise ValueError(f"its polynomial must be an object of {', '.join(_OF_POLYNOMIAL)}")
     if not isinstance(rule, FrozenRules) or rule.positions.tolist() != list(range(len(inputs))):
         raise ValueError("a polynomial goes with a rule on all inputs, and no law")
-    powers = cubic_powers(len(inputs))
-    sizes = zip(_OF_POLYNOMIAL, (len(inputs), len(inputs), len(powers)), strict=True)
+    n_terms = len(cubic_powers(len(inputs)))
+    sizes = zip(_OF_POLYNOMIAL, (len(inputs), len(inputs), n_terms), strict=True)
     lists = {k: _list_of_numbers(document[k], k, n, n, "polynomial") for k, n in sizes}
     for j, value in enumerate(document["scale"]):
         _divisor(value, f"polynomial.scale[{j}]")
     box, names = (rule.model.minimum, rule.model.maximum), np.array(inputs, dtype=object)
-    return Polynomial(*box, **lists, powers=powers, feature_names_in_=names)
+    return Polynomial(*box, **lists, feature_names_in_=names)
 
 
 def _divisor(value, where):

@@ -1,18 +1,19 @@
 """Two regressors in a row: the second learns what the first leaves."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin, clone
-from sklearn.pipeline import Pipeline
-from sklearn.preprocessing import PolynomialFeatures
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import Pipeline, make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 from sklearn.utils.validation import (
     check_is_fitted,
     check_scalar,
     column_or_1d,
-    has_fit_parameter,
     validate_data,
 )
 
@@ -78,13 +79,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         tags.regressor_tags.poor_score = self.base is None
         return tags
 
-    def fit(
-        self,
-        X: ArrayLike,
-        y: ArrayLike,
-        sample_weight: ArrayLike | None = None,
-        groups: ArrayLike | None = None,
-    ) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
         """Fit the base, then the residual model.
 
         Parameters
@@ -93,12 +88,9 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
             Inputs of both.
         y : array-like of shape (n_samples,)
             Target.
-        sample_weight : array-like of shape (n_samples,), default=None
-            Weights, given to both parts whatever metadata they request; to a Pipeline for its last
-            step.
         groups : array-like of shape (n_samples,), default=None
-            The run, device or day of each row, given to every part whose ``fit`` takes groups, and
-            to a search for its splitter.
+            The run, device or day of each row, given to the ``fit`` of the residual model; of a
+            Pipeline to its last step.
 
         Returns
         -------
@@ -107,8 +99,8 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If ``n_rounds`` is less than 1, if the base has no finite prediction for some training
-            row, if a part takes no weights, or if neither takes groups.
+            If ``n_rounds`` is less than 1, or if the base has no finite prediction for some
+            training row.
         """
         check_scalar(self.n_rounds, "n_rounds", (int, np.integer), min_val=1)
         # Each part checks X for itself, here and in predict; only its columns are taken note of.
@@ -116,17 +108,11 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         target: np.ndarray = column_or_1d(y, dtype=float, warn=True)
         base = OpenLoopArcsineRegressor() if self.base is None else self.base
         residual = ANFISRegressor() if self.residual is None else self.residual
-        for role, part in (("base", base), ("residual", residual)):
-            if sample_weight is not None and not _takes(part, "sample_weight"):
-                raise ValueError(f"sample_weight was given, but {role}={part!r} takes no weights.")
-        if groups is not None and not (_takes(base, "groups") or _takes(residual, "groups")):
-            raise ValueError(
-                f"groups was given, but neither base={base!r} nor residual={residual!r} takes any."
-            )
-        given = {"sample_weight": sample_weight, "groups": groups}
+        step = f"{residual.steps[-1][0]}__" if isinstance(residual, Pipeline) else ""
+        given = {} if groups is None else {f"{step}groups": groups}
         learnt = np.zeros(target.size)
         for _ in range(self.n_rounds):
-            fitted_base = clone(base).fit(X, target - learnt, **_arguments(base, given))
+            fitted_base = clone(base).fit(X, target - learnt)
             left = target - fitted_base.predict(X)
             refused = ~np.isfinite(left)
             if refused.any():
@@ -135,7 +121,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
                     "rows: nothing is left there for the residual model to learn. Drop these rows, "
                     "or give the base a policy that answers."
                 )
-            fitted_residual = clone(residual).fit(X, left, **_arguments(residual, given))
+            fitted_residual = clone(residual).fit(X, left, **given)
             learnt = fitted_residual.predict(X)
         # Both at once: a fit that is interrupted leaves no parts of two fits.
         self.base_, self.residual_ = fitted_base, fitted_residual
@@ -195,23 +181,6 @@ def _last_step(estimator):
     return estimator.steps[-1][1] if isinstance(estimator, Pipeline) else estimator
 
 
-def _takes(estimator, name):
-    """Whether the fit of what predicts in the end takes an argument."""
-    last = _last_step(estimator)
-    # A search takes groups for its splitter, by ``**params``.
-    return has_fit_parameter(last, name) or (name == "groups" and hasattr(last, "refit"))
-
-
-def _arguments(estimator, given):
-    """What of the given ones the estimator's fit takes, by the names that it goes by there."""
-    step = f"{estimator.steps[-1][0]}__" if isinstance(estimator, Pipeline) else ""
-    return {
-        f"{step}{name}": value
-        for name, value in given.items()
-        if value is not None and _takes(estimator, name)
-    }
-
-
 @dataclass(frozen=True, eq=False)
 class FrozenRules:
     """A model of rules on some columns of a table, as a fitted estimator.
@@ -251,17 +220,31 @@ class FrozenRules:
 class Polynomial:
     """sum_k c_k prod_j z_j^p_kj with z = (x - center) / scale, x held in a box; a fitted base.
 
-    ``powers`` are of shape (n_terms, n_inputs); all columns of X are inputs.
+    The terms are all up to the third degree, in the order of scikit-learn; all columns of X are
+    inputs.
     """
 
     minimum_: np.ndarray
     maximum_: np.ndarray
     center: np.ndarray
     scale: np.ndarray
-    powers: np.ndarray
     coefficients: np.ndarray
     feature_names_in_: np.ndarray
     out_of_bounds = "clip"
+
+    @classmethod
+    def fitted(cls, X, y, box):
+        """That of least squares, of a table X; ``box`` are the ends of its columns."""
+        scaler, line = StandardScaler(), LinearRegression()
+        make_pipeline(scaler, PolynomialFeatures(3, include_bias=False), line).fit(X, y)
+        coefficients, names = [line.intercept_, *line.coef_], np.array(X.columns, dtype=object)
+        low, high = box
+        return cls(low, high, scaler.mean_, scaler.scale_, np.array(coefficients), names)
+
+    @property
+    def powers(self):
+        """Of shape (n_terms, n_inputs)."""
+        return cubic_powers(self.center.size)
 
     @property
     def columns_(self):
@@ -275,7 +258,7 @@ class Polynomial:
         z = np.clip(np.asarray(X, dtype=float), self.minimum_, self.maximum_) - self.center
         terms = np.tile(self.coefficients, (len(z), 1))
         for column, powers in zip((z / self.scale).T, self.powers.T, strict=True):
-            terms *= column[:, None] ** powers
+            terms *= np.vander(column, 4, increasing=True)[:, powers]
         return terms.sum(axis=1)
 
     def bounds(self, box):
@@ -287,6 +270,7 @@ class Polynomial:
         return self.coefficients @ ~varies + np.array([-1.0, 1.0]) * (1.0 + 1e-12) * most
 
 
+@cache
 def cubic_powers(n_inputs):
     """Of all terms up to the third degree, in the order of scikit-learn."""
     return PolynomialFeatures(3).fit(np.zeros((1, n_inputs))).powers_

@@ -17,7 +17,6 @@ from ._columns import RATE_UNITS, SIGNALS
 from ._formulas import formula_of, law_text, rules_text
 from ._headline import (
     ARTICLES,
-    budget_of,
     flagged_text,
     headline,
     held_out_groups,
@@ -32,10 +31,6 @@ from .compose import FrozenRules
 from .displays import figures, signs
 from .metrics import rms
 
-_BUDGET = (
-    "Combined and RMS error are two ways to one figure: where the error is clearly larger, the "
-    "rules cannot follow the gyro between the groups, and no part of the budget knows of it."
-)
 # On the first page, with a picture; the others follow.
 _FIRST = (
     "residual_rms", "residual_peak", "reduction_factor", "bias", "bias_temperature_sensitivity",
@@ -67,7 +62,10 @@ _TERMS = {
     "allan_minimum": "none: least Allan deviation, 0.664 B",
     "rate_random_walk": "rate random walk, K (528, 952)",
 }
-_PROOF = "Proven for every point of the box. How far the gyro is from the compensator is not."
+_PROOF = (
+    "Proven for every point in the range of the calibration. How far the gyro is from the "
+    "compensator is not."
+)
 
 
 class Block(NamedTuple):
@@ -222,12 +220,6 @@ def _check(results):
             "from each run. Figures that need every row, of bias stability and Allan's deviation, "
             "are left out."
         )
-    if calibration.fold_choices is not None and calibration.writes_model:
-        found = Counter(_terms_text(choice.terms) for choice in calibration.fold_choices)
-        several = ", ".join(f"{text} ({count})" for text, count in found.most_common())
-        texts.append(
-            f"Each fold's training rows alone chose its structure (number of folds): {several}."
-        )
     blocks = [Block("text", text) for text in texts]
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
@@ -320,38 +312,20 @@ def _use(results):
 
 
 def _sure(results):
-    """The uncertainty budget, and the bounds over a box of inputs."""
+    """What is proven in the range of the calibration."""
     calibration = results.calibration
-    budget, certain = budget_of(calibration), proven_bounds(calibration)
-    parts = [
-        ("noise", budget.noise, "of a row, within its group"),
-        ("not repeatable", budget.scatter, f"between the {held_out_groups(calibration)}"),
-        ("model", budget.model, "posterior of the rules, RMS over the rows"),
-        ("combined", budget.combined, "root of the sum of squares"),
-        ("for comparison", rms(results.error_after), "RMS error, held-out rows"),
-    ]
-    lines = [[part, results.shown(size), "", meaning] for part, size, meaning in parts]
-    lines[1][2] = _interval(budget.scatter_low, budget.scatter_high, results.shown)
-    head = ["part", f"standard deviation [{results.symbol}]", "95 % interval", "meaning"]
-    caption = "Of one compensated row in range, in a group that the model has not seen"
+    certain = proven_bounds(calibration)
     added = calibration.compensator.predicts == "rate"
     what = "addition to the arcsine law" if added else "compensation"
     proven = [
         (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}"),
-        ("largest that was met", f"{results.shown(certain.met[0])} {results.symbol}"),
+        ("largest that was met", f"{results.shown(certain.met)} {results.symbol}"),
     ]
     if certain.rate_rises is not None:
         told = "proven" if certain.rate_rises else "not proven"
         proven.append(("the compensated rate follows the output, never against it", told))
-    return "How sure", [
-        _table(head, lines, caption),
-        Block("soft", _BUDGET),
-        Block("heading", "What is proven"),
-        _table(["over the box below", "result"], proven),
-        # What rounding leaves of zero, where a box is in the units before a scaler, is zero.
-        _box(calibration, certain.names, np.round(certain.box, 9) + 0.0),
-        Block("soft", _PROOF),
-    ]
+    table = _table(["in the range of the calibration", "result"], proven)
+    return "What is proven", [table, Block("soft", _PROOF)]
 
 
 def _rules(results):
@@ -366,7 +340,7 @@ def _rules(results):
     blocks.append(Block("pictures", list(results.memberships())))
     found = readability_of(calibration)
     text = rules_text(calibration, found)
-    n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.choice.terms)
+    n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.terms)
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         *blocks,

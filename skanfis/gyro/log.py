@@ -16,18 +16,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._checks import LABELS, RowChecks, check_values
+from ._checks import LABELS, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, checked_request, settle
 from ._source import NO_VALUE, Clock, as_numbers, open_source
 from ._units import settle_by_all
 from .errors import LogError, shortened
 
-_ROWS = 100_000  # of a piece, which is all that is held beside the log itself
+_ROWS = 100_000  # of a piece, which is all that is held of a file's texts
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
 _FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
+_SHORTEST_RUN = 3  # rows, at the end of a file
 _BEGINNING = 0.1  # part of a run, where a clock is again that has been set anew
 
 
@@ -136,37 +137,43 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
         raise ValueError("paths: at least one file is needed.")
     digests = digests_of(paths)
     files: list[LogFile] = []
-    finder, checks, thinned = RunFinder(request.guess), None, _Thinned(most_rows)
+    tables: list[pd.DataFrame] = []
     for number, path in enumerate(paths):
-        file = LogFile(path, request, files[0] if files else None)
-        files.append(file)
-        if request.guess and checks is None:
-            checks = RowChecks(file.layout.units)
-        for piece in file.pieces(finder, checks, number):
-            thinned.add(piece.drop(columns="device", errors="ignore"))
+        files.append(LogFile(path, request, files[0] if files else None))
+        tables.append(files[-1].read().assign(file=np.int32(number)))
         if len(paths) > 1:
-            tell(f"read {number + 1:,} of {len(paths):,}: {path}, {file.n_rows:,} rows")
-    if not thinned.n_rows:
+            tell(f"read {number + 1:,} of {len(paths):,}: {path}, {files[-1].n_rows:,} rows")
+    table = pd.concat(tables) if len(tables) > 1 else tables[0]
+    tables.clear()
+    if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
-    table, parts = pd.concat(thinned.pieces), files[0].layout.places
-    code, runs = table["run"].to_numpy(), finder.runs
-    log = table[[part for part in parts if part not in LABELS]].reset_index(drop=True)
-    layout = files[0].layout
+    layout, notes = files[0].layout, [note for file in files for note in file.notes]
+    keys = ["file", "device", "run"]
+    by_run = table.groupby(keys, sort=False, observed=True)
+    code, runs = by_run.ngroup().to_numpy(np.int32), by_run.size().index.to_frame(index=False)
+    n_rows, every = len(table), 1
+    while len(table) > most_rows * every:
+        every *= 2
+    if every > 1:
+        held = by_run.cumcount().to_numpy() % every == 0
+        table, code = table[held], code[held]
+        notes.append(f"of {n_rows:,} rows {len(table):,} are used, one in {every} of each run")
+    file, row = table["file"].to_numpy(), table.index.to_numpy()
+    log = table.drop(columns=keys).set_axis(pd.RangeIndex(len(table)))
+    del table, by_run
     if layout.assumed and request.assumed is None:
         found = settle_by_all(log, layout)
         if not found.items() <= layout.units.items():
             # All rows tell otherwise than the first ones.
             retold = replace(request, assumed=layout.units | found)
             return read(paths, retold, tell=tell, most_rows=most_rows)
-    names = _names_of_runs(runs, paths, "run" in parts or finder.note)
+    names = _names_of_runs(runs, paths)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
-    if "device" in parts:
+    if "device" in layout.places:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
-    notes = [note for file in files for note in file.notes]
-    notes = list(dict.fromkeys([*notes, *filter(None, [finder.note, thinned.note])]))
-    file, row = runs["file"].to_numpy()[code], table.index.to_numpy()
-    return Reading(log, file, row, files, notes, thinned.n_rows, digests, layout.assumed)
+    notes = list(dict.fromkeys(notes))
+    return Reading(log, file, row, files, notes, n_rows, digests, layout.assumed)
 
 
 class LogFile:
@@ -176,7 +183,7 @@ class LogFile:
     """
 
     def __init__(self, path, request, first=None):
-        self.path, self._allow_missing = path, request.guess
+        self.path, self._is_command = path, request.guess
         self.source = open_source(path)
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
@@ -194,78 +201,124 @@ class LogFile:
                 "(units: output=UNIT)."
             )
 
-    def pieces(self, finder, checks=None, number=0):
-        """Tables of the parts in the units of a log, "run" being a position in ``finder.runs``.
+    def read(self):
+        """The parts as a table in the units of a log, with labels of device and run.
 
-        The index is the row's position in the file, of which ``number`` is that in the log. The
-        command leaves out rows that lack a value.
+        The index is the row's position in the file. The command leaves out rows that lack a value,
+        tells runs by the clock, and checks every row.
         """
+        log = self._converted()
+        if self._is_command:
+            log = self._in_order(log)
+        missing = log.isna()
+        # A gap in one column is none in the clock.
+        log = log[~missing[[part for part in ("time", *LABELS) if part in log]].any(axis=1)]
+        for part in LABELS:
+            log[part] = log[part].astype("category") if part in log else ""
+        if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
+            runs = self._told_by_clock(log["time"].to_numpy())
+            log = log[: len(runs)].assign(run=runs)
+        is_whole = ~missing.any(axis=1)
+        if not is_whole.all():
+            self._note_gaps(missing)
+            log = log[is_whole[log.index]]
+        if self._is_command:
+            try:
+                check_rows(log, self.layout.units, [log["device"], log["run"]])
+            except LogError as error:
+                raise self.located(error, log.index) from error
+        return log
+
+    def _converted(self):
+        """All rows, in the units of a log."""
         places = self.layout.places
         labels = [places[part] for part in LABELS if part in places]
-        lacking = pd.Series(0, index=list(places))
-        n_left_out, first = 0, 0
+        columns: dict = {part: [] for part in places}
         for table in self.source.pieces(list(places.values()), _ROWS, labels):
             self.n_rows += len(table)
-            piece = table  # of which an error tells the rows
             try:
-                piece = self._in_order(self._converted(table), table)
-                missing = piece.isna()
-                bad = missing.any(axis=1)
-                if bad.any():
-                    lacking += missing.sum()
-                    first = first if n_left_out else int(bad.idxmax())
-                    n_left_out += int(bad.sum())
-                # A gap in one column is none in the clock.
-                known = ~missing[[part for part in ("time", *LABELS) if part in piece]].any(axis=1)
-                piece, bad = piece[known].copy(), bad[known]
-                if bad.all():
-                    continue
-                piece["run"] = finder.codes(piece, number)
-                piece = piece[~bad]
-                if checks is not None:
-                    checks.add(piece)
+                for part, place in places.items():
+                    values = table[place]
+                    if part not in LABELS:
+                        values = pd.Series(self._numbers(values, part), table.index)
+                    check_values(values, part, self._is_command)
+                    columns[part].append(values)
             except LogError as error:
-                raise self.located(error, piece.index) from error
-            yield piece
+                raise self.located(error, table.index) from error
         if self._clock is not None:
             self.notes += self._clock.notes
-        if not n_left_out:
-            return
+        nothing = [pd.Series(dtype=float)]
+        # One by one, and not copied again: a long log is held once.
+        parts = {part: pd.concat(columns.pop(part) or nothing) for part in places}
+        return pd.DataFrame(parts, copy=False)
+
+    def _in_order(self, log):
+        """The rows, but those that occur a second time, with the first row first."""
+        time = log["time"].to_numpy() if "time" in log else np.arange(len(log))
+        steps = np.diff(time[~np.isnan(time)])
+        if (steps > 0.0).all():
+            return log
+        if (steps < 0.0).all():
+            self.notes.append(f"{self.path}: the last row comes first; rows are turned round")
+            return log[::-1]
+        # What rows that occur twice share too, in less memory than hashes of all columns.
+        numbers = enumerate((part for part in log if part not in LABELS), 2)
+        mixed = sum(np.sqrt(k) * log[part].to_numpy() for k, part in numbers)
+        if (np.diff(np.sort(mixed)) > 0.0).all():
+            return log
+        twice = log.duplicated() & log["time"].notna()
+        # Runs of one value all through are alike, and two runs.
+        if log[twice].drop(columns="time").duplicated()[1:].all():
+            # A row that follows itself is no run.
+            twice &= log["time"].diff() == 0.0
+        if twice.any():
+            first, last = map(self._time_as_written, log.index[twice][[0, -1]])
+            self.notes.append(
+                f"{self.path}: {twice.sum():,} rows occur twice, from time {first} to {last}; the "
+                "second time they are left out"
+            )
+            log = log[~twice]
+        return log
+
+    def _time_as_written(self, row):
+        place = self.layout.places["time"]
+        pieces = self.source.pieces([place], _ROWS)
+        return next(piece[place][row] for piece in pieces if row in piece.index)
+
+    def _told_by_clock(self, time):
+        """Labels of runs: "1", "2" and so on, where the time begins anew or steps far.
+
+        A few rows at the end whose clock jumps are no run, and have none.
+        """
+        steps, longest = np.diff(time, prepend=time[0]), _longest_step(time)
+        starts, begin = steps > longest, time[0]
+        for row in np.flatnonzero(steps < 0.0):
+            if time[row] <= begin + _BEGINNING * (time[row - 1] - begin):
+                starts[row], begin = True, time[row]
+        code = np.cumsum(starts)
+        n_last = np.count_nonzero(code == code[-1])
+        if code[-1] and n_last < _SHORTEST_RUN:
+            self.notes.append(
+                f"{self.path}: the clock jumps at the last {n_last} row(s), which are left out"
+            )
+            code = code[:-n_last]
+        if not code[-1]:
+            return [""] * code.size
+        self.notes.append(
+            f"{self.path}: is split into {code[-1] + 1} runs, where the time begins anew or steps "
+            f"by more than {longest:.4g} s"
+        )
+        return pd.Categorical.from_codes(code, [str(k + 1) for k in range(code[-1] + 1)])
+
+    def _note_gaps(self, missing):
+        lacking, bad = missing.sum(), missing.any(axis=1)
         names = {self.layout.name(part): n for part, n in lacking[lacking > 0].items()}
         counts = ", ".join(f"{name!r} in {n:,}" for name, n in names.items())
-        said = f"{self.path}: {n_left_out:,} of {self.n_rows:,} rows lack a value ({counts})"
-        if 2 * n_left_out > self.n_rows:
+        said = f"{self.path}: {bad.sum():,} of {self.n_rows:,} rows lack a value ({counts})"
+        if 2 * bad.sum() > self.n_rows:
             raise LogError(f"{said}: too many to go on without them.")
-        place = self.source.place_of(first)
+        place = self.source.place_of(int(bad.idxmax()))
         self.notes.append(f"{said}; they are left out, the first of them {place}")
-
-    def _in_order(self, piece, table):
-        """A piece whose rows do not occur twice, and that begins with the first row."""
-        if not self._allow_missing or "time" not in piece:
-            return piece
-        twice = piece.duplicated() & piece["time"].notna()
-        # Runs of one value all through are alike, and two runs.
-        if twice.any() and not piece[twice].drop(columns="time").duplicated()[1:].all():
-            times = table[self.layout.places["time"]][twice]
-            self.notes.append(
-                f"{self.path}: {twice.sum():,} rows occur twice, from time {times.iloc[0]} to "
-                f"{times.iloc[-1]}; the second time they are left out"
-            )
-            piece = piece[~twice]
-        steps = np.diff(piece["time"].dropna())
-        if len(table) < _ROWS and steps.size and (steps < 0.0).all():
-            self.notes.append(f"{self.path}: the last row comes first; rows are turned round")
-            piece = piece[::-1]
-        return piece
-
-    def _converted(self, table):
-        piece = pd.DataFrame(index=table.index)
-        for part, place in self.layout.places.items():
-            column = table[place]
-            is_label = part in LABELS
-            piece[part] = column.astype(object) if is_label else self._numbers(column, part)
-            check_values(piece[part], part, self._allow_missing)
-        return piece
 
     def _numbers(self, column, part):
         numbers = as_numbers(column, self.source.decimal)
@@ -297,65 +350,8 @@ class LogFile:
         return LogError(f"{where}, column {name!r}{part}: {error.reason}")
 
 
-class RunFinder:
-    """Finds the runs of a log that comes in pieces: by labels, else by files.
-
-    With ``by_clock``, a file without labels is split at long steps of its time, and where it begins
-    anew. ``runs`` are in the order in which they came.
-    """
-
-    def __init__(self, by_clock):
-        self._by_clock = by_clock
-        self._longest = None  # step of the time within a run [s]
-        self._codes: dict = {}
-        self._open: dict = {}  # by file: when its clock began, its last time, the number of its run
-        self._is_split = False
-
-    @property
-    def runs(self):
-        """Their files, devices and labels."""
-        return pd.DataFrame(list(self._codes), columns=["file", "device", "run"])
-
-    def codes(self, piece, file):
-        """Position of each row's run among ``runs``; ``file`` tells files apart."""
-        nothing = np.full(len(piece), "", dtype=object)
-        if "run" in piece or not ("time" in piece and self._by_clock):
-            run = piece.get("run", nothing)
-        else:
-            run = self._split(piece["time"].to_numpy(), file)
-        (own, devices), (code, runs) = map(pd.factorize, (piece.get("device", nothing), run))
-        code, keys = pd.factorize(own * len(runs) + code)
-        own = [(file, devices[key // len(runs)], str(runs[key % len(runs)])) for key in keys]
-        places = [self._codes.setdefault(key, len(self._codes)) for key in own]
-        return np.array(places)[code]
-
-    def _split(self, time, file):
-        if self._longest is None:
-            self._longest = _longest_step(time)
-        begin, last, number = self._open.get(file, (time[0], time[0], 1))
-        steps = np.diff(time, prepend=last)
-        starts = steps > self._longest
-        for row in np.flatnonzero(steps < 0.0):
-            if time[row] <= begin + _BEGINNING * (time[row] - steps[row] - begin):
-                starts[row], begin = True, time[row]
-        self._is_split |= bool(starts.any())
-        numbers = number + np.cumsum(starts)
-        self._open[file] = begin, time[-1], numbers[-1]
-        return numbers
-
-    @property
-    def note(self):
-        """What the clock has told, in words; empty where it tells one run."""
-        if not self._is_split:
-            return ""
-        return (
-            f"the log is split into {len(self._codes)} runs, where the time begins anew or steps "
-            f"by more than {self._longest:.4g} s"
-        )
-
-
 def _longest_step(time):
-    """The longest step of the time within a run, by the first piece of a log."""
+    """The longest step of the time within a run."""
     steps = np.diff(time)
     forward = steps[steps > 0.0]
     if forward.size == 0:
@@ -365,45 +361,17 @@ def _longest_step(time):
     return longest if np.median(lengths) >= _FEWEST_ROWS else np.inf
 
 
-class _Thinned:
-    """The rows of a log that comes in pieces; of too many, every k-th of each run."""
-
-    def __init__(self, most_rows):
-        self._most, self._every = most_rows, 1
-        self.pieces: list = []
-        self._counts = pd.Series(dtype=int)  # rows so far, by run
-        self.n_rows = 0
-
-    def add(self, piece):
-        before = piece["run"].map(self._counts).fillna(0).astype(int)
-        place = before + piece.groupby("run").cumcount()
-        self._counts = self._counts.add(piece["run"].value_counts(), fill_value=0)
-        self.n_rows += len(piece)
-        self.pieces.append(piece.assign(place=place)[place % self._every == 0])
-        if sum(map(len, self.pieces)) > self._most:
-            self._every *= 2
-            self.pieces = [held[held["place"] % self._every == 0] for held in self.pieces]
-
-    @property
-    def note(self):
-        if self._every == 1:
-            return ""
-        n_used = sum(map(len, self.pieces))
-        return f"of {self.n_rows:,} rows {n_used:,} are used, one in {self._every} of each run"
-
-
-def _names_of_runs(runs, paths, has_labels):
+def _names_of_runs(runs, paths):
     """Labels of the runs that tell them apart, short ones if these do; None of a single run."""
     stems = [Path(path).stem for path in paths]
     files = stems if len(set(stems)) == len(stems) else list(map(os.fspath, paths))
     owners = ["file"] if len(paths) > 1 else []
-    owners += ["device"] if runs["device"].any() else []
-    owners += ["run"] if has_labels else []
+    owners += [label for label in ("device", "run") if runs[label].astype(bool).any()]
     if not {"file", "run"} & set(owners):
         return None
     keys: dict = runs.to_dict("list") | {"file": [files[file] for file in runs["file"]]}
     for parts in (["run"], ["file"], owners):
-        names = [" / ".join(row) for row in zip(*map(keys.get, parts), strict=True)]
+        names = [" / ".join(filter(None, row)) for row in zip(*map(keys.get, parts), strict=True)]
         if set(parts) <= set(owners) and len(set(names)) == len(names):
             break
     return names

@@ -166,15 +166,16 @@ def hysteresis(error, temperature, temperature_rate) -> float:
     high = max(low, min(temperature[side].max() for side in sides))
     edges = np.linspace(low, high, _HYSTERESIS_BINS + 1)
     shared = (temperature >= low) & (temperature <= high) & (temperature_rate != 0)
-    keys = [np.digitize(temperature[shared], edges[1:-1]), sides[0][shared]]
-    means = pd.Series(error[shared]).groupby(keys).agg(["mean", "size"])
-    gaps = means["mean"].where(means["size"] >= _ROWS_PER_MEAN).unstack().diff(axis=1)
-    if gaps.isna().all(axis=None):
+    bins = np.digitize(temperature[shared], edges[1:-1]) + _HYSTERESIS_BINS * sides[0][shared]
+    counts, sums = (np.bincount(bins, w, 2 * _HYSTERESIS_BINS) for w in (None, error[shared]))
+    means = np.where(counts < _ROWS_PER_MEAN, np.nan, sums / np.maximum(counts, 1))
+    gaps = np.abs(np.subtract(*means.reshape(2, -1)))
+    if np.isnan(gaps).all():
         raise ValueError(
             "No hysteresis: warming and cooling share no temperature at which both have "
             f"{_ROWS_PER_MEAN} rows."
         )
-    return float(PER_HOUR * gaps.abs().max(axis=None))
+    return float(PER_HOUR * np.nanmax(gaps))
 
 
 def allan_deviation(

@@ -30,7 +30,7 @@ _SMALLEST_PHASE, _LARGEST_PHASE = 0.01, np.pi / 2.0
 # A tenth of a radian apart: the fit goes the rest of the way.
 _STARTING_PHASES = np.linspace(0.1, 1.5, 15)
 # A dozen coefficients at most: the start needs few rows, and the fit to all begins with some.
-_ROWS_FOR_START, _ROWS_FOR_TRIAL = 2_000, 10_000
+_FEW_ROWS = 2_000
 _MAX_EVALUATIONS = 200
 _NEARBY = 1e-5  # how far a finished fit may still move, in standardised units
 
@@ -38,9 +38,9 @@ _NEARBY = 1e-5  # how far a finished fit may still move, in standardised units
 class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
     r"""Rate from the output of an open-loop fiber-optic gyro by the arcsine law.
 
-    The law :math:`V = A(T) \sin[K(T) (\Omega + b(T))] + V_0` is fitted to a calibration log by
+    The law :math:`V = A(T) \sin[K(T) (\Omega + b(T))]` is fitted to a calibration log by
     least squares on the output V, and inverted for the rate,
-    :math:`\hat\Omega = \arcsin[(V - V_0) / A(T)] / K(T) - b(T)`. The target is the true *rate*, not
+    :math:`\hat\Omega = \arcsin[V / A(T)] / K(T) - b(T)`. The target is the true *rate*, not
     the error of the indicated one. See :doc:`/gyro_physics`.
 
     Parameters
@@ -54,11 +54,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         behind the coil: the law then takes the temperature plus a lag, fitted too, times this rate.
     amplitude_degree, sagnac_degree, bias_degree : int, default=1
         Degrees of A(T), K(T) and b(T), 0 to 5.
-    fit_offset : bool, default=False
-        Whether the output has an offset V0. Only the sine's curvature tells it from the bias: leave
-        it out unless the rates of the log reach a phase of some 0.3 rad.
-    reference_temperature : float, default=None
-        Temperature at which the coefficients are given; None is the mean of the training data.
     max_phase : float, default=1.2
         Largest phase that is inverted, in (0, pi/2) [rad]; towards pi/2 the inverse magnifies noise
         by 1 / cos(phase).
@@ -72,8 +67,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
     amplitude_, sagnac_factor_, bias_ : ndarray of shape (degree + 1,)
         Coefficients of A, K and b in powers of T minus ``reference_temperature_``, lowest first; K
         in rad per unit of the target.
-    offset_ : float
-        V0, in the unit of the output; zero unless fitted.
     thermometer_lag_ : float
         Lag of the thermometer [s]; zero unless fitted.
     reference_temperature_ : float
@@ -115,8 +108,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         amplitude_degree: int = 1,
         sagnac_degree: int = 1,
         bias_degree: int = 1,
-        fit_offset: bool = False,
-        reference_temperature: float | None = None,
         max_phase: float = 1.2,
         out_of_bounds: str = "clip",
     ) -> None:
@@ -126,8 +117,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         self.amplitude_degree = amplitude_degree
         self.sagnac_degree = sagnac_degree
         self.bias_degree = bias_degree
-        self.fit_offset = fit_offset
-        self.reference_temperature = reference_temperature
         self.max_phase = max_phase
         self.out_of_bounds = out_of_bounds
 
@@ -170,7 +159,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         counts = weights > 0
         used = inputs[counts][:, columns]
         log = _standardised(used, rate[counts].astype(float), weights[counts])
-        log.degrees, log.has_offset = self._degrees(used), bool(self.fit_offset)
+        log.degrees = self._degrees(used)
         _check_log(log)
         parameters, self.n_iter_, has_settled = _fit_law(log)
         if not has_settled:
@@ -279,9 +268,8 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
 
     def _keep(self, log, law):
         """Coefficients in the units of X and y, in powers of T minus the reference."""
-        reference = self.reference_temperature
-        self.reference_temperature_ = float(log.mean if reference is None else reference)
-        tau = Polynomial([(self.reference_temperature_ - log.mean) / log.std, 1.0 / log.std])
+        self.reference_temperature_ = float(log.mean)
+        tau = Polynomial([0.0, 1.0 / log.std])
 
         def in_units(coefficients, unit, degree):
             by_degree = np.zeros(1 + (degree if self.temperature is not None else 0))
@@ -292,7 +280,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         self.amplitude_ = in_units(law.a, log.output_unit, self.amplitude_degree)
         self.sagnac_factor_ = in_units(law.k, 1.0 / log.rate_unit, self.sagnac_degree)
         self.bias_ = in_units(law.b, log.rate_unit, self.bias_degree)
-        self.offset_ = float(law.offset * log.output_unit)
         self.thermometer_lag_ = float(law.lag * log.std / log.thermal_unit)
 
     def _used(self, X):
@@ -307,10 +294,10 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         return used[:, 1] + lagging - self.reference_temperature_
 
     def _sine(self, used):
-        """(V - V0) / A(T): the sine of the phase, where it is one."""
+        """V / A(T): the sine of the phase, where it is one."""
         amplitude = polyval(self._difference(used), self.amplitude_)
         with np.errstate(divide="ignore", invalid="ignore"):
-            sine = (used[:, 0] - self.offset_) / amplitude
+            sine = used[:, 0] / amplitude
         # 0 / 0: no amplitude, no rate.
         return np.where(np.isnan(sine), np.inf, sine)
 
@@ -328,8 +315,6 @@ def check_parameters(law):
         raise ValueError(
             f"out_of_bounds={law.out_of_bounds!r} must be one of {', '.join(OUT_OF_BOUNDS)}."
         )
-    if law.reference_temperature is not None and not np.isfinite(law.reference_temperature):
-        raise ValueError(f"reference_temperature={law.reference_temperature} must be finite.")
 
 
 def past_phase(policy, what):
@@ -368,7 +353,7 @@ def _standardised(used, rate, weights):
 
 
 def _check_log(log):
-    n_coefficients = sum(log.degrees) + 3 + log.has_lag + log.has_offset
+    n_coefficients = sum(log.degrees) + 3 + log.has_lag
     output, rate = log.columns[:2]
     if rate.size < n_coefficients:
         raise ValueError(
@@ -381,14 +366,13 @@ def _check_log(log):
 
 
 def _law_of(parameters, log):
-    """The law from the vector that the solver works on: s = A k_0, K, b, then lag and offset.
+    """The law from the vector that the solver works on: s = A k_0, K, b, then the lag.
 
     Where the sine is nearly straight, A and K cannot be told apart, but s can.
     """
     ends = np.cumsum([degree + 1 for degree in log.degrees])
     s, k, b, rest = np.split(parameters, ends)
-    lag, offset = rest[0] if log.has_lag else 0.0, rest[-1] if log.has_offset else 0.0
-    return SimpleNamespace(a=s / k[0], k=k, b=b, lag=lag, offset=offset)
+    return SimpleNamespace(a=s / k[0], k=k, b=b, lag=rest[0] if log.has_lag else 0.0)
 
 
 def _misfit(parameters, columns, log):
@@ -397,7 +381,7 @@ def _misfit(parameters, columns, log):
     law = _law_of(parameters, log)
     tau = tau + law.lag * rho
     phase = polyval(tau, law.k) * (rate + polyval(tau, law.b))
-    return root_weights * (polyval(tau, law.a) * np.sin(phase) + law.offset - output)
+    return root_weights * (polyval(tau, law.a) * np.sin(phase) - output)
 
 
 def _jacobian(parameters, columns, log):
@@ -409,12 +393,12 @@ def _jacobian(parameters, columns, log):
 def _fit_law(log):
     """The solver's vector at the minimum, the number of evaluations, and whether it settled."""
     n_rows = log.columns.shape[1]
-    start = _start(log.columns[:, :: max(1, n_rows // _ROWS_FOR_START)], log)
+    start = _start(log.columns[:, :: max(1, n_rows // _FEW_ROWS)], log)
     lower, upper = np.full((2, start.size), [[-np.inf], [np.inf]])
     first_of_sagnac = log.degrees[0] + 1
     lower[first_of_sagnac], upper[first_of_sagnac] = _SMALLEST_PHASE, _LARGEST_PHASE
     # Of a long log some rows show the way; few steps on all are left then.
-    for step in sorted({max(1, n_rows // _ROWS_FOR_TRIAL), 1}, reverse=True):
+    for step in sorted({max(1, n_rows // _FEW_ROWS), 1}, reverse=True):
         fitted = least_squares(
             _misfit,
             start,
@@ -430,7 +414,7 @@ def _fit_law(log):
         )
         start = fitted.x
     # On a large log the noise is far above the eighth digit, and every pass has its price.
-    if n_rows <= _ROWS_FOR_TRIAL:
+    if n_rows <= _FEW_ROWS:
         start = _polished(start, log)
     return start, fitted.nfev, fitted.status != 0
 
@@ -463,4 +447,4 @@ def _start(columns, log):
     bias = np.arctan2(found[-1] * np.sign(found[0]), np.abs(found[0])) / phase
     k, b = np.zeros(log.degrees[1] + 1), np.zeros(log.degrees[2] + 1)
     k[0], b[0] = phase, np.clip(bias, -1.0, 1.0)
-    return np.concatenate([phase * found[:-1], k, b, np.zeros(log.has_lag + log.has_offset)])
+    return np.concatenate([phase * found[:-1], k, b, [0.0] * log.has_lag])

@@ -31,11 +31,5 @@ def coarse_report():
 @pytest.fixture
 def few_rivals(monkeypatch):
     """Of what is simpler than rules the simplest alone; test_calibration.py asks for the others."""
-    every = _simpler._kinds
-    monkeypatch.setattr(_simpler, "_kinds", lambda *given: islice(every(*given), 3))
-
-
-@pytest.fixture
-def law_of_degree_one(monkeypatch):
-    """Nor is the degree of the law compared on every fold; that too is of test_calibration.py."""
-    monkeypatch.setattr(_models, "_law_degree", lambda *_: 1)
+    every = _simpler.kinds
+    monkeypatch.setattr(_simpler, "kinds", lambda *given: islice(every(*given), 3))

@@ -5,25 +5,13 @@ neither it nor the values settle the units, a log is ambiguous.
 """
 
 import io
-from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
+from .log_variants import Variant
+
 EXACT = {"rad/s": np.pi / 180.0, "deg/h": 3600.0, "mdeg/s": 1e3, "counts": 131.0, "mV": -12.5}
-
-
-@dataclass
-class Variant:
-    """As in log_variants.py."""
-
-    number: int
-    source: str
-    suffix: str
-    content: bytes
-    is_determined: bool
-    rows: np.ndarray
-    story: str
 
 
 class Case:

@@ -65,7 +65,6 @@ class Variant:
     suffix: str
     content: bytes
     is_determined: bool
-    units: dict
     rows: np.ndarray  # of the clean log that are there, in their order
     story: str
 
@@ -105,7 +104,7 @@ def variant(number, logs, seed=0):
     is_determined = not nameless and not headless and _is_settled(log, units, told, source)
     story += [f"units {units}", f"told {told}", "nameless" * nameless, "headless" * headless]
     suffix, content = _written(frame, [header[name] for name in frame], headless, rng, story)
-    return Variant(number, source, suffix, content, is_determined, units, rows, "; ".join(story))
+    return Variant(number, source, suffix, content, is_determined, rows, "; ".join(story))
 
 
 def _name(part, unit, is_told, rng):

@@ -18,12 +18,14 @@ from skanfis.gyro import (
     ResidualRegressor,
     export_c_physics,
 )
+from skanfis.gyro.compensator import features
 
 from ..export.json_mutations import mutated_numbers, with_number
 from ..quick import quick
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 FACTOR = -27_000.0  # counts per deg/s
+LAG = 60.0  # s
 # Next to none, for data next to without noise.
 WEIGHTS = {"agreement": 1e-8, "alpha": 1e-9}
 
@@ -37,10 +39,9 @@ def log():
 
 
 def fitted(log, **options):
-    shell = GyroCompensator(None, INPUTS, scale_factor=FACTOR, output_unit="counts")
-    X = shell.features(log)
+    X = features(log, INPUTS, LAG)
     model = make_pipeline(StandardScaler(), quick([1, 2, 1, 3], **WEIGHTS, **options))
-    model.fit(X, shell.indicated(log) - log["rate"])
+    model.fit(X, log["output"] / FACTOR - log["rate"])
     return GyroCompensator(model, INPUTS, scale_factor=FACTOR, output_unit="counts")
 
 
@@ -75,8 +76,8 @@ def test_rows_out_of_range_are_flagged_and_follow_the_policy(log, policy):
     if policy == "nan":
         assert (status[outside] & 8 != 0).all()
     if policy == "clip":
-        low, high = compensator.features(log).min(), compensator.features(log).max()
-        at_edge = compensator.features(hotter).clip(low, high, axis=1)
+        known = features(log, INPUTS, LAG)
+        at_edge = features(hotter, INPUTS, LAG).clip(known.min(), known.max(), axis=1)
         expected = hotter["output"] / FACTOR - compensator.estimator.predict(at_edge)
         np.testing.assert_allclose(compensated["rate_compensated"], expected, rtol=1e-12)
 
@@ -91,11 +92,10 @@ def test_rows_hardly_covered_are_flagged(log):
 
 def with_physics(log, **parameters):
     """Law and rules; the rules on chosen columns, in another order than the inputs."""
-    shell = GyroCompensator(None, INPUTS, predicts="rate", scale_factor=FACTOR)
     law = OpenLoopArcsineRegressor("output", **{"temperature": "temperature"} | parameters)
     chosen = make_column_transformer((StandardScaler(), ["output", "time"]))
     rules = make_pipeline(chosen, quick([1, 2]))
-    model = ResidualRegressor(law, rules).fit(shell.features(log), log["rate"])
+    model = ResidualRegressor(law, rules).fit(features(log, INPUTS, LAG), log["rate"])
     return GyroCompensator(model, INPUTS, predicts="rate", scale_factor=FACTOR)
 
 
@@ -104,9 +104,9 @@ def with_physics(log, **parameters):
     [
         None,  # rules alone
         {},
-        {"temperature_rate": "temperature_rate", "amplitude_degree": 3, "fit_offset": True},
+        {"temperature_rate": "temperature_rate", "amplitude_degree": 3},
         {"temperature": None, "max_phase": 0.5, "out_of_bounds": "nan"},
-        {"reference_temperature": 20, "max_phase": 0.5, "out_of_bounds": "linear"},
+        {"max_phase": 0.5, "out_of_bounds": "linear"},
     ],
 )
 def test_json_gives_the_same_compensator(log, compensator, parameters, tmp_path):
@@ -162,8 +162,11 @@ def of_law(**changes):
         (of_law(amplitude=[1.0] * 7), r"law\.amplitude: .* must be a list of 1 to 6 number"),
         (of_law(sagnac_factor=[float("nan")]), r"law\.sagnac_factor\[0\]: nan is not a number"),
         (of_law(sagnac_factor=[0.0, 1.0]), r"law\.sagnac_factor\[0\], in size: 0.0 is not"),
-        (of_law(offset=True), r"law\.offset: True is not a number"),
-        (of_law(offset=1e60), r"law\.offset: 1e\+60 is not a number of size up to 1e\+50"),
+        (of_law(thermometer_lag=True), r"law\.thermometer_lag: True is not a number"),
+        (
+            of_law(thermometer_lag=1e60),
+            r"law\.thermometer_lag: 1e\+60 is not a number of size up to 1e\+50",
+        ),
         (of_law(minimum=[0.0]), r"law\.minimum: .* must be a list of 2 number"),
         (of_law(minimum=[1e30, 0.0]), "the law's minimum is above its maximum"),
         (of_law(thermometer_lag=5.0), "no column for the temperature's rate"),

@@ -1,4 +1,4 @@
-"""Physics plus what it leaves: sums, weights, nested parameters, and flags through Pipelines."""
+"""Physics plus what it leaves: sums, nested parameters, and flags through Pipelines."""
 
 import numpy as np
 import pytest
@@ -63,23 +63,9 @@ def test_rounds_take_from_the_base_what_is_not_its_own(rng):
         ResidualRegressor(n_rounds=0).fit(x, y)
 
 
-@pytest.mark.parametrize("residual", [LinearRegression(), make_pipeline(LinearRegression())])
-def test_weights_reach_both_parts(rng, residual):
-    x, weights = rng.normal(size=(30, 2)), rng.integers(0, 3, 30)
-    y = x[:, 0] ** 2 + x[:, 1]
-    model = ResidualRegressor(LinearRegression(fit_intercept=False), residual)
-    weighted = model.fit(x, y, sample_weight=weights).predict(x)
-    copies = model.fit(np.repeat(x, weights, axis=0), np.repeat(y, weights)).predict(x)
-    np.testing.assert_allclose(weighted, copies)
-
-
 def test_what_the_parts_do_not_have_is_said(rng):
     X, y = rng.normal(size=(9, 2)), np.arange(9.0)
     model = ResidualRegressor(LinearRegression(), KNeighborsRegressor(2)).fit(X, y)
-    with pytest.raises(ValueError, match=r"residual=KNeighborsRegressor.* takes no weights"):
-        model.fit(X, y, sample_weight=np.ones(9))
-    with pytest.raises(ValueError, match=r"groups was given, but neither base=Lin.* takes any"):
-        model.fit(X, y, groups=y)
     for method in (model.in_bounds, model.coverage):
         with pytest.raises(ValueError, match=f"KNeigh.* has no method '{method.__name__}'"):
             method(X)

@@ -31,8 +31,8 @@ def computed(text, columns):
     [
         {},
         {"temperature": None},
-        {"amplitude_degree": 3, "bias_degree": 0, "fit_offset": True},
-        {"temperature_rate": "thermal_rate", "reference_temperature": 0.0},
+        {"amplitude_degree": 3, "bias_degree": 0},
+        {"temperature_rate": "thermal_rate"},
     ],
 )
 def test_the_formula_is_the_law(options):
@@ -42,7 +42,7 @@ def test_the_formula_is_the_law(options):
     law = OpenLoopArcsineRegressor("output", **{"temperature": "temperature"} | options)
     law.fit(X, log["rate"])
     text = law_text(law, Recipe(tuple(X), "counts"))
-    assert text.startswith("rate [deg/s] = arcsin((output [counts]")
+    assert text.startswith("rate [deg/s] = arcsin(output [counts]")
     assert ("s * thermal_rate [degC/s]" in text) == ("temperature_rate" in options)
     assert text.endswith("Beyond a phase (the arcsin) of 1.2 rad the phase is held there.")
     values = {name: X[name].to_numpy() for name in X}

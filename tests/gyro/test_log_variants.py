@@ -7,11 +7,13 @@ import os
 
 import numpy as np
 import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis.gyro import LogError
 from skanfis.gyro._checks import check_at_rest
 from skanfis.gyro._guess import Request
-from skanfis.gyro._models import make_polynomial
 from skanfis.gyro.errors import UsageError
 from skanfis.gyro.log import read
 
@@ -35,6 +37,10 @@ def rate_error(log):
     return log[["temperature"]].assign(output=output), output - log["rate"]
 
 
+def cubic(X, y):
+    return make_pipeline(StandardScaler(), PolynomialFeatures(3), LinearRegression()).fit(X, y)
+
+
 def outcome(case, logs, folder):
     """ "read", "refused", "asked" for an option, or "wrong"."""
     path = folder / f"log{case.number}{case.suffix}"
@@ -53,9 +59,9 @@ def outcome(case, logs, folder):
     log = reading.log
     if "rate" in log and "rate" not in clean:
         return "wrong", "a rate that is none"
-    found = make_polynomial(3).fit(*rate_error(log))
+    found = cubic(*rate_error(log))
     X, y = rate_error(clean.iloc[case.rows])
-    expected = make_polynomial(3).fit(X, y).predict(X)
+    expected = cubic(X, y).predict(X)
     off = np.sqrt(np.mean((found.predict(X) - expected) ** 2) / np.mean(expected**2))
     if "time" not in log:
         return "wrong", "no time"

@@ -416,3 +416,23 @@ def test_rows_from_the_last_to_the_first_are_turned_round(tmp_path, truth):
     reading = found(tmp_path / "log.csv")
     same(reading, table, PARTS)
     assert reading.name_row(0).endswith("line 301")
+
+
+@pytest.mark.parametrize(
+    ("last", "n_rows", "told"),
+    [
+        ("0,21.5,1.0,1.0", 300, "the clock jumps at the last 1 row(s), which are left out"),
+        ("9e6,21.5,1.0,1.0", 300, "the clock jumps at the last 1 row(s), which are left out"),
+        ("3000,21.", 300, "1 of 301 rows lack a value"),
+        ("{same}", 300, "1 rows occur twice"),
+    ],
+)
+def test_a_last_row_that_is_a_glitch_is_no_run(tmp_path, truth, last, n_rows, told):
+    table = truth[["temperature", "output", "rate"]]
+    table.insert(0, "time_s", 10.0 * np.arange(300))
+    text = table.to_csv(index=False)
+    same_row = text.strip().rpartition("\n")[2]
+    (tmp_path / "log.csv").write_text(f"{text}{last.format(same=same_row)}\n")
+    reading = found(tmp_path / "log.csv")
+    assert (len(reading.log), "run" in reading.log) == (n_rows, False)
+    assert told in "; ".join(reading.notes)

@@ -16,8 +16,9 @@ pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, LogError, read_log
-from skanfis.gyro._simpler import frozen, single_rule
 from skanfis.gyro.command import _staged, main
+
+from ..quick import quick
 
 
 @pytest.fixture
@@ -28,7 +29,7 @@ def files(tmp_path, monkeypatch):
     named = log.rename(columns={"temperature": "temp_c", "output": "gyro_dps"})
     named[["time", "temp_c", "gyro_dps"]].to_csv("log.csv", index=False)
     compensator = GyroCompensator(
-        frozen(0.5, single_rule(log[["temperature"]], "clip")), ("temperature",)
+        quick(1, order=0).fit(log[["temperature"]], np.full(len(log), 0.5)), ("temperature",)
     )
     compensator.write_json("model.json")
     joblib.dump(compensator, "model.joblib")

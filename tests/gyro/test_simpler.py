@@ -4,15 +4,18 @@ import json
 
 import numpy as np
 import pytest
+from sklearn.linear_model import LinearRegression
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
-from skanfis.gyro._models import make_law, make_law_and_line, make_polynomial
-from skanfis.gyro._simpler import frozen, single_rule
+from skanfis.gyro._models import make_law
+from skanfis.gyro._simpler import kinds
 from skanfis.gyro.compose import Polynomial
 
 INPUTS = ("time", "temperature", "output")
-KINDS = ("constant", "line", "cubic", "law", "law and line")
+CUBIC = make_pipeline(StandardScaler(), PolynomialFeatures(3), LinearRegression())
 
 
 @pytest.fixture(scope="module")
@@ -20,28 +23,34 @@ def log():
     return make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=0)
 
 
-def fitted(kind, X, log):
-    error = log["output"] - log["rate"]
-    if kind == "constant":
-        return float(error.mean()), "error"
-    if kind.startswith("law"):
-        make = make_law if kind == "law" else make_law_and_line
-        arguments = (INPUTS, 1, "linear") if kind == "law" else (INPUTS,)
-        return make(*arguments).fit(X, log["rate"]), "rate"
-    return make_polynomial(1 if kind == "line" else 3).fit(X, error), "error"
+def fitted(kind, log, policy="linear"):
+    """A simple compensation, and what it predicts."""
+    X, rate = log[list(INPUTS)], log["rate"].to_numpy()
+    every = {name: (predicts, fit) for name, predicts, fit in kinds(INPUTS, policy)}
+    predicts, fit = every[kind]
+    return fit(X, rate if predicts == "rate" else log["output"].to_numpy() - rate), predicts
 
 
-@pytest.fixture(scope="module", params=KINDS)
+@pytest.fixture(scope="module", params=[name for name, *_ in kinds(INPUTS)])
 def case(request, log):
-    X = log[list(INPUTS)]
-    model, predicts = fitted(request.param, X, log)
-    return X, model, predicts, frozen(model, single_rule(X, "linear"))
+    return request.param, *fitted(request.param, log)
 
 
-def test_it_gives_what_the_model_gives_and_knows_the_rows(case):
-    X, model, _, estimator = case
-    expected = model if isinstance(model, float) else model.predict(X)
-    np.testing.assert_allclose(estimator.predict(X), expected, rtol=0, atol=1e-12)
+def test_it_gives_what_the_model_gives_and_knows_the_rows(case, log):
+    kind, estimator, _ = case
+    X, rate, error = log[list(INPUTS)], log["rate"], log["output"] - log["rate"]
+    expected = {
+        "no compensation": lambda: np.zeros(len(X)),
+        "constant": lambda: np.full(len(X), error.mean()),
+        "straight line": lambda: LinearRegression().fit(X, error).predict(X),
+        "arcsine law": lambda: make_law(INPUTS, 1, "linear").fit(X, rate).predict(X),
+        # What is left of the rate is orthogonal to every line.
+        "arcsine law and a line": lambda: (
+            estimator.predict(X) + LinearRegression().fit(X, rate - estimator.predict(X)).predict(X)
+        ),
+        "cubic polynomial": lambda: CUBIC.fit(X, error).predict(X),
+    }[kind]()
+    np.testing.assert_allclose(estimator.predict(X), expected, rtol=0, atol=1e-10)
     assert estimator.in_bounds(X).all()
     assert estimator.coverage(X).min() == 1.0
     hot = X.assign(temperature=X["temperature"].max() + 60.0)
@@ -50,7 +59,7 @@ def test_it_gives_what_the_model_gives_and_knows_the_rows(case):
 
 
 def test_the_file_of_it_gives_the_same(case, log, tmp_path):
-    _, _, predicts, estimator = case
+    _, estimator, predicts = case
     compensator = GyroCompensator(estimator, INPUTS, predicts=predicts)
     compensator.write_json(tmp_path / "it.json")
     again = GyroCompensator.read_json(tmp_path / "it.json")
@@ -63,8 +72,8 @@ def test_the_file_of_it_gives_the_same(case, log, tmp_path):
 @pytest.mark.parametrize("policy", ["linear", "clip", "nan"])
 def test_beyond_the_box_a_polynomial_keeps_its_policy(log, policy):
     X = log[list(INPUTS)]
-    model, _ = fitted("cubic", X, log)
-    estimator = frozen(model, single_rule(X, policy))
+    estimator, _ = fitted("cubic polynomial", log, policy)
+    model = CUBIC.fit(X, log["output"] - log["rate"])
     far = X.assign(output=3.0 * X["output"], temperature=X["temperature"] - 15.0)
     nearest = far.clip(X.min(), X.max(), axis=1)
     found, at_edge = estimator.predict(far), model.predict(nearest)
@@ -78,8 +87,7 @@ def test_beyond_the_box_a_polynomial_keeps_its_policy(log, policy):
 
 def test_bounds_of_a_polynomial_hold_and_are_exact_for_one_input(log):
     X = log[list(INPUTS)]
-    model, _ = fitted("cubic", X, log)
-    estimator = frozen(model, single_rule(X, "linear"))
+    estimator, _ = fitted("cubic polynomial", log)
     box = np.stack([X.min() - 5.0, X.max() + 5.0], axis=1)
     values = estimator.predict(np.random.default_rng(0).uniform(*box.T, (20_000, len(INPUTS))))
     low, high = estimator.base_.bounds(box)
@@ -87,8 +95,8 @@ def test_bounds_of_a_polynomial_hold_and_are_exact_for_one_input(log):
     # Of z^3 + 2 z^2 on [-1, 2]: exact at the far end.
     low, high = np.array([-20.0]), np.array([70.0])
     third = (high - low) / 3.0
-    powers, names = np.arange(4)[:, None], np.array(["temperature"], dtype=object)
-    one = Polynomial(low, high, low + third, third, powers, np.array([0.0, 0.0, 2.0, 1.0]), names)
+    names = np.array(["temperature"], dtype=object)
+    one = Polynomial(low, high, low + third, third, np.array([0.0, 0.0, 2.0, 1.0]), names)
     np.testing.assert_allclose(one.bounds(np.array([[-20.0, 70.0]])), [-16.0, 16.0], atol=1e-9)
     assert one.predict([high])[0] == pytest.approx(16.0)
 
@@ -104,10 +112,7 @@ def test_bounds_of_a_polynomial_hold_and_are_exact_for_one_input(log):
     ],
 )
 def test_a_file_that_was_changed_is_refused(log, tmp_path, spoil, message):
-    X = log[list(INPUTS)]
-    compensator = GyroCompensator(
-        frozen(fitted("cubic", X, log)[0], single_rule(X, "linear")), INPUTS
-    )
+    compensator = GyroCompensator(fitted("cubic polynomial", log)[0], INPUTS)
     compensator.write_json(tmp_path / "it.json")
     document = json.loads((tmp_path / "it.json").read_text())
     spoil(document)

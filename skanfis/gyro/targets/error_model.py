@@ -123,7 +123,7 @@ class _Polynomial:
 
 
 class _Law:
-    """asin((V - V0) / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
+    """asin(V / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
 
     def __init__(self, law):
         self._law, self.columns = law, list(law.columns_)
@@ -136,7 +136,7 @@ class _Law:
             for each in (law.amplitude_, law.sagnac_factor_, law.bias_)
         )
         over_a, over_k = _inverse(a), _inverse(k)
-        sine = product((low[0] - law.offset_, high[0] - law.offset_), over_a)
+        sine = product((low[0], high[0]), over_a)
         sine = np.where(size(sine) <= np.sin(law.max_phase), sine, np.nan)
         steep = product(product(over_a, over_k), [1 / np.sqrt(1 - s) for s in square(sine)])
         phase = np.arcsin(sine)

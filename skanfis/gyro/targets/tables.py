@@ -33,7 +33,7 @@ table |}
 table |
       |int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
       |{
-      |    $wide part[$NAME_N_INPUTS], value;
+      |    $wide part[$NAME_N_INPUTS], value, cells;
       |    int i, at[$NAME_N_INPUTS], status = $NAME_IN_RANGE;
       |
 real  |$finite_input
@@ -48,7 +48,8 @@ fixed |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
       |            status = $NAME_OUT_OF_RANGE;
       |        }
       |        value -= $name_low[i];
-      |        at[i] = (int)(value / $name_step[i]);
+      |        cells = value / $name_step[i];
+      |        at[i] = (int)cells;
       |        if (at[i] > $name_last[i]) {
       |            at[i] = $name_last[i];
       |        }

@@ -6,8 +6,7 @@ import numpy as np
 import pandas as pd
 
 from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
-from skanfis.gyro._models import make_polynomial
-from skanfis.gyro._simpler import frozen, single_rule
+from skanfis.gyro._simpler import kinds
 from skanfis.gyro.targets.error_model import ErrorModel
 
 from ...quick import quick
@@ -28,15 +27,15 @@ def planted(temperature, output):
     return 0.02 * np.tanh((temperature - 20.0) / 15.0) + 1e-3 * rate * np.sin(temperature / 25.0)
 
 
-def framed(X):
-    """The rows with the ends of the range among them."""
-    corners = pd.DataFrame(ENDS.T, columns=AXES)[list(X)]
-    return pd.concat([X, corners])
+def framed():
+    """Rows with the ends of the range among them."""
+    return np.vstack([rows(800), ENDS.T])
 
 
-def polynomial(X, y, degree=3):
-    """A fitted polynomial as it is written."""
-    return frozen(make_polynomial(degree).fit(X, y), single_rule(framed(X), "clip"))
+def polynomial(X, error):
+    """The cubic nearest to an error, as it is written."""
+    every = {name: fit for name, _, fit in kinds(list(X), "clip")}
+    return every["cubic polynomial"](X, error)
 
 
 def law_and_line():
@@ -47,7 +46,7 @@ def law_and_line():
 @cache
 def error_of(kind):
     """The ErrorModel of both inputs, of a kind of estimator."""
-    points = rows(800)
+    points = framed()
     X = pd.DataFrame(points, columns=AXES)[list(INPUTS)]
     error = planted(*points.T)
     rate = X["output"] / COUNTS - error
@@ -61,15 +60,15 @@ def error_of(kind):
     estimator = make(X, rate if is_rate else error)
     predicts = "rate" if is_rate else "error"
     compensator = GyroCompensator(estimator, INPUTS, predicts, COUNTS, "counts")
-    return ErrorModel(compensator, estimator, framed(X))
+    return ErrorModel(compensator, estimator, X)
 
 
 @cache
 def error_over_temperature(kind="rules"):
     """The ErrorModel of the temperature alone."""
-    points = rows(800)[:, :1]
+    points = framed()[:, :1]
     X = pd.DataFrame(points, columns=AXES[:1])
     make = {"rules": quick([4]).fit, "polynomial": polynomial}[kind]
     estimator = make(X, planted(points[:, 0], 0.0))
     compensator = GyroCompensator(estimator, AXES[:1])
-    return ErrorModel(compensator, estimator, framed(X))
+    return ErrorModel(compensator, estimator, X)

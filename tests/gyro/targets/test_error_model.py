@@ -39,7 +39,7 @@ def test_values_and_slopes_in_a_box_are_in_their_ranges(kind):
 def test_nothing_is_known_beyond_the_largest_phase():
     error = error_of("law and line")
     law = error._estimator.base_
-    output = law.offset_ + 1.5 * law.amplitude_[0]
+    output = 1.5 * law.amplitude_[0]
     value, _ = error.ranges(np.array([[20.0], [output]]), np.array([[21.0], [output + 1.0]]))
     assert np.isnan(value).all()
 

@@ -25,7 +25,7 @@ def line_through(function, edges, shift=0.0):
 @pytest.fixture(scope="module")
 def parabola():
     x = pd.DataFrame({"temperature": np.linspace(-20.0, 60.0, 50)})
-    model = polynomial(x, BEND * x["temperature"] ** 2, degree=2)
+    model = polynomial(x, (BEND * x["temperature"] ** 2).to_numpy())
     return ErrorModel(GyroCompensator(model, ("temperature",)), model, x)
 
 

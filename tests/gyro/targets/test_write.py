@@ -134,7 +134,6 @@ def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
         ),
     ],
 )
-@pytest.mark.usefixtures("law_of_degree_one")
 def test_what_a_target_cannot_say_is_refused_by_name(inputs, options, target, message, tmp_path):
     calibration = calibrated(smooth, inputs, **options)
     told, done = written(calibration, tmp_path, target)[target.partition(":")[0]]
