@@ -18,7 +18,7 @@ from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..learning.objective import Evaluation
 from ..model import TSKModel
 from ..policies import SILENT
-from .certified import cuts_of
+from .certified import cuts_of, spread_points
 from .constraints import Constraints
 from .construction import ONE_RULE, RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from .contradictions import contradicted
@@ -32,6 +32,9 @@ from .terms import is_known
 _DEAR, _FAR = 1.02**2, 1.1**2
 # Halvings of the way, and boxes of each proof (fewer where there are more terms than so many).
 _HALVINGS, _MOST_BOXES, _TERMS = 6, 3000, 20
+# Rounds in which points are added, so many of a sample in each; all corners of so few inputs are in
+# it. In standard deviations of the target, and of the input, what is kept at them.
+_ROUNDS, _POINTS_A_ROUND, _SAMPLE, _CORNERS, _MARGIN = 12, 20, 1024, 8, 1e-3
 
 
 @dataclass(frozen=True)
@@ -194,7 +197,7 @@ class _ConstrainedFit:
 
     def certified_order(self, evaluation) -> Ordered:
         """Rules in order, or a line; an error that says which constraints cannot be kept."""
-        equal, equal_to = self._fixed(evaluation.antecedent)
+        equal, equal_to = self._fixed(self._columns(evaluation.antecedent))
         try:
             ordered = in_order(self.problem, evaluation, self.constraints, equal, equal_to)
             if not self._is_certified(ordered):
@@ -248,23 +251,68 @@ class _ConstrainedFit:
         return Kept(ordered.free, self._ended(ordered.free, local), coefficients, known)
 
     def drawn(self, kept, ordered):
-        """The nearest to the free fit on the way there that is proven; and how far it is drawn."""
-        drawn, normal = 1.0, ordered.free.normal
-        equal, equal_to = self._fixed(ordered.free.antecedent)
-        equal = equal @ self.problem.local.to_global(np.eye(self.problem.n_columns))
-        no_rows = np.empty((0, self.problem.n_columns)), np.empty(0)
-        free = normal.coefficients.copy()
-        for k, values in enumerate(equal_to.T):
-            free[:, k] = nearest(normal.factor, free[:, k], equal, values, *no_rows)[0]
-        can_prove = all(is_known(group.family) for group in ordered.free.antecedent.groups)
-        for step in 0.5 ** np.arange(1, 1 + _HALVINGS) if can_prove else ():
-            local = free + (drawn - step) * (ordered.local - free)
-            if self._is_proven(self._model(ordered, local)):
-                kept, drawn = self.kept(ordered, local, is_end=False), float(drawn - step)
+        """The nearest that is proven on the way from there; and how far that is drawn."""
+        if not all(is_known(group.family) for group in ordered.free.antecedent.groups):
+            return kept, float(ordered.is_line)
+        near, drawn = self._nearest_at_points(ordered), 1.0
+        for drawn_to in (0.0, *(0.5 ** np.arange(1, 1 + _HALVINGS))):
+            # First all of the way, then halves of what is left.
+            now = drawn - drawn_to if drawn_to else 0.0
+            local = near + now * (ordered.local - near)
+            if self._violation(self._model(ordered, local)) is None:
+                kept, drawn = self.kept(ordered, local, is_end=False), float(now)
+                if now == 0.0:
+                    break
         return kept, drawn if drawn < 1.0 or ordered.is_line else 0.0
 
-    def _is_proven(self, model):
-        """Whether branch and bound proves all inequalities."""
+    def _nearest_at_points(self, ordered):
+        """The local consequents nearest to the free fit that keep all where they did not.
+
+        Points are the worst of a sample, then those at which branch and bound finds a violation.
+        """
+        normal, problem, model = ordered.free.normal, self.problem, self.model
+        columns = self._columns(ordered.free.antecedent)
+        to_global = problem.local.to_global(np.eye(problem.n_columns))
+        equal, equal_to = self._fixed(columns)
+        sample = spread_points(model.minimum, model.maximum, _SAMPLE, _CORNERS)
+        rows = [np.empty((0, problem.n_columns))] * problem.n_outputs
+        least = [np.empty(0)] * problem.n_outputs
+        local = normal.coefficients.copy()
+        for _ in range(_ROUNDS):
+            for k, values in enumerate(equal_to.T):
+                start, fixed = normal.coefficients[:, k], equal @ to_global
+                try:
+                    found = nearest(normal.factor, start, fixed, values, rows[k], least[k])
+                except InfeasibleError:
+                    return local
+                local[:, k] = found[0]
+            now = self._model(ordered, local)
+            worst = [(one, _worst(one, now, sample)) for one in self.inequalities]
+            if not any(len(points) for _, points in worst):
+                found = self._violation(now)
+                if found is None or not len(found[1]):
+                    break
+                worst = [found]
+            for one, points in worst:
+                of_points, to_keep = self._rows(one, columns, points)
+                rows[one.output] = np.vstack([rows[one.output], of_points @ to_global])
+                least[one.output] = np.append(least[one.output], to_keep)
+        return local
+
+    def _rows(self, one, columns, points):
+        """Sums over the consequents that an inequality is about at points; and their least."""
+        inputs, targets = self.problem.rows.inputs, self.problem.rows.targets
+        at = (points - inputs.offset) / inputs.scale
+        if one.input is not None:
+            found = one.sign * columns.gradient(at)[:, one.input]
+            # Where no consequents have much of a slope, none is asked for.
+            return found, _MARGIN * np.minimum(np.abs(found).sum(axis=1), 1.0)
+        limit = (one.limit - targets.offset[one.output]) / targets.scale[one.output]
+        found = one.sign * columns.predict(at)
+        return found, np.full(len(found), one.sign * limit + _MARGIN)
+
+    def _violation(self, model):
+        """An inequality that is not proven and where it does not hold, if anywhere; or None."""
         most_boxes = int(_MOST_BOXES * min(1.0, _TERMS / max(model.antecedent.n_terms, 1)))
         for one in self.inequalities:
             enclosure = Enclosure(model, one.output, -one.sign)
@@ -274,8 +322,8 @@ class _ConstrainedFit:
             until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
             found = largest(bound_of, *ends, 0.0, most_boxes, cuts_of(model), until=until)
             if found.bound > until:
-                return False
-        return True
+                return one, found.point[None][: int(found.attained > until)]
+        return None
 
     def _ended(self, evaluation, local):
         """The evaluation with other local consequents."""
@@ -300,18 +348,25 @@ class _ConstrainedFit:
         antecedent = ordered.free.antecedent.change_units(inputs.offset, inputs.scale)
         return replace(self.model, antecedent=antecedent, coefficients=coefficients)
 
-    def _fixed(self, antecedent):
+    def _fixed(self, columns):
         """Of the fixed points, sums over the consequents on [1, z], and what they are to be."""
-        model, problem = self.model, self.problem
-        inputs, targets = problem.rows.inputs, problem.rows.targets
+        inputs, targets, constraints = self.problem.rows.inputs, self.problem.rows.targets, self.constraints
+        points = (constraints.points - inputs.offset) / inputs.scale
+        values = (constraints.values - targets.offset) / targets.scale
+        nothing = np.empty((0, self.problem.n_columns))
+        columns = columns.with_out_of_bounds(*self.policy)
+        return columns.predict(points) if len(points) else nothing, values
+
+    def _columns(self, antecedent):
+        """A model whose outputs are the columns of the design, in standardised inputs."""
+        model, problem, inputs = self.model, self.problem, self.problem.rows.inputs
         n_rules, n_columns = antecedent.n_rules, problem.n_columns
-        # A model whose outputs are the columns of the design, in standardised inputs.
         unit = np.eye(n_columns).reshape(n_rules, problem.n_basis, n_columns)
         coefficients = np.zeros((n_rules, 1 + model.n_inputs, n_columns))
         coefficients[:, 0] = unit[:, 0]
         coefficients[:, 1 + problem.consequent_inputs] = unit[:, 1:]
         at = model.tangent_at
-        columns = replace(
+        return replace(
             model,
             antecedent=antecedent,
             initial_antecedent=antecedent,
@@ -323,10 +378,7 @@ class _ConstrainedFit:
             support=None,
             tangent_at=None if at is None else (at - inputs.offset) / inputs.scale,
             output_names=tuple(map(str, range(n_columns))),
-        ).with_out_of_bounds(*self.policy)
-        points = (self.constraints.points - inputs.offset) / inputs.scale
-        values = (self.constraints.values - targets.offset) / targets.scale
-        return (columns.predict(points) if len(points) else np.empty((0, n_columns))), values
+        )
 
 
 def _inequalities_of(constraints: Constraints, model: TSKModel):
@@ -341,3 +393,13 @@ def _inequalities_of(constraints: Constraints, model: TSKModel):
             if np.isfinite(limit):
                 found.append(Inequality(k, sign, None, limit, f"the limit {limit:g} of {name!r}"))
     return found
+
+
+def _worst(one, model, points):
+    """The points at which an inequality does not hold, the worst of them first, and not all."""
+    if one.input is None:
+        excess = one.sign * (one.limit - model.predict(points)[:, one.output])
+    else:
+        excess = -one.sign * model.gradient(points)[:, one.input, one.output]
+    order = np.argsort(-excess)[:_POINTS_A_ROUND]
+    return points[order[excess[order] > 0.0]]
