@@ -20,6 +20,7 @@ All of it is linear in the consequents, and a linear function is least at a corn
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -124,7 +125,7 @@ def _pairs(antecedent, j):
 def _neighbours(rules, places):
     """Rules (above, below) that are next to each other; of the same place all, in no order."""
     levels = [rules[places == place] for place in np.unique(places)]
-    pairs = [_all_pairs(above, below) for below, above in zip(levels, levels[1:], strict=False)]
+    pairs = [_all_pairs(above, below) for below, above in pairwise(levels)]
     return np.vstack([np.empty((0, 2), dtype=int), *pairs])
 
 

@@ -5,6 +5,8 @@ to the largest of these, is against the sign by more than four of its own standa
 limit: at some row the free fit is beyond it by as many.
 """
 
+from itertools import pairwise
+
 import numpy as np
 
 # Squared errors over the free fit's from which on it matters.
@@ -52,11 +54,14 @@ def _speaks_against(one, free, X):
         return False
     column = X[:, one.input]
     edges = np.quantile(column, np.linspace(0.0, 1.0, _PARTS + 1))
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         before = X[(low <= column) & (column <= high)]
         after = before.copy()
         before[:, one.input], after[:, one.input] = low, high
         falls = -one.sign * (free.predict(after) - free.predict(before)).mean(axis=0)[one.output]
-        if falls > _CERTAIN * free.posterior.of_mean(free, after.T.copy(), before.T.copy())[one.output]:
+        if (
+            falls
+            > _CERTAIN * free.posterior.of_mean(free, after.T.copy(), before.T.copy())[one.output]
+        ):
             return True
     return False

@@ -33,8 +33,9 @@ _DEAR, _FAR = 1.02**2, 1.1**2
 # Halvings of the way, and boxes of each proof (fewer where there are more terms than so many).
 _HALVINGS, _MOST_BOXES, _TERMS = 6, 3000, 20
 # Rounds in which points are added, so many of a sample in each; all corners of so few inputs are in
-# it. In standard deviations of the target, and of the input, what is kept at them.
-_ROUNDS, _POINTS_A_ROUND, _SAMPLE, _CORNERS, _MARGIN = 12, 20, 1024, 8, 1e-3
+# it. In standard deviations of the target, and of the input, what is kept at them: first and last.
+_ROUNDS, _POINTS_A_ROUND, _SAMPLE, _CORNERS = 20, 20, 1024, 8
+_FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.1, 1.5
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,9 @@ def constrained(
     kept, drawn = fit.kept(ordered, ordered.local), 1.0 if ordered.is_line else 0.0
     before = evaluation.mean_squared_error
     if kept.evaluation.mean_squared_error > _DEAR * before:
-        kept, drawn = fit.drawn(kept, ordered)
+        other, way = fit.drawn(kept, ordered)
+        if other.evaluation.mean_squared_error < kept.evaluation.mean_squared_error:
+            kept, drawn = other, way
     after = kept.evaluation.mean_squared_error
     report = {
         "certified": True,
@@ -259,7 +262,7 @@ class _ConstrainedFit:
             # First all of the way, then halves of what is left.
             now = drawn - drawn_to if drawn_to else 0.0
             local = near + now * (ordered.local - near)
-            if self._violation(self._model(ordered, local)) is None:
+            if next(self._not_proven(self._model(ordered, local)), None) is None:
                 kept, drawn = self.kept(ordered, local, is_end=False), float(now)
                 if now == 0.0:
                     break
@@ -276,43 +279,45 @@ class _ConstrainedFit:
         equal, equal_to = self._fixed(columns)
         sample = spread_points(model.minimum, model.maximum, _SAMPLE, _CORNERS)
         rows = [np.empty((0, problem.n_columns))] * problem.n_outputs
-        least = [np.empty(0)] * problem.n_outputs
-        local = normal.coefficients.copy()
+        least = [np.empty((0, 2))] * problem.n_outputs
+        local, margin = normal.coefficients.copy(), np.array([1.0, _FIRST_MARGIN])
         for _ in range(_ROUNDS):
             for k, values in enumerate(equal_to.T):
                 start, fixed = normal.coefficients[:, k], equal @ to_global
                 try:
-                    found = nearest(normal.factor, start, fixed, values, rows[k], least[k])
+                    found = nearest(normal.factor, start, fixed, values, rows[k], least[k] @ margin)
                 except InfeasibleError:
                     return local
                 local[:, k] = found[0]
             now = self._model(ordered, local)
             worst = [(one, _worst(one, now, sample)) for one in self.inequalities]
             if not any(len(points) for _, points in worst):
-                found = self._violation(now)
-                if found is None or not len(found[1]):
+                worst = list(self._not_proven(now))
+                if not worst or margin[1] > _LAST_MARGIN:
                     break
-                worst = [found]
+                # With more of a margin there is less to find, and boxes are decided sooner.
+                margin[1] *= _RAISE
             for one, points in worst:
                 of_points, to_keep = self._rows(one, columns, points)
                 rows[one.output] = np.vstack([rows[one.output], of_points @ to_global])
-                least[one.output] = np.append(least[one.output], to_keep)
+                least[one.output] = np.vstack([least[one.output], to_keep])
         return local
 
     def _rows(self, one, columns, points):
-        """Sums over the consequents that an inequality is about at points; and their least."""
+        """Sums over the consequents that an inequality is about; their least, and its margin."""
         inputs, targets = self.problem.rows.inputs, self.problem.rows.targets
-        at = (points - inputs.offset) / inputs.scale
-        if one.input is not None:
-            found = one.sign * columns.gradient(at)[:, one.input]
-            # Where no consequents have much of a slope, none is asked for.
-            return found, _MARGIN * np.minimum(np.abs(found).sum(axis=1), 1.0)
-        limit = (one.limit - targets.offset[one.output]) / targets.scale[one.output]
-        found = one.sign * columns.predict(at)
-        return found, np.full(len(found), one.sign * limit + _MARGIN)
+        at, least = (points - inputs.offset) / inputs.scale, np.ones((len(points), 2))
+        if one.input is None:
+            least[:, 0] = one.sign * (one.limit - targets.offset[one.output])
+            least[:, 0] /= targets.scale[one.output]
+            return one.sign * columns.predict(at), least
+        found, least[:, 0] = one.sign * columns.gradient(at)[:, one.input], 0.0
+        # Where no consequents have much of a slope, none is asked for.
+        least[:, 1] = np.minimum(np.abs(found).sum(axis=1), 1.0)
+        return found, least
 
-    def _violation(self, model):
-        """An inequality that is not proven and where it does not hold, if anywhere; or None."""
+    def _not_proven(self, model):
+        """Every inequality that branch and bound does not prove, and where it fails, if it does."""
         most_boxes = int(_MOST_BOXES * min(1.0, _TERMS / max(model.antecedent.n_terms, 1)))
         for one in self.inequalities:
             enclosure = Enclosure(model, one.output, -one.sign)
@@ -322,8 +327,7 @@ class _ConstrainedFit:
             until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
             found = largest(bound_of, *ends, 0.0, most_boxes, cuts_of(model), until=until)
             if found.bound > until:
-                return one, found.point[None][: int(found.attained > until)]
-        return None
+                yield one, found.point[None][: int(found.attained > until)]
 
     def _ended(self, evaluation, local):
         """The evaluation with other local consequents."""
@@ -350,7 +354,11 @@ class _ConstrainedFit:
 
     def _fixed(self, columns):
         """Of the fixed points, sums over the consequents on [1, z], and what they are to be."""
-        inputs, targets, constraints = self.problem.rows.inputs, self.problem.rows.targets, self.constraints
+        inputs, targets, constraints = (
+            self.problem.rows.inputs,
+            self.problem.rows.targets,
+            self.constraints,
+        )
         points = (constraints.points - inputs.offset) / inputs.scale
         values = (constraints.values - targets.offset) / targets.scale
         nothing = np.empty((0, self.problem.n_columns))
