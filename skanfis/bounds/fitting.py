@@ -30,8 +30,9 @@ from .terms import is_known
 # Squared errors over the free fit's: beyond the first, a way back is sought; beyond the other, with
 # consequents that were drawn, it is told.
 _DEAR, _FAR = 1.02**2, 1.1**2
-# Halvings of the way, and boxes of each proof (fewer where there are more terms than so many).
-_HALVINGS, _MOST_BOXES, _TERMS = 6, 3000, 20
+# Halvings of the way; boxes of each proof, and of all on the way to the nearest (fewer where there
+# are more terms than so many).
+_HALVINGS, _MOST_BOXES, _ALL_BOXES, _TERMS = 6, 3000, 10_000, 20
 # Rounds in which points are added, so many of a sample in each; all corners of so few inputs are in
 # it. In standard deviations of the target, and of the input, what is kept at them: first and last.
 _ROUNDS, _POINTS_A_ROUND, _SAMPLE, _CORNERS = 20, 20, 1024, 8
@@ -190,6 +191,7 @@ class _ConstrainedFit:
         self.model = replace(model.with_out_of_bounds("clip"), target=None)
         self.policy = model.out_of_bounds, model.max_extrapolation
         self.inequalities = _inequalities_of(constraints, model)
+        self.n_boxes, self.part = 0, min(1.0, _TERMS / max(model.antecedent.n_terms, 1))
         beyond = constraints.points[~model.in_bounds(constraints.points)]
         if len(beyond) and model.out_of_bounds in SILENT:
             raise ValueError(
@@ -293,7 +295,7 @@ class _ConstrainedFit:
             worst = [(one, _worst(one, now, sample)) for one in self.inequalities]
             if not any(len(points) for _, points in worst):
                 worst = list(self._not_proven(now))
-                if not worst or margin[1] > _LAST_MARGIN:
+                if not worst or margin[1] > _LAST_MARGIN or self.n_boxes > _ALL_BOXES * self.part:
                     break
                 # With more of a margin there is less to find, and boxes are decided sooner.
                 margin[1] *= _RAISE
@@ -318,14 +320,15 @@ class _ConstrainedFit:
 
     def _not_proven(self, model):
         """Every inequality that branch and bound does not prove, and where it fails, if it does."""
-        most_boxes = int(_MOST_BOXES * min(1.0, _TERMS / max(model.antecedent.n_terms, 1)))
         for one in self.inequalities:
             enclosure = Enclosure(model, one.output, -one.sign)
             bound_of = enclosure.values
             if one.input is not None:
                 bound_of = partial(enclosure.slope, j=one.input)
             until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
-            found = largest(bound_of, *ends, 0.0, most_boxes, cuts_of(model), until=until)
+            most = int(_MOST_BOXES * self.part)
+            found = largest(bound_of, *ends, 0.0, most, cuts_of(model), until=until)
+            self.n_boxes += found.n_boxes
             if found.bound > until:
                 yield one, found.point[None][: int(found.attained > until)]
 
