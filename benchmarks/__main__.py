@@ -9,16 +9,16 @@ from shlex import join
 from .fresh import alone, run_benchmark
 from .report import Results, machine, markdown
 
-ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "file_size", "command")
+ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "command")
 ON_REQUEST = (
     "structure",
+    "trees",
     "real_sets",
     "battery",
     "small_problems",
     "how_sure",
     "certain",
     "compensation",
-    "solvers",
     "c_code",
     "large_data",
     "long_logs",
@@ -42,13 +42,9 @@ def parse():
     )
     parser.add_argument("--details", action="store_true", help="also what explains the figures")
     parser.add_argument(
-        "--rows",
-        type=int,
-        default=10_000_000,
-        metavar="N",
-        help="long_logs: rows of a log",
+        "--rows", type=int, default=10_000_000, metavar="N", help="long_logs: rows of a log"
     )
-    many = parser.add_argument_group("structure, real_sets, battery, small_problems, how_sure")
+    many = parser.add_argument_group("structure, trees, and what else has many cases")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
     many.add_argument("--jobs", type=int, default=1, metavar="N", help="processes")

@@ -15,13 +15,12 @@ from .readable import readability
 from .report import Measure, Results, Row, Table
 from .rivals import fitted_rival
 
-__all__ = ["REMEMBERED", "cases", "rivals", "run"]
+__all__ = ["cases", "run"]
 
 N_CASES = 240
 _SEED = 9
 _INPUTS = ("uniform", "correlated", "clusters", "integer", "t3", "lognormal")
 BEST_OF = ("quadratic ridge", "Gaussian process")
-REMEMBERED = (BEST_OF,)
 _GP_ROWS = 1000
 # Beyond the training target's range by so much of it.
 _BEYOND = 0.25
@@ -54,10 +53,9 @@ def error(prediction, data):
     return float(np.sqrt(np.mean((prediction - data.truth) ** 2) + data.noise**2))
 
 
-def rival_figures(name, data):
-    model, seconds = fitted_rival(name, data.X, data.y, _GP_ROWS)
-    prediction = model.predict(data.X_test)
-    return [error(prediction, data), seconds, n_beyond(prediction, data)]
+def rival_error(name, data):
+    model, _ = fitted_rival(name, data.X, data.y, _GP_ROWS)
+    return error(model.predict(data.X_test), data)
 
 
 def n_beyond(prediction, data):
@@ -66,21 +64,13 @@ def n_beyond(prediction, data):
     return int(np.sum(beyond & data.in_box))
 
 
-def rivals(case, names=BEST_OF, fit=True):
-    """Error, seconds and rows beyond the target, of each rival."""
-    data = make_data(case)
+def rivals(case, data, fit=True):
+    """The error of each rival."""
     found = {}
-    for name in names:
-        key = f"battery/{case.seed:03} {name}".replace(" ", "_")
-        found[name] = remembered(
-            key,
-            lambda *_, name=name: rival_figures(name, data),
-            data.X,
-            data.y,
-            data.X_test,
-            data.truth,
-            fit=fit,
-        )
+    for name in BEST_OF:
+        key = f"battery/{case.seed:03} {name} error".replace(" ", "_")
+        rows = data.X, data.y, data.X_test, data.truth
+        found[name] = remembered(key, lambda *_, n=name: rival_error(n, data), *rows, fit=fit)
     if None in found.values():
         raise LookupError("its rivals are not remembered yet")
     return found
@@ -89,17 +79,17 @@ def rivals(case, names=BEST_OF, fit=True):
 def measure(case, options):
     data = make_data(case)
     start = perf_counter()
-    found = rivals(case, fit=not options.quick)
+    found = rivals(case, data, fit=not options.quick)
     rivals_wall = perf_counter() - start
     model, seconds = fitted(data.X, data.y, options)
     prediction = model.predict(data.X_test)
     ours = error(prediction, data)
-    best = min(found, key=lambda name: found[name][0])
+    best = min(found, key=found.get)
     inside, span = data.in_box, np.ptp(data.y)
     excess = np.maximum(data.y.min() - prediction, prediction - data.y.max()) / span
     return {
         "case": str(case),
-        "ratio": ours / found[best][0],
+        "ratio": ours / found[best],
         "best": best,
         "over mean": ours / error(data.y.mean(), data),
         "error": ours / np.std(data.truth),
@@ -108,11 +98,6 @@ def measure(case, options):
         "inside": float(inside.mean()),
         "seconds": seconds,
         **readability(model, data.X, data.y),
-        "inputs": case.inputs,
-        "function": case.function,
-        "rivals": {name: figures[0] / np.std(data.truth) for name, figures in found.items()},
-        "rivals_seconds": {name: figures[1] for name, figures in found.items()},
-        "rivals_beyond": {name: figures[2] for name, figures in found.items()},
         "rivals_wall": rivals_wall,
     }
 
@@ -149,9 +134,7 @@ def run(options):
             ],
         ),
     ]
-    return Results(
-        rows, [worst(found), beside(found), *(by(found, key) for key in ("inputs", "function"))]
-    )
+    return Results(rows, [worst(found)])
 
 
 def worst(found):
@@ -163,44 +146,3 @@ def worst(found):
         [*head, "rules", "strongest alone [sd]"],
         [[figures[key] for key in keys] for figures in ordered],
     )
-
-
-def beside(found):
-    """The same counts for the rivals."""
-    lines = []
-    for name in BEST_OF:
-        to_best = [f["rivals"][name] * f["ratio"] / f["error"] for f in found]
-        to_mean = [f["rivals"][name] * f["over mean"] / f["error"] for f in found]
-        lines.append(
-            [
-                name,
-                geometric_mean(to_best),
-                float(np.quantile(to_best, 0.95)),
-                sum(ratio > _WORSE_THAN_MEAN for ratio in to_mean),
-                sum(f["rivals_beyond"][name] > 0 for f in found),
-                float(np.median([f["rivals_seconds"][name] for f in found])),
-            ]
-        )
-    head = ["rival", "geometric mean", "95th percentile", "worse than the mean", "beyond", "CPU"]
-    return Table("Battery: the rivals over the better of them", head, lines)
-
-
-def by(found, key):
-    """Figures by a property of the cases."""
-    lines = []
-    for kind in dict.fromkeys(figures[key] for figures in found):
-        some = [figures for figures in found if figures[key] == kind]
-        ratios = [figures["ratio"] for figures in some]
-        lines.append(
-            [
-                kind,
-                len(some),
-                geometric_mean(ratios),
-                max(ratios),
-                sum(figures["over mean"] > _WORSE_THAN_MEAN for figures in some),
-                sum(figures["beyond"] > 0 for figures in some),
-                float(np.median([figures["seconds"] for figures in some])),
-            ]
-        )
-    head = [key, "cases", "geometric mean", "worst", "worse than the mean", "beyond", "CPU [s]"]
-    return Table(f"Battery, by {key}", head, lines)

@@ -1,4 +1,4 @@
-"""36 rules in C, size and time: ``python -m benchmarks c_code``. Needs gcc and size (binutils)."""
+"""Models in C, size and time: ``python -m benchmarks c_code``. Needs gcc and size (binutils)."""
 
 import re
 import shutil
@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
@@ -21,7 +22,7 @@ _MAIN = """
 #include <stdio.h>
 #include <time.h>
 #include "{name}.h"
-static const {dtype} rows[][2] = {{ {rows} }};
+static const {dtype} rows[][{width}] = {{ {rows} }};
 int main(void)
 {{
     const int n = (int)(sizeof rows / sizeof rows[0]);
@@ -56,7 +57,7 @@ def measured(model, X, dtype, folder):
     (folder / f"{name}.h").write_text(code.header, encoding="utf-8")
     (folder / f"{name}.c").write_text(code.source, encoding="utf-8")
     rows = ", ".join("{" + ", ".join(f"{value:.9e}" for value in row) + "}" for row in X)
-    main = _MAIN.format(name=name, dtype=dtype, rows=rows)
+    main = _MAIN.format(name=name, dtype=dtype, rows=rows, width=X.shape[1])
     (folder / "main.c").write_text(main, encoding="utf-8")
     told(["gcc", *_FLAGS, "-c", f"{name}.c"], folder)
     told(["gcc", *_FLAGS, "main.c", f"{name}.o", "-lm", "-o", "main"], folder)
@@ -73,17 +74,29 @@ def told(command, folder):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True).stdout
 
 
-def run(options):
-    if not (shutil.which("gcc") and shutil.which("size")):
-        return Results(tables=[Table("36 rules in C: no compiler here", ["type"], [])])
+def models():
+    """36 rules of a gyro; a tree of 8 leaves and 8 scattered rules of one function of 6 inputs."""
     log = make_ofog(n_devices=1, n_runs=16, random_state=0)
     X, y = log[["temperature", "output"]].to_numpy(), log["error"].to_numpy()
-    model = ANFISRegressor(n_mfs=6).fit(X, y)
-    chosen = np.random.default_rng(0).permutation(len(X))[:1000]
-    with tempfile.TemporaryDirectory() as folder:
-        lines = [
-            [dtype, *measured(model, X[chosen], dtype, Path(folder))]
-            for dtype in ("double", "float")
-        ]
-    head = ["type", "tables [B]", "code [B]", "time [ns]"]
-    return Results(tables=[Table(f"36 rules in C, gcc {' '.join(_FLAGS)}", head, lines)])
+    yield "36 rules", ANFISRegressor(n_mfs=6).fit(X, y), X
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1.0, 1.0, (2000, 6))
+    y = np.sin(np.pi * X[:, 0] * X[:, 1]) + 2.0 * X[:, 2] ** 2 + X[:, 3] * np.tanh(2.0 * X[:, 4])
+    y += 0.3 * X[:, 5] + 0.05 * rng.standard_normal(2000)
+    tree = ANFISRegressor(partition="tree", max_rules=8, simplicity=0).fit(X, y)
+    yield f"tree of {tree.n_rules_} leaves, 6 inputs", tree, X
+    around = KMeans(8, random_state=0)
+    yield "8 scattered rules, 6 inputs", ANFISRegressor(partition=around).fit(X, y), X
+
+
+def run(options):
+    if not (shutil.which("gcc") and shutil.which("size")):
+        return Results(tables=[Table("C: no compiler here", ["type"], [])])
+    lines = []
+    for label, model, X in models():
+        chosen = np.random.default_rng(0).permutation(len(X))[:1000]
+        for dtype in ("double", "float"):
+            with tempfile.TemporaryDirectory() as folder:
+                lines.append([label, dtype, *measured(model, X[chosen], dtype, Path(folder))])
+    head = ["model", "type", "tables [B]", "code [B]", "time [ns]"]
+    return Results(tables=[Table(f"C, gcc {' '.join(_FLAGS)}", head, lines)])

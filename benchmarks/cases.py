@@ -17,13 +17,23 @@ from time import perf_counter, process_time
 
 import numpy as np
 from joblib import Parallel, delayed
+from sklearn.model_selection import KFold
 
 import skanfis
 from skanfis import ANFISRegressor
 
 from .report import Measure
 
-__all__ = ["evaluate", "fitted", "geometric_mean", "kept", "remembered"]
+__all__ = [
+    "evaluate",
+    "fitted",
+    "fitted_in_folds",
+    "folds",
+    "geometric_mean",
+    "kept",
+    "remembered",
+    "rms",
+]
 
 CACHE = Path(os.environ.get("SKANFIS_BENCHMARKS_CACHE", Path(__file__).with_name(".cache")))
 _VERSIONS = ("numpy", "scipy", "scikit-learn")
@@ -169,6 +179,21 @@ def fitted(X, y, options, groups=None, **params):
     start = process_time()
     model = ANFISRegressor(**params | options.estimator_params).fit(X, y, groups=groups)
     return model, process_time() - start
+
+
+def folds(X, n_folds=5):
+    return KFold(n_folds, shuffle=True, random_state=0).split(X)
+
+
+def fitted_in_folds(X, y, options, n_folds=5, **params):
+    """Of each fold: the model, seconds of its fit, its rows, and its errors on the others."""
+    for train, test in folds(X, n_folds):
+        model, seconds = fitted(X[train], y[train], options, **params)
+        yield model, seconds, train, model.predict(X[test]) - y[test]
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def geometric_mean(values):

@@ -18,10 +18,11 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, ThermalRate
 
+from .cases import rms
 from .report import Measure, Results, Row, Table
 from .timing import best_of
 
-__all__ = ["cold_starts", "polynomial", "rms", "run", "with_thermal_rate"]
+__all__ = ["cold_starts", "polynomial", "run", "with_thermal_rate"]
 
 _SEEDS = range(10, 13)  # others than those that the method was tried on
 _INPUTS = ["output", "temperature", "time", "thermal_rate"]
@@ -68,10 +69,6 @@ OF_ERROR = {
     "gradient boosting": HistGradientBoostingRegressor,
     "ANFIS as it comes": ANFISRegressor,
 }
-
-
-def rms(values):
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def residual(make_estimator, log, target):

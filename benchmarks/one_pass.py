@@ -21,7 +21,7 @@ from skanfis.search import Spacing, grid_antecedent
 
 from .fresh import alone
 from .report import Measure, Results, Row, Table
-from .timing import profile, side_by_side
+from .timing import side_by_side
 
 __all__ = ["run"]
 
@@ -91,8 +91,6 @@ def run(options):
     tables = [Table("One pass", ["work", "CPU [s]", "in products"], lines)]
     if options.details:
         tables.append(block_sizes())
-        halves = passes(make_problem())
-        tables += [profile(halves[half], calls=3, title=f"{half} in full") for half in _HALVES]
     return Results(rows, tables)
 
 

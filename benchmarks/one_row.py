@@ -1,12 +1,15 @@
-"""Predicting one row, against a linear regression in the same process."""
+"""Predicting one row, against a linear regression beside it; the size of a joblib file."""
 
+import io
+
+import joblib
 from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
 
 from .gyro import make_surface
 from .report import Measure, Results, Row
-from .timing import profile, side_by_side
+from .timing import side_by_side
 
 __all__ = ["run"]
 
@@ -29,5 +32,7 @@ def run(options):
         Measure("LinearRegression", linear, "µs"),
     ]
     work = f"predict of one row, {model.n_rules_} rules"
-    tables = [profile(lambda: model.predict(row), _CALLS, work)] if options.details else []
-    return Results([Row(work, measures)], tables)
+    file = io.BytesIO()
+    joblib.dump(model, file)
+    size = Measure("size", file.tell() / 1000.0, "kB", 50.0)
+    return Results([Row(work, measures), Row(f"joblib file, {model.n_rules_} rules", [size])])

@@ -88,10 +88,6 @@ def uniform(rng, n, d):
     return rng.uniform(-1, 1, (n, d))
 
 
-def normal(rng, n, d):
-    return rng.standard_normal((n, d))
-
-
 def correlated(rng, n, d):
     """Normal, with a common part of 50 to 98 % of the variance."""
     common = rng.uniform(0.5, 0.98)
@@ -121,31 +117,13 @@ def lognormal(rng, n, d):
     return rng.lognormal(0, 1, (n, d))
 
 
-def one_far(rng, n, d):
-    return _far(rng, normal(rng, n, d), 1)
-
-
-def three_far(rng, n, d):
-    return _far(rng, normal(rng, n, d), 3)
-
-
-def _far(rng, X, n_far):
-    """The first rows, which are trained on, thirty deviations off in directions of their own."""
-    directions = rng.standard_normal((n_far, X.shape[1]))
-    X[:n_far] = 30.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
-    return X
-
-
 INPUTS = {
     "uniform": uniform,
-    "normal": normal,
     "correlated": correlated,
     "clusters": clusters,
     "integer": integer,
     "t3": t3,
     "lognormal": lognormal,
-    "one far": one_far,
-    "three far": three_far,
 }
 
 # Functions ------------------------------------------------------------------------------------

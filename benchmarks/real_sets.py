@@ -13,17 +13,14 @@ from time import perf_counter
 
 import numpy as np
 import pandas as pd
-from sklearn.model_selection import KFold
 
-from .cases import evaluate, fitted, geometric_mean, remembered
+from .cases import evaluate, fitted_in_folds, geometric_mean
 from .readable import readability
 from .report import Measure, Results, Row, Table
-from .rivals import BEST_OF, GLASS_BOXES, RIVALS, fitted_rival
+from .rivals import BEST_OF, RIVALS, rival_in_folds
 
-__all__ = ["SETS", "cases", "data_sets", "load", "rivals", "run"]
+__all__ = ["SETS", "RealSet", "cases", "in_deviations", "load", "rivals", "run"]
 
-# Those that the ratio needs first, what takes minutes last.
-REMEMBERED = (BEST_OF, tuple(name for name in RIVALS if name != "EBM"), ("EBM",))
 _SEED = 0
 
 
@@ -113,52 +110,19 @@ def load_frame(real_set):
     return X, y
 
 
-def data_sets():
-    """Name, X and y of each."""
-    for real_set in SETS:
-        yield real_set.name, *load(real_set)
-
-
-def folds(X, seed=0):
-    return KFold(5, shuffle=True, random_state=seed).split(X)
-
-
-def rival_figures(name, X, y):
-    """Error of five folds in deviations of the target, and median seconds of a fit."""
-    squares, times = [], []
-    for train, test in folds(X):
-        model, seconds = fitted_rival(name, X[train], y[train])
-        squares.append((model.predict(X[test]) - y[test]) ** 2)
-        times.append(seconds)
-    return in_deviations(squares, y), float(np.median(times))
-
-
-def in_deviations(squares, y):
-    return float(np.sqrt(np.mean(np.concatenate(squares))) / y.std())
-
-
 def cases():
     return SETS
 
 
 def rivals(real_set, names=tuple(RIVALS), fit=True):
-    """Error and seconds by name, of those that are installed."""
-    X, y = load(real_set)
-    found = {}
-    for rival in names:
-        key = f"real_sets/{real_set.name} {rival}".replace(" ", "_")
-        packages = [GLASS_BOXES[rival]] if rival in GLASS_BOXES else []
-        figures = remembered(
-            key,
-            lambda X, y, rival=rival: rival_figures(rival, X, y),
-            X,
-            y,
-            packages=packages,
-            fit=fit,
-        )
-        if figures is not None:
-            found[rival] = figures
-    return found
+    """What ``rival_in_folds`` finds, by name."""
+    key = f"real_sets/{real_set.name}"
+    return {name: rival_in_folds(name, key, *load(real_set), fit=fit) for name in names}
+
+
+def in_deviations(squares, y):
+    """The error of all rows from sums of squares."""
+    return float(np.sqrt(np.sum(squares) / len(y)) / y.std())
 
 
 def measure(real_set, options):
@@ -166,36 +130,28 @@ def measure(real_set, options):
     X, y = load(real_set)
     start = perf_counter()
     found = rivals(real_set, fit=not options.quick)
+    found = {name: np.array(parts) for name, parts in found.items() if None not in parts}
     if not set(BEST_OF) <= set(found):
         raise LookupError("its rivals are not remembered yet")
+    errors = {name: in_deviations(parts[:, 0], y) for name, parts in found.items()}
     rivals_wall = perf_counter() - start
-    squares, times, read, beyond = [], [], [], 0.0
-    for train, test in folds(X):
-        model, seconds = fitted(X[train], y[train], options)
-        prediction = model.predict(X[test])
-        squares.append((prediction - y[test]) ** 2)
-        times.append(seconds)
-        read.append(readability(model, X[train], y[train]))
-        low, high = y[train].min(), y[train].max()
-        excess = np.maximum(low - prediction, prediction - high).max() / (high - low)
-        beyond = max(beyond, float(excess))
+    squares, parts = [], []
+    for model, seconds, train, left in fitted_in_folds(X, y, options):
+        squares.append(left @ left)
+        parts.append(readability(model, X[train], y[train]) | {"seconds": seconds})
     error = in_deviations(squares, y)
-    best = min(found[rival][0] for rival in BEST_OF)
+    middle = {key: float(np.median([part[key] for part in parts])) for key in parts[0]}
+    counts = {key: sum(part[key] for part in parts) for key in ("false", "alike")}
     return {
         "case": real_set.name,
         "rows": X.shape[0],
         "inputs": X.shape[1],
         "error": error,
-        "ratio": error / best,
-        "seconds": float(np.median(times)),
-        "beyond": beyond,
-        "strongest": float(np.median([each["strongest"] for each in read])),
-        "rules": float(np.median([each["rules"] for each in read])),
-        "cost": float(np.median([each["cost"] for each in read])),
-        "false": sum(each["false"] for each in read),
-        "alike": sum(each["alike"] for each in read),
-        "rivals": {rival: figures[0] for rival, figures in found.items()},
-        "rivals_seconds": {rival: figures[1] for rival, figures in found.items()},
+        "ratio": error / min(errors[name] for name in BEST_OF),
+        **middle,
+        **counts,
+        "rivals": errors,
+        "rivals_seconds": {name: float(np.median(parts[:, 1])) for name, parts in found.items()},
         "rivals_wall": rivals_wall,
     }
 
@@ -236,12 +192,7 @@ def run(options):
             [Measure("terms", terms, "", 0)],
         ),
     ]
-    return Results(rows, [errors(found), seconds(found), rules(found)])
-
-
-def names_of(found, key):
-    """The rivals of all sets."""
-    return [name for name in RIVALS if all(name in figures[key] for figures in found)]
+    return Results(rows, [errors(found), rules(found)])
 
 
 def label(figures):
@@ -249,7 +200,7 @@ def label(figures):
 
 
 def errors(found):
-    names = names_of(found, "rivals")
+    names = [name for name in RIVALS if all(name in figures["rivals"] for figures in found)]
     lines = [
         [label(f), *(f["rivals"][name] for name in names), f["error"], f["ratio"]] for f in found
     ]
@@ -261,6 +212,9 @@ def errors(found):
         means.append(geometric_mean(ratios))
     ours = geometric_mean([figures["ratio"] for figures in found])
     lines.append(["geometric mean of the ratios", *means, ours, ours])
+    middle = [float(np.median([f["rivals_seconds"][name] for f in found])) for name in names]
+    own = float(np.median([figures["seconds"] for figures in found]))
+    lines.append(["CPU of a fit, median [s]", *middle, own, ""])
     return Table(
         f"Real sets: error of five folds, in deviations of the target; the ratio is to the best of "
         f"{', '.join(BEST_OF)} (the last on at most 1,500 rows)",
@@ -269,16 +223,8 @@ def errors(found):
     )
 
 
-def seconds(found):
-    names = names_of(found, "rivals_seconds")
-    lines = [
-        [label(f), *(f["rivals_seconds"][name] for name in names), f["seconds"]] for f in found
-    ]
-    return Table("Real sets: CPU of a fit [s]", ["data", *names, "ANFISRegressor()"], lines)
-
-
 def rules(found):
-    keys = ("rules", "cost", "strongest", "false", "alike", "beyond")
+    keys = ("rules", "cost", "strongest", "false", "alike", "seconds")
     lines = [[label(figures), *(figures[key] for key in keys)] for figures in found]
     head = [
         "data",
@@ -287,6 +233,6 @@ def rules(found):
         "strongest alone [sd]",
         "terms never true",
         "terms alike",
-        "furthest beyond the target [ranges]",
+        "fit, CPU [s]",
     ]
     return Table("Real sets: the rules, medians and sums of five folds", head, lines)

@@ -17,7 +17,17 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import FunctionTransformer, PolynomialFeatures, StandardScaler
 from sklearn.svm import SVR
 
-__all__ = ["BEST_OF", "GLASS_BOXES", "GP_ROWS", "RIVALS", "fitted_rival", "gaussian_process"]
+from .cases import folds, remembered
+
+__all__ = [
+    "BEST_OF",
+    "GLASS_BOXES",
+    "GP_ROWS",
+    "RIVALS",
+    "fitted_rival",
+    "gaussian_process",
+    "rival_in_folds",
+]
 
 # The ratios are to the best of these.
 BEST_OF = ("quadratic ridge", "SVR", "Gaussian process")
@@ -75,6 +85,12 @@ def cubist(n_inputs):
     return make_pipeline(named, Cubist(random_state=0))
 
 
+def figs(n_inputs):
+    from imodels import FIGSRegressor
+
+    return FIGSRegressor(max_rules=12, random_state=0)
+
+
 RIVALS = {
     "mean": lambda n_inputs: DummyRegressor(),
     "quadratic ridge": quadratic_ridge,
@@ -84,9 +100,10 @@ RIVALS = {
     "GradientBoosting": lambda n_inputs: boosting(),
     "EBM": explainable_boosting,
     "cubist": cubist,
+    "FIGS": figs,
 }
 # Models that people read; and the packages they are in.
-GLASS_BOXES = {"EBM": "interpret-core", "cubist": "cubist"}
+GLASS_BOXES = {"EBM": "interpret-core", "FIGS": "imodels", "cubist": "cubist"}
 
 
 def fitted_rival(name, X, y, gp_rows=GP_ROWS):
@@ -99,3 +116,19 @@ def fitted_rival(name, X, y, gp_rows=GP_ROWS):
         warnings.simplefilter("ignore")
         model = RIVALS[name](X.shape[1]).fit(X, y)
     return model, process_time() - start
+
+
+def rival_in_folds(name, key, X, y, n_folds=5, fit=True):
+    """Of each fold, the sum of squared errors and seconds; None where ``remembered`` gives that."""
+
+    def figures(X_train, y_train, X_test, y_test):
+        model, seconds = fitted_rival(name, X_train, y_train)
+        return [float(np.sum((model.predict(X_test) - y_test) ** 2)), seconds]
+
+    packages = [GLASS_BOXES[name]] if name in GLASS_BOXES else []
+    found = []
+    for k, (train, test) in enumerate(folds(X, n_folds)):
+        file = f"{key} {name} {k} of {n_folds}".replace(" ", "_")
+        data = X[train], y[train], X[test], y[test]
+        found.append(remembered(file, figures, *data, packages=packages, fit=fit))
+    return found

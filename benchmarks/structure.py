@@ -12,15 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from sklearn.base import clone
 from sklearn.compose import TransformedTargetRegressor
-from sklearn.model_selection import KFold
 from sklearn.preprocessing import StandardScaler
 
 from . import real_sets
-from .cases import evaluate, fitted, geometric_mean, remembered
+from .cases import evaluate, fitted, fitted_in_folds, geometric_mean, remembered, rms
 from .every_table import part
-from .readable import readability
+from .real_sets import in_deviations
 from .report import Measure, Results, Row, Table
-from .rivals import BEST_OF, fitted_rival
+from .rivals import BEST_OF, fitted_rival, rival_in_folds
 
 __all__ = ["cases", "run"]
 
@@ -127,7 +126,7 @@ def of_functions(case, options, n_seeds=1):
         for seed in range(n_seeds):
             X, y, fresh, truth, noise = drawn(case, seed)
             model, seconds = fitted(X, y, options, simplicity=simplicity)
-            left = np.sqrt(np.mean((model.predict(fresh) - truth) ** 2))
+            left = rms(model.predict(fresh) - truth)
             new = math.hypot(left, noise)
             parts.append(
                 figures_of(model, y.std() / new) | {"error": left / (truth.std() or noise)}
@@ -154,27 +153,20 @@ def of_folds(X, y, n_folds, options):
     found = {}
     for simplicity in SIMPLICITIES:
         parts, squares = [], []
-        for train, test in KFold(n_folds, shuffle=True, random_state=0).split(X):
-            model, seconds = fitted(X[train], y[train], options, simplicity=simplicity)
-            squares.append((model.predict(X[test]) - y[test]) ** 2)
+        in_folds = fitted_in_folds(X, y, options, n_folds, simplicity=simplicity)
+        for model, seconds, train, left in in_folds:
+            squares.append(left @ left)
             parts.append(figures_of(model, y[train].std() / y.std()) | {"seconds": seconds})
-            parts[-1]["strongest"] = readability(model, X[train], y[train])["strongest"]
-        error = max(real_sets.in_deviations(squares, y), _EXACT)
+        error = max(in_deviations(squares, y), _EXACT)
         found[simplicity] = [each | {"error": error} for each in parts]
         for each in found[simplicity]:
             each["true"] /= error
     return found
 
 
-def rival_errors(case, X, y, n_folds):
-    def of_folds_by(name):
-        squares = []
-        for train, test in KFold(n_folds, shuffle=True, random_state=0).split(X):
-            rival, _ = fitted_rival(name, X[train], y[train])
-            squares.append((rival.predict(X[test]) - y[test]) ** 2)
-        return max(real_sets.in_deviations(squares, y), _EXACT)
-
-    return {name: of_folds_by(name) for name in BEST_OF}
+def rival_errors(key, X, y, n_folds):
+    found = {name: np.array(rival_in_folds(name, key, X, y, n_folds)) for name in BEST_OF}
+    return {name: max(in_deviations(parts[:, 0], y), _EXACT) for name, parts in found.items()}
 
 
 def smooth_rivals(case):
@@ -185,23 +177,24 @@ def smooth_rivals(case):
         if case.n_rows > _TUNED_ON and name != "Gaussian process":
             best = clone(rival.regressor_.best_estimator_)
             rival = TransformedTargetRegressor(best, transformer=StandardScaler()).fit(X, y)
-        found[name] = float(np.sqrt(np.mean((rival.predict(fresh) - truth) ** 2)) / truth.std())
+        found[name] = rms(rival.predict(fresh) - truth) / truth.std()
     return found
 
 
 def measure(case, options):
     """Everything of one case."""
     rivals = {}
-    key = f"structure/{case}".replace(" ", "_").replace("/", "-")
     if case.kind in ("real set", "table"):
-        n_folds = 5 if case.kind == "real set" else 3
+        folder, n_folds = ("real_sets", 5) if case.kind == "real set" else ("tables", 3)
         X, y = _loaded(case)
         found = of_folds(X, y, n_folds, options)
         if not options.quick:
-            rivals = remembered(key, lambda X, y: rival_errors(case, X, y, n_folds), X, y)
+            key = f"{folder}/{case.name.replace('/', '-')}"
+            rivals = rival_errors(key, X, y, n_folds)
     else:
         found = of_functions(case, options, 1 if case.kind == "smooth" else 5)
         if case.kind == "smooth" and not options.quick:
+            key = f"structure/{case}".replace(" ", "_")
             rivals = remembered(key, lambda *_: smooth_rivals(case), *drawn(case)[:2])
     best = min(rivals.values(), default=np.nan)
     figures = {"case": str(case), "kind": case.kind, "rivals": rivals}

@@ -150,7 +150,7 @@ for name, model in {"to compute": anfis, "to read": readable}.items():
     remains = np.sqrt(np.mean((error[known] - model.predict(X[known])) ** 2))
     apart = model.readability_.summary["strongest_alone"]
     print(f"{name:10}{3600 * remains:4.0f} °/h; strongest rule alone {apart:.2f} deviations off")
-print(export_text(readable, precision=3, max_shown=3, output_names=["error"]))
+print(export_text(readable, max_shown=3, output_names=["error"]))
 
 # %%
 # ``make demo`` gives this script a folder, for the picture; otherwise it is shown.

@@ -45,19 +45,19 @@ print(f"error {error.std():.3f} °/s, with the model {(error - model.predict(X))
 # Rules as text
 # -------------
 #
-# The weightiest first, to three digits. Consequents are told by the distance from round numbers
-# near the mean, so that their constants are values which the rules take there.
+# The weightiest first. Each says what it is about where its own rows lie, and by how much that
+# changes with an input, counting from there.
 
-print(export_text(model, precision=3, max_shown=4, output_names=["error"]))
+print(export_text(model, max_shown=4, output_names=["error"]))
 
 # %%
 # As a table
 # ----------
 #
 # "weight" is the part of the data on which a rule fires, "rows" the number of rows on which it is
-# the strongest.
+# the strongest, "at" where the rule says its value.
 
-rules_table(model, about="mean").round(3)
+rules_table(model).round(3)
 
 # %%
 # Why this prediction?
@@ -98,8 +98,8 @@ rules_table(warming)["data"].plot.bar(subplots=True, legend=False, figsize=(5.6,
 # Can the rules be read one by one?
 # ---------------------------------
 #
-# How far the strongest rule of each row alone is from what all say together, how true each term
-# becomes, and where neighbours cross. :doc:`/reading_rules` says what to believe of a rule.
+# How many numbers there are to read, what the text as printed errs over the model, and what speaks
+# against reading it. :doc:`/reading_rules` says what to believe of a rule.
 
 print(readability(model, X, error))
 

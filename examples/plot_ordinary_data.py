@@ -83,8 +83,8 @@ StructureDisplay.from_estimator(model)
 # -----------------
 #
 # The report measures how far the strongest rule alone is from what all say together. Where rules
-# mean nothing alone, it says so, and ``export_text`` warns. :doc:`/reading_rules` says what may be
-# believed of a rule, and when.
+# mean nothing alone, it says so, and so does ``export_text``. :doc:`/reading_rules` says what may
+# be believed of a rule, and when.
 
 print(model[-1].readability_)
 
@@ -101,7 +101,7 @@ print(model[-1].readability_)
 #
 # In the names and units of the table: the encoder is folded in, ``maker_Bohm`` is 1 or 0.
 
-print(export_text(model, precision=3, max_shown=4, show_terms=False))
+print(export_text(model, max_shown=4, show_terms=False))
 
 # %%
 # Which inputs bend, and where? Terms before training are dashed, the data grey.

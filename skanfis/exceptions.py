@@ -13,7 +13,6 @@ __all__ = [
     "ForgottenRowsWarning",
     "InfeasibleConstraintsError",
     "OutOfBoundsWarning",
-    "ReadabilityWarning",
     "UnderdeterminedWarning",
 ]
 
@@ -50,13 +49,6 @@ class OutOfBoundsWarning(UserWarning):
     """Rows to predict lie outside the range of the training data, input by input.
 
     From ``predict`` and ``score`` with ``out_of_bounds="linear"``; ``in_bounds(X)`` tells the rows.
-    """
-
-
-class ReadabilityWarning(UserWarning):
-    """The rules of a model are not fit to be read one by one.
-
-    From ``export_text`` and ``rules_table``, with the findings of ``readability_``.
     """
 
 

@@ -13,7 +13,14 @@ import numpy as np
 from .antecedent.tree import CRISP
 from .membership import SigmoidFalling, SigmoidRising
 
-__all__ = ["LINGUISTIC", "default_output_names", "default_term_names", "given_term_names"]
+__all__ = [
+    "LINGUISTIC",
+    "SIGNS",
+    "default_output_names",
+    "default_term_names",
+    "given_term_names",
+    "written_side",
+]
 
 # Six as in the founding paper, negative large to positive large; seven with zero between them.
 LINGUISTIC = {
@@ -28,18 +35,19 @@ LINGUISTIC = {
 # More than these tell no two doubles apart.
 _MOST_DIGITS = 17
 
-
-_SIGNS = {SigmoidRising: "> ", SigmoidFalling: "< "}
+# Families that are one side of a cut.
+SIGNS = {SigmoidRising: "> ", SigmoidFalling: "< "}
 # A side is 0.9 true this many widths from its cut; digits that are written of that length.
 _MOSTLY_TRUE, _DIGITS_OF_WIDTH = np.log(9.0), 2
 # As rounding leaves the cut between two values.
 _ROUNDING = 1e-6
 
 
-def default_term_names(antecedent, minimum, maximum):
+def default_term_names(antecedent, minimum, maximum, digits=_DIGITS_OF_WIDTH):
     """Names: of a grid by the order of its terms, else "near 21.3", unique on each input.
 
-    Of a side "> 6.8 ± 0.3"; ``minimum`` and ``maximum`` of each input's data.
+    Of a side "> 6.8 ± 0.3", to so many digits of its width; ``minimum`` and ``maximum`` of each
+    input's data.
     """
     inputs, places = antecedent.term_inputs, antecedent.term_places
     names = np.empty(inputs.size, dtype=object)
@@ -52,15 +60,16 @@ def default_term_names(antecedent, minimum, maximum):
             names[own] = _near(places[own])
     start = 0
     for group in antecedent.groups:
-        if group.family in _SIGNS:
+        if group.family in SIGNS:
             for j in np.unique(group.inputs):
                 own = np.flatnonzero(group.inputs == j)
                 names[start + own] = _sides(
-                    _SIGNS[group.family],
+                    SIGNS[group.family],
                     group.theta[0, own],
                     group.theta[1, own],
                     minimum[j],
                     maximum[j],
+                    digits,
                 )
         start += group.n_terms
     return tuple(names)
@@ -73,7 +82,7 @@ def is_crisp(cut, width, low, high):
     return is_between & (2.0 * CRISP * width <= (1.0 + _ROUNDING) * size)
 
 
-def _sides(sign, cuts, log_widths, low, high):
+def _sides(sign, cuts, log_widths, low, high, fewest):
     """Of one input and one direction: the cut to the digits that matter over its width.
 
     More tell cuts apart that would look the same; equal ones, on different paths, have one name.
@@ -81,7 +90,7 @@ def _sides(sign, cuts, log_widths, low, high):
     widths = np.exp(log_widths)
     sides = list(zip(cuts, widths, is_crisp(cuts, widths, low, high), strict=True))
     names: dict[tuple, str] = {}
-    for digits in range(_DIGITS_OF_WIDTH, _MOST_DIGITS + 1):
+    for digits in range(fewest, _MOST_DIGITS + 1):
         written = {side: sign + _side(*side, low, high, digits) for side in sides}
         taken = Counter(written.values())
         for side, text in written.items():
@@ -101,6 +110,15 @@ def _side(cut, width, alone, low, high, digits):
     size = int(np.floor(np.log10(abs(cut)))) if cut else -last
     text = _plain(cut, min(max(size + 1 + last, 1), _MOST_DIGITS))
     return text if alone else f"{text} ± {_plain(half, digits)}"
+
+
+def written_side(name, theta):
+    """Cut and log width of the side that is called so; ``theta`` where the name does not say."""
+    _, *numbers = name.replace("±", "").split()
+    if not numbers:
+        return theta
+    cut, *half = map(float, numbers)
+    return np.array([cut, np.log(half[0] / _MOSTLY_TRUE) if half else theta[1]])
 
 
 def default_output_names(n_outputs):

@@ -144,6 +144,13 @@ class Posterior:
             own[: len(rows)] = rows
         return replace(self, pinned=pinned)
 
+    def of_coefficients(self, n_rules):
+        """The same of every coefficient about the reference, (n_rules, 1 + n_inputs, n_outputs)."""
+        n_columns, n_changes = len(self.consequents), self.noise.size * self.premises.shape[1]
+        halves = self._halves(np.eye(n_columns + n_changes, n_columns))
+        found = [np.sqrt(np.maximum(self._product(k, h, h), 0.0)) for k, h in enumerate(halves)]
+        return (np.array(found) * self._unit[:, None]).T.reshape(n_rules, -1, self.noise.size)
+
     def inside(self, model, Z):
         """Standard deviations (n_outputs, n_rows) at rows Z (n_inputs, n_rows) in the range."""
         halves = self._halves(self._rows(model, Z))

@@ -32,7 +32,7 @@ class RuleSupport:
     radius : ndarray of shape (n_rules,)
         The largest d of a training row on which the rule fires.
     marginals : tuple of (ndarray, ndarray)
-        Of every input alone, standardised: second moments of what rules say of it
+        Of every input alone, standardised: second moments of what rules say of it, or None
         (``inspection.anova``), and values at evenly spaced quantiles. Empty where not known.
 
     Examples

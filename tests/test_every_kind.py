@@ -51,10 +51,7 @@ from .export.c_compiler import evaluate_all, needs_compiler
 from .oracles import central_difference
 
 KINDS = {"grid": GridAntecedent, "tree": TreeAntecedent, "scattered": ScatteredAntecedent}
-pytestmark = [
-    pytest.mark.parametrize("kind", KINDS),
-    pytest.mark.filterwarnings("ignore::skanfis.exceptions.ReadabilityWarning"),
-]
+pytestmark = [pytest.mark.parametrize("kind", KINDS)]
 # Weights that are given are not sought: a fit takes a tenth of the time.
 GIVEN = {"agreement": 0.01, "alpha": 1e-4, "solver": VariableProjection(stiffness=1e-3)}
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from skanfis.inspection import Readability
+from skanfis.inspection.readability import GREATEST_ALONE, GREATEST_ERROR
 from skanfis.membership import MEMBERSHIPS
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -17,7 +17,7 @@ WITH_PROMPTS = {
     "add_a_membership": 5,
     "files": 5,
     "how_sure": 15,
-    "reading_rules": 15,
+    "reading_rules": 12,
     "training": 20,
     "trees": 9,
 }
@@ -64,11 +64,10 @@ def test_page_with_prompts(page, tmp_path, monkeypatch):
 
 def test_limits_of_reading_rules_are_those_of_the_package():
     page = (DOCS / "reading_rules.rst").read_text(encoding="utf-8")
-    table, limits = page.partition("list-table")[2], Readability.limits
+    table = page.partition("list-table")[2]
     for measure, limit in (
-        ("greatest truth of a term", f"{limits['least_truth']} or more"),
-        ("crossing of neighbours", f"{limits['greatest_crossing']} or less"),
-        ("strongest rule alone", f"{limits['strongest_alone']} standard deviations"),
+        ("text over model", f"{GREATEST_ERROR} times the error"),
+        ("strongest rule alone", f"{GREATEST_ALONE} standard deviations"),
     ):
         assert re.search(rf"\* - {measure}\n     - {re.escape(limit)}\n", table)
 

@@ -10,6 +10,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from ..bounds.constraints import Constraints
 from ..inspection.measures import RuleSums
 from ..inspection.readability import Readability
+from ..inspection.sentences import Sentences
 from ..learning.sampling import is_many
 from ..regressor import ANFISRegressor
 from .rows import ClusterData, Partitions, add_each, computed, is_collection, reduce_partitions
@@ -135,13 +136,15 @@ class DaskANFISRegressor(ANFISRegressor):
             return super()._readability(data)
         rows = data.rows()
         # Nothing is asked of the posterior, which is most of a model's bytes.
-        sent = replace(self.model_, posterior=None)
-        sums = rows.reduce(partial(_rule_sums, model=sent, target=rows.targets), RuleSums.joined)
+        printed = Sentences.of(self.model_).printed
+        model, printed = (replace(one, posterior=None) for one in (self.model_, printed))
+        of_rows = partial(_rule_sums, model=model, printed=printed, target=rows.targets)
+        sums = rows.reduce(of_rows, RuleSums.joined)
         return Readability(self.model_, sums.measures())
 
 
-def _rule_sums(rows, model, target):
-    return RuleSums(model, target).add(rows.X, rows.sample_weight)
+def _rule_sums(rows, model, printed, target):
+    return RuleSums(model, printed, target).add(rows.X, rows.y, rows.sample_weight)
 
 
 def _predicted(block, model, names, is_deviation):

@@ -12,88 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..antecedent import TreeAntecedent
-from ..membership import FAMILIES, PRODUCTS, Membership
-
-# As in ``membership.profiles`` and ``membership.bell``.
-FLOOR = 1e-10
-SMALLEST_LOG_SQUARE = np.log(1e-300)
-
-# Constants of memberships out of theta (n_parameters, n_terms), whose location is about the
-# reference; those of one term are a row of what the functions stack.
-
-
-def _gaussian(theta):
-    location, log_width = theta
-    return [location, np.sqrt(0.5) * np.exp(-log_width)]
-
-
-def _bell(theta):
-    location, log_width, log_slope = theta
-    return [location, np.exp(-log_width), np.exp(log_slope)]
-
-
-def _two_sided_gaussian(theta):
-    location, log_left, log_right, log_plateau = theta
-    return [location, 0.5 * np.exp(log_plateau), np.exp(-log_left), np.exp(-log_right)]
-
-
-def _two_feet(theta):
-    """The feet, one over the lengths of the flanks, and the location, a triangle's corner."""
-    location, log_left, log_right, *log_plateau = theta
-    left, right = np.exp(log_left), np.exp(log_right)
-    half = 0.5 * np.exp(log_plateau[0]) if log_plateau else 0.0
-    return [location - half - left, location + half + right, 1.0 / left, 1.0 / right, location]
-
-
-def _one_foot(side):
-    def constants(theta):
-        shoulder, log_width = theta
-        width = np.exp(log_width)
-        return [shoulder + side * width, -side / width]
-
-    return constants
-
-
-def _sigmoid_difference(theta):
-    location, log_width, log_flank = theta
-    v = np.exp(log_width - log_flank)
-    return [location, np.exp(-log_flank), v, np.log(-np.expm1(-2.0 * v))]
-
-
-def _sigmoid_product(first, second):
-    """Of a sigmoid at the left and one at the right; the signs of their slopes."""
-
-    def constants(theta):
-        location, log_width, *log_flanks = theta
-        left, right = (np.exp(-log_flank) for log_flank in log_flanks)
-        width = np.exp(log_width)
-        slopes = [first * left, -second * right]
-        return [location, *slopes, *(width * slope for slope in slopes)]
-
-    return constants
-
-
-def _side(sign):
-    return lambda theta: [theta[0], sign * np.exp(-theta[1])]
-
-
-_BY_NAME = {
-    "gaussian": _gaussian,
-    "bell": _bell,
-    "triangular": _two_feet,
-    "trapezoidal": lambda theta: _two_feet(theta)[:4],
-    "two_sided_gaussian": _two_sided_gaussian,
-    "pi_shaped": lambda theta: _two_feet(theta)[:4],
-    "s_shaped": _one_foot(-1.0),
-    "z_shaped": _one_foot(1.0),
-    "sigmoid_difference": _sigmoid_difference,
-    **{one.name: _sigmoid_product(*signs) for signs, one in PRODUCTS.items()},
-    "sigmoid_rising": _side(1.0),
-    "sigmoid_falling": _side(-1.0),
-}
-
-# By the class, since another class may go by the same name.
-_CONSTANTS_OF = {FAMILIES[name]: constants for name, constants in _BY_NAME.items()}
+from ..membership import Membership
+from ._families import FORMULAS
 
 
 class TermTable(NamedTuple):
@@ -125,8 +45,10 @@ class Numbers:
         # Terms per input of a grid, and where those of each input start; None where there is none.
         self.counts = model.antecedent.grid_counts
         self.block_starts = np.cumsum([0, *(self.counts or ())])[:-1]
-        # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none.
+        # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none: where no
+        # rule has any, of one column.
         rule_terms, n_terms = model.antecedent.rule_terms, model.antecedent.n_terms
+        rule_terms = rule_terms if rule_terms.size else np.full((model.n_rules, 1), -1)
         self.rule_terms = np.where(rule_terms < 0, n_terms, rule_terms)
         # Of a tree, its nodes from the root on: their constants, inputs, and what is below each.
         self.nodes = None
@@ -184,14 +106,14 @@ def _term_tables(model, reference):
     start = 0
     for group in model.antecedent.groups:
         family, inputs = group.family, group.inputs
-        if family not in _CONSTANTS_OF:
+        if family not in FORMULAS:
             raise ValueError(
                 f"Memberships {family.name!r} cannot be exported; "
-                f"{', '.join(one.name for one in _CONSTANTS_OF)} can."
+                f"{', '.join(one.name for one in FORMULAS)} can."
             )
         theta = group.theta.copy()
         theta[0] -= reference[inputs]
-        constants = np.column_stack(_CONSTANTS_OF[family](theta))
+        constants = np.column_stack(FORMULAS[family].constants(theta))
         what = f"a constant of a {family.name} membership"
         yield TermTable(family, start, _rounded(constants, reference.dtype, what))
         start += group.n_terms

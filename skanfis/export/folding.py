@@ -104,11 +104,11 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     return model, read(X)
 
 
-def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray]]:
+def fold_with_reader(estimator: Any) -> tuple[TSKModel, "Reader"]:
     """Return what :func:`fold` does, and what takes the rows of its inputs out of a table."""
     if isinstance(estimator, TSKModel):
         inputs = [_Column(j, name) for j, name in enumerate(estimator.input_names)]
-        return estimator, _reader(inputs, estimator.input_names, True)
+        return estimator, Reader(inputs, list(estimator.input_names), True)
     (*steps, (label, last)), target_steps = _steps_of("", estimator)
     model = _model_of(label, last)
     first = next((step for _, step in steps if not _is_passthrough(step)), last)
@@ -128,7 +128,7 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Callable[..., np.ndarray
     model = _with_raw_inputs(model, columns, order)
     for label, transformer in reversed(target_steps):
         model = _with_raw_target(model, label, transformer)
-    return model, _reader([columns[j] for j in order], names, given is not None)
+    return model, Reader([columns[j] for j in order], names, given is not None)
 
 
 def last_step(estimator: Any) -> Any:
@@ -316,28 +316,52 @@ def _model_of(label, estimator):
     return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
 
 
-def _reader(inputs, names, is_named):
-    """The function that takes the inputs out of tables with columns of these names."""
+@dataclass(frozen=True)
+class Reader:
+    """Takes the inputs of a model out of tables with columns of these names."""
 
-    def read(X):
+    inputs: list[_Column]
+    names: list[str]
+    is_named: bool
+
+    @property
+    def categories(self) -> dict[str, tuple[int, ...]]:
+        """By raw column, the inputs that are indicators of its levels, two or more of them."""
+        found: dict[str, tuple[int, ...]] = {}
+        for j, column in enumerate(self.inputs):
+            if column.encode is not None:
+                name = self.names[column.source]
+                found[name] = (*found.get(name, ()), j)
+        return {name: own for name, own in found.items() if len(own) > 1}
+
+    @property
+    def levels(self) -> dict[str, tuple[str, str]]:
+        """By the name of an indicator its raw column and level: "fibre_PM", ("fibre", "PM")."""
+        encoded = [one for one in self.inputs if one.encode is not None]
+        columns = [str(self.names[one.source]) for one in encoded]
+        return {
+            one.name: (column, one.name.removeprefix(f"{column}_"))
+            for one, column in zip(encoded, columns, strict=True)
+        }
+
+    def __call__(self, X) -> np.ndarray:
+        """The rows; ValueError for other columns, and for numbers that are not finite."""
         given = getattr(X, "columns", None)
-        if is_named and given is not None and list(given) != list(names):
+        if self.is_named and given is not None and list(given) != self.names:
             raise ValueError(
-                f"X must have the columns {', '.join(map(repr, names))}, in this order; it "
+                f"X must have the columns {', '.join(map(repr, self.names))}, in this order; it "
                 f"has {', '.join(map(repr, given))}."
             )
-        table = X if any(one.encode for one in inputs) else _as_numbers(X)
+        table = X if any(one.encode for one in self.inputs) else _as_numbers(X)
         n_columns = np.shape(table)[1]
-        if n_columns != len(names):
+        if n_columns != len(self.names):
             raise ValueError(
-                f"X has {n_columns} columns, the estimator takes {len(names)}: "
-                f"{', '.join(map(repr, names))}."
+                f"X has {n_columns} columns, the estimator takes {len(self.names)}: "
+                f"{', '.join(map(repr, self.names))}."
             )
-        rows = np.column_stack([one.values(table) for one in inputs])
-        check_finite(rows, "X", [one.name for one in inputs])
+        rows = np.column_stack([one.values(table) for one in self.inputs])
+        check_finite(rows, "X", [one.name for one in self.inputs])
         return rows
-
-    return read
 
 
 def _with_raw_inputs(model, columns, order):

@@ -6,8 +6,8 @@ value and its place in the file.
 
 import json
 from functools import partial
-from itertools import groupby
-from math import inf, prod
+from itertools import chain, groupby
+from math import inf, nan, prod
 
 import numpy as np
 
@@ -92,12 +92,12 @@ _FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
     "terms": _list_or_empty,
     "support": _or_null(_list),
     "posterior": _as_it_is,
-    "tangent_at": _or_null(_list),
 }
 INPUT = {
     "name": _text,
     **dict.fromkeys(["minimum", "maximum", "reference"], number),
     "spread": _positive,
+    "tangent_at": _or_null(number, nan),
 }
 OUTPUT = {
     "name": _text,
@@ -126,12 +126,12 @@ def model_of(document):
             f"the file is of version {shown(version)}, this skanfis reads versions 1 to {VERSION}: "
             "upgrade skanfis to read it."
         )
-    file = _members({"posterior": None, "tangent_at": None} | document, _FILE, "the file")
+    if version == 1:
+        document = _of_version_1(document)
+    file = _members({"posterior": None} | document, _FILE, "the file")
     n_rules, n_terms = len(file["rules"]), len(file["terms"])
     n_inputs, n_outputs = len(file["inputs"]), len(file["outputs"])
-    inputs = _columns(file["inputs"], INPUT, "inputs")
-    minimum, maximum = np.array(inputs["minimum"]), np.array(inputs["maximum"])
-    _check_all(minimum <= maximum, "inputs[{}]: minimum is above maximum.")
+    names, inputs = _inputs(file["inputs"])
     output_names, target = _outputs(file["outputs"])
     check_size(n_rules, n_terms, n_inputs, n_outputs)
     groups, initial_groups, term_names = _terms(file["terms"], n_inputs)
@@ -141,19 +141,14 @@ def model_of(document):
     if posterior is not None:
         n_slopes = n_inputs if rules["consequents"].shape[1] > 1 else 0
         posterior = _posterior(posterior, antecedent, n_inputs, n_slopes, n_outputs)
-    at = file["tangent_at"]
     return TSKModel(
-        tangent_at=None if at is None else _tangent_at(at, minimum, maximum),
+        **inputs,
         antecedent=antecedent,
         initial_antecedent=_rule_base(file["rule_base"], initial_groups, table),
         coefficients=rules["consequents"],
         rule_weights=rules["weight"],
         rule_rows=rules["rows"],
-        reference=np.array(inputs["reference"]),
-        spread=np.array(inputs["spread"]),
-        minimum=minimum,
-        maximum=maximum,
-        input_names=tuple(inputs["name"]),
+        input_names=names,
         out_of_bounds=file["out_of_bounds"],
         max_extrapolation=file["max_extrapolation"],
         support=None if support is None else _support(support, n_rules, n_inputs),
@@ -204,6 +199,35 @@ def _check_all(holds, message):
     """Raise ValueError with the place of the first for which a condition does not hold."""
     if not np.all(holds):
         raise ValueError(message.format(np.argmin(holds)))
+
+
+def _of_version_1(document):
+    """The same in the present form: no tangents of their own, a triangle as one list."""
+    found = dict(document)
+    if isinstance(found.get("inputs"), list):
+        no_tangent = {"tangent_at": None}
+        found["inputs"] = [
+            one | no_tangent if isinstance(one, dict) else one for one in found["inputs"]
+        ]
+    posterior = found.get("posterior")
+    if isinstance(posterior, dict) and isinstance(posterior.get("consequents"), list):
+        rows = [row if isinstance(row, list) else [row] for row in posterior["consequents"]]
+        n_outputs = len(_list(found.get("outputs"), "outputs"))
+        triangle = {"consequents": list(chain.from_iterable(rows))}
+        found["posterior"] = {"pinned": [[]] * n_outputs} | posterior | triangle
+    return found
+
+
+def _inputs(inputs):
+    """Names, and what the model has of every input."""
+    found = _columns(inputs, INPUT, "inputs")
+    names, arrays = tuple(found.pop("name")), {key: np.array(own) for key, own in found.items()}
+    low, high, at = arrays["minimum"], arrays["maximum"], arrays["tangent_at"]
+    _check_all(low <= high, "inputs[{}]: minimum is above maximum.")
+    is_free = np.isnan(at)
+    is_within = is_free | ((low <= at) & (at <= high))
+    _check_all(is_within, "inputs[{}]: tangent_at is not from minimum to maximum.")
+    return names, arrays | {"tangent_at": None if is_free.all() else at}
 
 
 def _outputs(outputs):
@@ -305,27 +329,11 @@ def _support(items, n_rules, n_inputs):
     return RuleSupport(**found | {"factor": factor})
 
 
-def _tangent_at(items, minimum, maximum):
-    """Where tangents by other inputs are taken; null is NaN."""
-    read = _or_null(number, np.nan)
-    found = np.array([read(item, f"tangent_at[{j}]") for j, item in enumerate(items)], dtype=float)
-    if found.size != minimum.size or ((found < minimum) | (found > maximum)).any():
-        raise ValueError(
-            f"tangent_at has {shown(items)}: it must be a number in its range, or null, for each "
-            f"of the {minimum.size} inputs."
-        )
-    return found
-
-
 def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     """The posterior that an object describes; ValueError where it is not one of such a model."""
-    if isinstance(item, dict):
-        # Only where constraints are met with equality.
-        item = {"pinned": [[]] * n_outputs} | item
     found = _members(item, dict.fromkeys(_POSTERIOR, _list_or_empty), "posterior")
-    inputs, triangle = found["inputs"], found["consequents"]
-    for value in inputs:
-        _whole(0, n_inputs - 1)(value, "posterior.inputs")
+    index = _whole(0, n_inputs - 1)
+    inputs = [index(value, "posterior.inputs") for value in found.pop("inputs")]
     if len(set(inputs)) < len(inputs) or len(inputs) > n_slopes:
         raise ValueError(
             f"posterior.inputs: {shown(inputs)} has an input twice, or more than {n_slopes}."
@@ -334,24 +342,22 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     n_columns = antecedent.n_rules * (1 + len(inputs))
     if n_columns + n_parameters > MOST_PARAMETERS:
         raise ValueError(f"posterior: more than {MOST_PARAMETERS} parameters.")
-    if len(triangle) != n_columns:
-        raise ValueError(f"posterior.consequents is not a triangle of {n_columns} rows.")
-    consequents = np.zeros((n_columns, n_columns))
-    for i, row in enumerate(triangle):
-        consequents[i, : i + 1] = numbers(row, f"posterior.consequents[{i}]", (i + 1,))
     n_rows = np.unique(antecedent.tied).size if found["premises"] else 0
     n_pinned = len(_list(_list(found["pinned"], "posterior.pinned")[0], "posterior.pinned[0]", 0))
     if n_pinned > n_columns + n_rows:
         raise ValueError(f"posterior.pinned has {n_pinned} rows, more than columns.")
     shapes = {
         "noise": (n_outputs,),
+        "consequents": (n_columns * (n_columns + 1) // 2,),
         "premises": (n_rows, n_parameters),
         "cross": (n_outputs, n_rows, n_columns),
         "pinned": (n_outputs, n_pinned, n_columns + n_rows),
     }
     arrays = {key: numbers(found[key], f"posterior.{key}", shape) for key, shape in shapes.items()}
-    arrays |= {"noise": np.abs(arrays["noise"]), "inputs": np.array(inputs, dtype=int)}
-    return Posterior(consequents=consequents, **arrays)
+    consequents = np.zeros((n_columns, n_columns))
+    consequents[np.tril_indices(n_columns)] = arrays["consequents"]
+    own = {"noise": np.abs(arrays["noise"]), "inputs": np.array(inputs, dtype=int)}
+    return Posterior(**arrays | own | {"consequents": consequents})
 
 
 def _rule_base(kind, groups, table):

@@ -4,7 +4,7 @@ docs/files.rst has the format. Numbers are written so that the same double comes
 """
 
 import json
-from math import inf, isinf
+from math import isfinite, nan
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -51,16 +51,20 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
     '  "format": "skanfis-model",'
     """
     model = fold(estimator)
-    limit, support = model.max_extrapolation, model.support
+    support, no_target = model.support, dict.fromkeys(list(OUTPUT)[1:], nan)
+    at = np.full(model.n_inputs, nan) if model.tangent_at is None else model.tangent_at
+    of_inputs = vars(model) | {"name": model.input_names, "tangent_at": at}
+    of_outputs = {
+        key: np.broadcast_to(values, model.n_outputs)
+        for key, values in (vars(model.target) if model.target else no_target).items()
+    }
     document = {
         "format": FORMAT,
         "version": VERSION,
-        "inputs": _items(
-            name=model.input_names, **{key: vars(model)[key] for key in list(INPUT)[1:]}
-        ),
-        "outputs": _output_items(model),
+        "inputs": _items(**{key: of_inputs[key] for key in INPUT}),
+        "outputs": _items(name=model.output_names, **of_outputs),
         "out_of_bounds": model.out_of_bounds,
-        "max_extrapolation": None if isinf(limit) else limit,
+        "max_extrapolation": _or_null(model.max_extrapolation),
         "rule_base": KINDS[type(model.antecedent)],
         "terms": list(_terms(model)),
         "rules": _items(
@@ -78,16 +82,14 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
             center=support.center,
             factor=support.factor[:, *np.tril_indices(model.n_inputs)],
         )
-    if model.tangent_at is not None:
-        at = [None if np.isnan(one) else float(one) for one in model.tangent_at]
-        document["tangent_at"] = at
     if posterior:
         if model.posterior is None:
             raise ValueError(
                 "posterior=True, but the model knows of none: it was taken as it was given, not "
                 "fitted, or is too large to keep one."
             )
-        document["posterior"] = _posterior_item(model.posterior)
+        state = model.posterior.__getstate__()
+        document["posterior"] = {key: values.tolist() for key, values in state.items()}
     try:
         model_of(document)
     except ValueError as error:
@@ -188,25 +190,9 @@ def _laid_out(document):
 def _items(**columns):
     """An object per row of what the keys hold."""
     lists = [getattr(values, "tolist", lambda v=values: v)() for values in columns.values()]
-    return [dict(zip(columns, row, strict=True)) for row in zip(*lists, strict=True)]
+    return [dict(zip(columns, map(_or_null, row), strict=True)) for row in zip(*lists, strict=True)]
 
 
-def _output_items(model):
-    """Every output's name, and what the target was in training; null where there is none."""
-    if model.target is None:
-        return [dict.fromkeys(OUTPUT) | {"name": name} for name in model.output_names]
-    ranges = {
-        key: np.broadcast_to(values, model.n_outputs) for key, values in vars(model.target).items()
-    }
-    return [
-        {key: None if value in (-inf, inf) else value for key, value in item.items()}
-        for item in _items(name=model.output_names, **ranges)
-    ]
-
-
-def _posterior_item(posterior):
-    item = {key: values.tolist() for key, values in vars(posterior).items()}
-    item["consequents"] = [row[: i + 1] for i, row in enumerate(item["consequents"])]
-    if not posterior.pinned.size:
-        del item["pinned"]
-    return item
+def _or_null(value):
+    """Null for what JSON has no number: no limit, nothing known."""
+    return None if isinstance(value, float) and not isfinite(value) else value

@@ -9,9 +9,9 @@ from functools import partialmethod
 
 import numpy as np
 
-from ..membership import FAMILIES, PRODUCTS
 from ..options import policy_of
-from ._numbers import FLOOR, SMALLEST_LOG_SQUARE, Numbers
+from ._families import FORMULAS
+from ._numbers import Numbers
 
 # Softmax along one axis and ReduceSum with axes as an input are of this version.
 _OLDEST_OPSET = 13
@@ -136,7 +136,6 @@ class _Value:
     exp = partialmethod(_node, "Exp")
     log = partialmethod(_node, "Log")
     abs = partialmethod(_node, "Abs")
-    sigmoid = partialmethod(_node, "Sigmoid")
     at_most = partialmethod(_node, "Min")
     at_least = partialmethod(_node, "Max")
     # Of a comparison: one value where it holds, another where not.
@@ -218,7 +217,8 @@ class _Formula:
             return None, None
         for terms in numbers.terms:
             positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
-            value, slope = _FORMULAS[terms.family](z.columns(positions), terms.constants.T)
+            formula = FORMULAS[terms.family].of
+            value, slope = formula(z.columns(positions), terms.constants.T)
             logs.append(value())
             if way_out is not None:
                 slopes.append(slope() * way_out.columns(positions))
@@ -248,127 +248,3 @@ class _Formula:
         if isinstance(by_rule, np.ndarray):
             return self.graph.node("Identity", by_rule[:, 0])
         return by_rule.sum(keep=False)
-
-
-# Families: of inputs x about the reference and the constants p of ``_numbers``, functions that
-# give log mu and its derivative by x.
-
-
-def _log_sigmoid(u):
-    return u.at_most(0.0) - ((-u.abs()).exp() + 1.0).log()
-
-
-def _gaussian(x, p):
-    t = (x - p[0]) * p[1]
-    return lambda: -(t * t), lambda: t * (-2.0 * p[1])
-
-
-def _bell(x, p):
-    u = (x - p[0]) * p[1]
-    # log |u| has a floor, as in Python; where u is zero so is the slope.
-    far = u.abs() > np.finfo(u.graph.dtype).tiny
-    safe = far.where(u, np.ones((1, 1)))
-    log_square = far.where(safe.abs().log() * 2.0, np.full((1, 1), SMALLEST_LOG_SQUARE))
-    exponent = log_square.at_least(SMALLEST_LOG_SQUARE) * p[2]
-
-    def slope():
-        return far.where(exponent.sigmoid() / safe * (-2.0 * p[1] * p[2]), np.zeros((1, 1)))
-
-    return lambda: _log_sigmoid(-exponent), slope
-
-
-def _two_sided_gaussian(x, p):
-    center, half, left, right = p
-    d = x - center
-    on_left = d < 0.0
-    per_length = on_left.where(left[None], right[None])
-    t = (d.abs() - half).at_least(0.0) * per_length
-    side = on_left.where(np.full((1, 1), -1.0), np.ones((1, 1)))
-    return lambda: t * t * -0.5, lambda: -(t * per_length * side)
-
-
-def _linear(s):
-    one, zero = np.ones((1, 1)), np.zeros((1, 1))
-    return s, lambda: (s > 0.0).where((s < 1.0).where(one, zero), zero)
-
-
-def _spline(s):
-    """Two parabolas, 2 s^2 and 1 - 2 (1 - s)^2, for s between zero and one; and the slope."""
-    t = -(s - 1.0)
-    low = s < 0.5
-    return low.where(s * s * 2.0, -(t * t * 2.0 - 1.0)), lambda: s.at_most(t) * 4.0
-
-
-def _flank(profile, s):
-    """Log mu of a flank over a floor, and its derivative by s; zero at the foot, one at the top."""
-    near = s.at_least(0.0).at_most(1.0)
-    mu, mu_slope = profile(near)
-    t, t_near = -(s.at_most(1.0) - 1.0), -(near - 1.0)
-    gaussian = (t_near * t_near * -0.5).exp()
-    mixture = mu + (gaussian - mu) * FLOOR
-
-    def value():
-        return mixture.log() - (t - t_near) * (t + t_near) * 0.5
-
-    def slope():
-        # Not times 1 - FLOOR: onnxruntime takes that for one and leaves it out.
-        steep = mu_slope()
-        return (steep + (t_near * gaussian - steep) * FLOOR) / mixture + (t - t_near)
-
-    return value, slope
-
-
-def _two_feet(profile):
-    def formula(x, p):
-        left, right = (x - p[0]) * p[2], -((x - p[1]) * p[3])
-        on_left = left < right
-        value, slope = _flank(profile, on_left.where(left, right))
-
-        def signed_slope():
-            if len(p) == 4:
-                return on_left.where(p[2][None], -p[3][None]) * slope()
-            # Of a triangle, it is the corner that says on which side x lies, and slope is zero
-            # there: an input that is held at the edge of the box may lie on it.
-            d = x - p[4]
-            signed = (d < 0.0).where(p[2][None], -p[3][None]) * slope()
-            return (d.abs() > 0.0).where(signed, np.zeros((1, 1)))
-
-        return value, signed_slope
-
-    return formula
-
-
-def _one_foot(x, p):
-    value, slope = _flank(_spline, (x - p[0]) * p[1])
-    return value, lambda: slope() * p[1]
-
-
-def _sigmoids(x, center, per_left, per_right, at_left, at_right, log_gain=0.0):
-    d = x - center
-    rise, fall = d * per_left + at_left, -(d * per_right - at_right)
-    return (
-        lambda: _log_sigmoid(rise) + _log_sigmoid(fall) + log_gain,
-        lambda: (-rise).sigmoid() * per_left - (-fall).sigmoid() * per_right,
-    )
-
-
-def _side(x, p):
-    u = (x - p[0]) * p[1]
-    return lambda: _log_sigmoid(u), lambda: (-u).sigmoid() * p[1]
-
-
-_BY_NAME = {
-    "gaussian": _gaussian,
-    "bell": _bell,
-    "triangular": _two_feet(_linear),
-    "trapezoidal": _two_feet(_linear),
-    "two_sided_gaussian": _two_sided_gaussian,
-    "pi_shaped": _two_feet(_spline),
-    "s_shaped": _one_foot,
-    "z_shaped": _one_foot,
-    "sigmoid_difference": lambda x, p: _sigmoids(x, p[0], p[1], p[1], p[2], p[2], p[3]),
-    **{one.name: lambda x, p: _sigmoids(x, *p) for one in PRODUCTS.values()},
-    "sigmoid_rising": _side,
-    "sigmoid_falling": _side,
-}
-_FORMULAS = {FAMILIES[name]: formula for name, formula in _BY_NAME.items()}

@@ -1,21 +1,18 @@
 """What every input, and every pair of inputs, does to the output, and how much of it."""
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations, product
+from itertools import combinations
 from operator import itemgetter
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
-from sklearn.preprocessing import OneHotEncoder
 
-from ..export import fold, fold_with_rows
-from ..export.folding import found_by_search
+from ..export.folding import fold_with_reader
 from ..model import TSKModel
-from .anova import N_DRAWS, DrawnAnova, ProductAnova, covariances, draw, moments_of_rows
+from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, covariances, draw
 from .displays import _position
 
 # Shares that differ by more are told; so is what is held, of more of the product's mass.
@@ -99,10 +96,9 @@ def effects(
     """
     study = Study.of(estimator, X, groups, output)
     anova, labels = study.anova, study.labels
-    wanted = study.pairs() if isinstance(pairs, str) and pairs == "all" else study.given(pairs)
-    ones = [(g,) for g in range(len(labels))]
+    ones, wanted = [(g,) for g in range(len(labels))], study.pairs(pairs)
     subsets = [*ones, *wanted]
-    columns = {"sobol": _shares(subsets, [anova.closed(v) for v in subsets], anova.variance)}
+    columns = {"sobol": study.sobol(subsets)}
     if study.rows is not None:
         columns["rows"] = _shares(subsets, *covariances(anova, subsets, study.rows))
     table = pd.DataFrame(columns, index=[" and ".join(labels[g] for g in v) for v in subsets])
@@ -150,34 +146,22 @@ def _notes(table, held, is_drawn):
 
 def importances(model: TSKModel) -> np.ndarray:
     """Sobol's total share of every input over their sum, (n_outputs, n_inputs)."""
-    blocks = [(j,) for j in range(model.n_inputs)]
-    known = _distributions(model, blocks, None)
-    anovas = [_anova(model, k, blocks, known, None) for k in range(model.n_outputs)]
+    blocks = _known(model, [(j,) for j in range(model.n_inputs)], None)
+    anovas = [_anova(model, k, blocks) for k in range(model.n_outputs)]
     found = np.array([anova.totals() * (anova.variance > 0.0) for anova in anovas])
     total = found.sum(axis=1, keepdims=True)
     return found / np.where(total > 0.0, total, 1.0)
 
 
-def _anova(model, output, blocks, known, rows):
-    if model.antecedent.factors(model.reference[:, None]) is None:
-        return DrawnAnova(model, output, blocks, known)
-    if rows is not None:
-        return ProductAnova(model, output, blocks, moments_of_rows(model, blocks, rows))
-    moments = []
-    for inputs, (values, weight) in zip(blocks, known, strict=True):
-        if weight is None:
-            moments.append(model.support.marginals[inputs[0]][0])
-        else:
-            X = np.tile(model.reference, (len(values), 1))
-            X[:, list(inputs)] = values
-            moments += moments_of_rows(model, [inputs], X, weight)
-    return ProductAnova(model, output, blocks, moments)
+def _anova(model, output, blocks):
+    is_product = blocks[0].moments is not None
+    return (ProductAnova if is_product else DrawnAnova)(model, output, blocks)
 
 
-def _distributions(model, blocks, rows):
-    """Rows of every block and their weights, None for equal ones; without rows, of training."""
+def _known(model, blocks, rows):
+    """Blocks of inputs with their distributions: over rows, or without these in training."""
     if rows is not None:
-        return [(rows[:, list(inputs)], None) for inputs in blocks]
+        return blocks_of_rows(model, blocks, rows)
     if model.support is None or not model.support.marginals:
         raise ValueError(
             "The model does not know how its inputs are distributed: it was not trained by fit, or "
@@ -190,36 +174,38 @@ def _distributions(model, blocks, rows):
             # Indicators of the levels of a category, and none of these; their means are known.
             share = np.clip(model.reference[own], 0.0, 1.0)
             share = np.append(share, max(1.0 - share.sum(), 0.0))
-            found.append((np.eye(len(own) + 1)[:, :-1], share / share.sum()))
+            X = np.tile(model.reference, (share.size, 1))
+            X[:, own] = np.eye(share.size)[:, :-1]
+            found += blocks_of_rows(model, [inputs], X, share / share.sum())
         else:
-            values = model.reference[own] + model.spread[own] * model.support.marginals[own[0]][1]
-            found.append((np.clip(values, model.minimum[own], model.maximum[own])[:, None], None))
+            moments, values = model.support.marginals[own[0]]
+            values = model.reference[own] + model.spread[own] * values[:, None]
+            values = np.clip(values, model.minimum[own], model.maximum[own])
+            found.append(Block(inputs, values, None, moments))
     return found
 
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """Blocks of inputs that enter as one, their distributions, and the ANOVA over them."""
+    """A model, the blocks of inputs that enter as one, and the ANOVA of one output over them."""
 
     model: TSKModel
     output: int
     labels: list[str]
-    blocks: list[tuple[int, ...]]
+    blocks: list[Block]
     is_drawn: list[bool]  # whether pictures show it: one input, or a category
-    known: list  # rows of every block, and their weights or None
     rows: np.ndarray | None
     anova: ProductAnova | DrawnAnova
 
     @classmethod
     def of(cls, estimator, X, groups, output):
         """Of an estimator; ValueError as of :func:`effects`."""
-        model, rows = (fold(estimator), None) if X is None else fold_with_rows(estimator, X)
+        model, read = fold_with_reader(estimator)
         k = _position(output, model.output_names, "output")
-        if rows is not None:
-            rows = np.clip(rows, model.minimum, model.maximum)
-        elif groups:
+        rows = None if X is None else np.clip(read(X), model.minimum, model.maximum)
+        if groups and rows is None:
             raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
-        found = _one_hot(estimator, model.input_names)
+        found = read.categories
         for label, columns in (groups or {}).items():
             own = {_position(column, model.input_names) for column in columns}
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
@@ -228,26 +214,23 @@ class Study:
             found[label] = tuple(sorted(own))
         taken = {j for inputs in found.values() for j in inputs}
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}
-        labels, blocks = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
-        if sum(map(len, blocks)) != model.n_inputs:
+        labels, inputs = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
+        if sum(map(len, inputs)) != model.n_inputs:
             raise ValueError("groups: one of them is called as a column that it does not have.")
         is_drawn = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
-        known = _distributions(model, blocks, rows)
-        anova = _anova(model, k, blocks, known, rows)
-        return cls(model, k, labels, blocks, is_drawn, known, rows, anova)
+        blocks = _known(model, inputs, rows)
+        return cls(model, k, labels, blocks, is_drawn, rows, _anova(model, k, blocks))
 
-    def pairs(self):
-        """Pairs of blocks, but those whose component is zero for want of terms."""
-        terms = set(self.model.antecedent.term_inputs.tolist())
-        active = [bool(terms & set(inputs)) for inputs in self.blocks]
-        least = 1 if self.model.order else 2
-        every = combinations(range(len(active)), 2)
-        return [(g, h) for g, h in every if active[g] + active[h] >= least]
-
-    def given(self, pairs):
-        """Pairs by names or positions of blocks."""
+    def pairs(self, asked="all"):
+        """Pairs of blocks by their positions; all but those that are zero for want of terms."""
+        if isinstance(asked, str) and asked == "all":
+            terms = set(self.model.antecedent.term_inputs.tolist())
+            active = [bool(terms & set(block.inputs)) for block in self.blocks]
+            least = 1 if self.model.order else 2
+            every = combinations(range(len(active)), 2)
+            return [(g, h) for g, h in every if active[g] + active[h] >= least]
         found: dict[tuple[int, ...], None] = {}
-        for pair in pairs:
+        for pair in asked:
             names = [pair] if isinstance(pair, str) else pair
             own = tuple(sorted({_position(name, self.labels) for name in names}))
             if len(own) != 2:
@@ -255,39 +238,14 @@ class Study:
             found[own] = None
         return list(found)
 
+    def sobol(self, subsets):
+        """Shares of inputs and pairs in the variance, where inputs are independent."""
+        return _shares(subsets, [self.anova.closed(v) for v in subsets], self.anova.variance)
+
     @property
     def held(self):
         """Part of the product's mass where the output would be held."""
-        rows = draw(self.blocks, self.known, _N_HELD, np.random.default_rng(0))
+        rows = draw(self.blocks, _N_HELD, np.random.default_rng(0))
         y = replace(self.model, target=None).predict(rows)[:, self.output]
         low, high = self.model.output_limits[:, self.output]
         return float(np.mean((y < low) | (y > high)))
-
-
-def _one_hot(estimator, names):
-    """Inputs that are indicators of one column, two or more of them, by its name."""
-    place = {name: j for j, name in enumerate(names)}
-    # Columns without names are called by their number in the whole table, of which an encoder may
-    # see a part.
-    numbered = sorted({one[0] for name in names if (one := re.match(r"x\d+(?=_)", name))})
-    found: dict[str, tuple[int, ...]] = {}
-    for encoder in _encoders(estimator):
-        known, levels = getattr(encoder, "feature_names_in_", None), encoder.categories_
-        columns = product(numbered, levels) if known is None else zip(known, levels, strict=True)
-        for column, own in columns:
-            own = [f"{column}_{level}" for level in [*own, "infrequent_sklearn"]]
-            inputs = tuple(sorted(place[name] for name in own if name in place))
-            if len(inputs) > max(len(found.get(column, ())), 1):
-                found[column] = inputs
-    return found
-
-
-def _encoders(estimator):
-    """Every OneHotEncoder in a nest of pipelines, column transformers, wrappers and searches."""
-    estimator = found_by_search(estimator)
-    if isinstance(estimator, OneHotEncoder):
-        return [estimator]
-    parts = [getattr(estimator, "regressor_", None)]
-    for name in ("steps", "transformers_"):
-        parts += [step[1] for step in getattr(estimator, name, ())]
-    return [found for part in parts if part is not None for found in _encoders(part)]

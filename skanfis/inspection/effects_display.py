@@ -16,8 +16,8 @@ from .labels import as_label
 _N_POINTS, _N_ACROSS = 61, 31
 # A pair of a smaller share is not drawn.
 _LEAST = 0.005
-# Parts of a panel's height: its data, and room above the curves.
-_DATA_HEIGHT, _ROOM = 0.15, 0.03
+# Above and below the curves, as a part of what they span: below stand the data.
+_ROOM = 0.2
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -33,8 +33,8 @@ class EffectsDisplay:
     curves : list of dict
         The strongest first: "input", "points" (of a category 0, 1, ...), "levels" or None, "share"
         of the variance (Sobol's, of this input alone), "mean" and its "deviation", 0 where none is
-        known, (n_points,); "terms", how true each is (of cuts: above), (n_terms, n_points);
-        "edges" and "counts" of the histogram of the data. Groups of several columns have no curve.
+        known, (n_points,); "terms", how true each is, (n_terms, n_points); "edges" and "counts" of
+        the histogram of the data. Groups of several columns have no curve.
     pairs : list of dict
         "inputs", "points", "levels" of both, "share", and "effect" (n_points up, n_points across).
     output_name : str
@@ -77,20 +77,15 @@ class EffectsDisplay:
         """
         check_count("max_shown", max_shown, 1)
         study = Study.of(estimator, X, groups, output)
-        anova, shown = study.anova, np.flatnonzero(study.is_drawn).tolist()
-        alone = {g: anova.closed((g,)) for g in shown}
-        drawable = [pair for pair in study.pairs() if set(pair) <= set(shown)]
-        both = {(g, h): anova.closed((g, h)) - alone[g] - alone[h] for g, h in drawable}
-        totals, unit = anova.totals(), anova.variance or 1.0
-        strongest = sorted(shown, key=lambda g: -totals[g])[:max_shown]
-        pairs = sorted(both, key=lambda pair: -both[pair])[:2]
+        ones = [(g,) for g in np.flatnonzero(study.is_drawn).tolist()]
+        pairs = [(g, h) for g, h in study.pairs() if study.is_drawn[g] and study.is_drawn[h]]
+        share = dict(zip([*ones, *pairs], study.sobol([*ones, *pairs]), strict=True))
+        totals = study.anova.totals()
+        ones = sorted(ones, key=lambda one: -totals[one[0]])[:max_shown]
+        pairs = sorted(pairs, key=lambda pair: -share[pair])[:2]
         return cls(
-            curves=[_curve(study, g) | {"share": alone[g] / unit} for g in strongest],
-            pairs=[
-                _pair(study, *pair) | {"share": both[pair] / unit}
-                for pair in pairs
-                if both[pair] > _LEAST * unit
-            ],
+            curves=[_curve(study, *one) | {"share": share[one]} for one in ones],
+            pairs=[_pair(study, *v) | {"share": share[v]} for v in pairs if share[v] > _LEAST],
             output_name=study.model.output_names[study.output],
         ).plot(ax=ax)
 
@@ -98,16 +93,16 @@ class EffectsDisplay:
         """Draw the effects on ``ax``, as of :meth:`from_estimator`."""
         self.axes_ = _panels(ax, len(self.curves) + len(self.pairs))
         self.figure_ = self.axes_[0].figure
-        name, n_curves = as_label(self.output_name), len(self.curves)
         # One scale for all, so that what is flat looks flat.
-        low = min(np.min(one["mean"] - 2.0 * one["deviation"]) for one in self.curves)
-        high = max(np.max(one["mean"] + 2.0 * one["deviation"]) for one in self.curves)
-        height = (high - low or 1.0) / (1.0 - _DATA_HEIGHT - 2.0 * _ROOM)
-        limits = low - (_DATA_HEIGHT + _ROOM) * height, high + _ROOM * height
-        for axes, curve in zip(self.axes_[:n_curves], self.curves, strict=True):
+        ends = [
+            one["mean"] + side * one["deviation"] for one in self.curves for side in (-2.0, 2.0)
+        ]
+        low, high = np.min(np.concatenate(ends)), np.max(np.concatenate(ends))
+        room = _ROOM * (high - low or 1.0)
+        for axes, curve in zip(self.axes_, self.curves, strict=False):
             _draw_curve(axes, curve)
-            axes.set(ylim=limits, ylabel=name)
-        for axes, pair in zip(self.axes_[n_curves:], self.pairs, strict=True):
+            axes.set(ylim=(low - room, high + room), ylabel=as_label(self.output_name))
+        for axes, pair in zip(self.axes_[len(self.curves) :], self.pairs, strict=True):
             _draw_pair(axes, pair)
         if ax is None:
             note = "curve: mean over all other inputs, ± 2 sd; shaded: terms; grey: data"
@@ -118,9 +113,8 @@ class EffectsDisplay:
 
 def _along(study, g, n_points):
     """Rows along a block, the others at their means: "input", "points", and "levels" if any."""
-    name, own, model = study.labels[g], list(study.blocks[g]), study.model
-    values = np.unique(study.known[g][0], axis=0)
-    levels = None
+    name, own, model = study.labels[g], study.blocks[g].inputs, study.model
+    values, levels = np.unique(study.blocks[g].values, axis=0), None
     if len(own) > 1:
         values = np.eye(len(own))
         levels = [model.input_names[j].removeprefix(f"{name}_") for j in own]
@@ -136,41 +130,34 @@ def _along(study, g, n_points):
 
 def _curve(study, g):
     """The mean along a block, its deviation, its terms and its data."""
-    model, own = study.model, list(study.blocks[g])
+    model, block = study.model, study.blocks[g]
     rows, axis = _along(study, g, _N_POINTS)
     deviation = np.zeros(len(rows))
     if model.posterior is not None:
-        others = draw(study.blocks, study.known, N_SHARED, np.random.default_rng(0))
+        others = draw(study.blocks, N_SHARED, np.random.default_rng(0))
         for i, row in enumerate(rows):
-            others[:, own] = row[own]
+            others[:, block.inputs] = row[list(block.inputs)]
             deviation[i] = model.posterior.of_mean(model, others.T.copy())[study.output]
-    # As shares, where they are factors of the strengths.
-    Z = rows.T.copy()
-    terms = model.antecedent.factors(Z)
-    terms = np.exp(model.antecedent.log_memberships(Z)) if terms is None else terms
-    is_own = np.isin(model.antecedent.term_inputs, own)
-    # Of both sides of a cut one will do.
-    is_own[getattr(model.antecedent, "n_nodes", is_own.size) :] = False
-    values, weight = study.known[g]
-    weight = np.full(len(values), 1.0 / len(values)) if weight is None else weight
+    is_own = np.isin(model.antecedent.term_inputs, block.inputs)
     if axis["levels"] is None:
-        counts, edges = np.histogram(values[:, 0], _BINS, weights=weight)
+        counts, edges = np.histogram(block.values[:, 0], _BINS)
     else:
-        is_at = (values[:, None] == rows[:, own]).all(axis=2)
+        is_at = (block.values[:, None] == rows[:, block.inputs]).all(axis=2)
+        weight = np.ones(len(is_at)) if block.weight is None else block.weight
         counts, edges = weight @ is_at, np.arange(len(rows) + 1) - 0.5
     return axis | {
         "mean": study.anova.mean + study.anova.curve((g,), rows),
         "deviation": deviation,
-        "terms": terms[is_own],
+        "terms": np.exp(model.antecedent.log_memberships(rows.T.copy()))[is_own],
         "edges": edges,
-        "counts": counts,
+        "counts": counts / counts.sum(),
     }
 
 
 def _pair(study, g, h):
     """What two blocks do together, less what each does alone."""
     (across, one), (up, other) = _along(study, g, _N_ACROSS), _along(study, h, _N_ACROSS)
-    rows, own = np.tile(across, (len(up), 1)), list(study.blocks[h])
+    rows, own = np.tile(across, (len(up), 1)), study.blocks[h].inputs
     rows[:, own] = np.repeat(up[:, own], len(across), axis=0)
     effect = study.anova.curve((g, h), rows).reshape(len(up), len(across))
     effect -= study.anova.curve((g,), across) + study.anova.curve((h,), up)[:, None]
@@ -185,22 +172,21 @@ def _pair(study, g, h):
 def _draw_curve(axes, curve):
     points, mean, band = curve["points"], curve["mean"], 2.0 * curve["deviation"]
     on_height = {"transform": axes.get_xaxis_transform()}
-    heights = _DATA_HEIGHT * curve["counts"] / curve["counts"].max()
+    # Of the height of a panel, the room below the curves.
+    heights = 0.9 * _ROOM / (1.0 + 2.0 * _ROOM) * curve["counts"] / curve["counts"].max()
     axes.stairs(heights, curve["edges"], fill=True, color="0.8", zorder=0, **on_height)
     if curve["levels"] is not None:
         axes.errorbar(points, mean, band, fmt="o", color="black", capsize=3.0)
-        axes.set_xlim(curve["edges"][0], curve["edges"][-1])
     else:
         shades = _pyplot().get_cmap()(np.linspace(0.0, _BRIGHTEST, len(curve["terms"])))
         for term, shade in zip(curve["terms"], shades, strict=True):
             axes.fill_between(points, term, color=shade, alpha=0.13, linewidth=0, **on_height)
         axes.fill_between(points, mean - band, mean + band, color="0.3", alpha=0.4, linewidth=0)
         axes.plot(points, mean, color="black", linewidth=1.8)
-        axes.set_xlim(points[0], points[-1])
+    axes.set_xlim(curve["edges"][0], curve["edges"][-1])
     _name(axes.xaxis, curve["input"], points, curve["levels"])
-    axes.set_title(
-        f"alone {100.0 * curve['share']:.0f} % of variance", fontsize="small", loc="left"
-    )
+    title = f"alone {100.0 * curve['share']:.0f} % of variance"
+    axes.set_title(title, fontsize="small", loc="left")
 
 
 def _draw_pair(axes, pair):

@@ -1,8 +1,8 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, ClassVar
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,16 +11,20 @@ from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import check_finite, positive_weights
 from ..export.folding import fold_with_reader
-from ..membership import GREATEST_CROSSING, LEAST_TRUTH
 from ..model import TSKModel
-from ..reading_cost import reading_cost
-from .measures import Measures, crossings, distinct_terms, measure
-from .rules import premise_texts, rules_frame, writable
+from .measures import Measures, measure
+from .rules import premise_texts, writable
+from .sentences import Sentences
 
-# In standardised units: whoever reads the strongest rule alone is then as wrong as a model that
-# explains three quarters of the variance; beyond, the rule says too little of the model.
+# In deviations of the target: whoever reads the strongest rule alone is then as wrong as a model
+# that explains three quarters of the variance; beyond, the rule says too little of the model.
 GREATEST_ALONE = 0.5
-# A sentence names so many terms or pairs, and counts the others.
+# What the text as printed may err, over the model's error.
+GREATEST_ERROR = 1.05
+# A slope has a sign where it is this many of its deviations from zero; in rules of this part of the
+# weight.
+_DEVIATIONS, _LEAST_WEIGHT = 2.0, 0.05
+# A sentence names so many, and counts the others.
 _MOST_NAMED = 5
 
 
@@ -39,19 +43,20 @@ class Readability:
 
     Attributes
     ----------
-    terms : DataFrame
-        One row per term: "input"; "term"; "greatest_truth", its greatest membership on a row;
-        "crossing", the height at which it crosses the next one. Equal terms count once.
     rules : DataFrame
         One row per rule and output: "if", its terms; "output"; "weight", the part of the rows'
         weight on which it fires; "rows", the weight of the rows on which it is the strongest;
-        "alone", the RMS of its value less the model on these, in sd of the target.
+        "alone", the RMS of its value less the model on these, in sd of the target; "error", the
+        RMSE of its value there, in units of the target; "numbers" in its sentence.
     reading_cost : int
-        Numerals that a person reads in the rules' sentences, as ``structures_`` counts them.
-    summary, limits : Series, dict
-        The worst "strongest_alone", "least_truth" and "greatest_crossing", and what just passes.
+        Numerals that a person reads in the rules' sentences, as ``structures_`` counts them, but
+        for slopes that are too small to be written.
+    summary : Series
+        The worst "strongest_alone", and "text_over_model", the RMSE of the text as printed over
+        the model's; NaN where the model has no error to compare with.
     findings, line : list of str, str
-        What is not fit to be read, in sentences, empty if all is well; the summary in one line.
+        What speaks against reading the rules one by one, in sentences, empty if nothing does; and
+        how many numbers there are to read, and what the text as printed errs.
 
     Examples
     --------
@@ -59,77 +64,68 @@ class Readability:
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import readability
     >>> X, y = make_jang_sinc()
-    >>> found = readability(ANFISRegressor(n_mfs=[3, 1], solver="lse").fit(X, y), X, y)
-    >>> list(found.terms["term"])
-    ['low', 'medium', 'high']
+    >>> found = readability(ANFISRegressor(n_mfs=[3, 1], order=0, solver="lse").fit(X, y), X, y)
+    >>> found.rules["numbers"].tolist()
+    [2, 2, 2]
     """
 
     model: TSKModel
     measures: Measures
 
-    limits: ClassVar[dict] = {
-        "strongest_alone": GREATEST_ALONE,
-        "least_truth": LEAST_TRUTH,
-        "greatest_crossing": GREATEST_CROSSING,
-    }
-
-    @property
-    def terms(self) -> Any:
-        """One row per term; see the class."""
-        model, antecedent = writable(self.model), self.model.antecedent
-        own = [t for terms in distinct_terms(antecedent).values() for t in terms]
-        inputs = antecedent.term_inputs
-        return pd.DataFrame(
-            {
-                "input": [model.input_names[inputs[t]] for t in own],
-                "term": [model.term_names[t] for t in own],
-                "greatest_truth": self.measures.truth[own],
-                "crossing": crossings(antecedent)[own],
-            },
-            index=pd.Index(own, name="term", dtype=int),
-        )
+    @cached_property
+    def _said(self):
+        return Sentences.of(writable(self.model))
 
     @property
     def rules(self) -> Any:
         """The rules; see the class."""
-        found, model = self.measures, writable(self.model)
-        premises = premise_texts(rules_frame(model, model.reference))
+        found, model = self.measures, self._said.model
         return pd.DataFrame(
             {
-                "if": np.repeat(np.array(premises, dtype=object), model.n_outputs),
+                "if": np.repeat(np.array(premise_texts(model), dtype=object), model.n_outputs),
                 "output": list(model.output_names) * model.n_rules,
                 "weight": np.repeat(found.rule_weights, model.n_outputs),
                 "rows": np.repeat(found.rule_rows, model.n_outputs),
                 "alone": found.rule_alone.ravel(),
+                "error": self.rule_errors.ravel(),
+                "numbers": np.repeat(self._said.n_numbers, model.n_outputs),
             },
             index=pd.Index(np.repeat(np.arange(model.n_rules), model.n_outputs), name="rule"),
         )
 
     @property
+    def rule_errors(self) -> np.ndarray:
+        """RMSE of each rule alone where it is the strongest, in units of the target."""
+        target, found = self.model.target, self.measures
+        return found.rule_errors * (found.deviation if target is None else target.spread)
+
+    @property
     def reading_cost(self) -> int:
         """Numerals that a person reads in the rules' sentences; see the class."""
-        model = self.model
-        n_slopes = int(np.count_nonzero(model.coefficients[:, 1:].any(axis=2)))
-        is_common = model.common_slopes
-        n_slopes -= int(is_common.sum() - is_common.any(axis=0).sum())
-        return reading_cost(model.antecedent, n_slopes, model.n_outputs)
+        return self._said.reading_cost
 
     @property
     def summary(self) -> Any:
-        """The worst of each figure, over outputs and terms."""
-        terms = self.terms
+        """The worst of each figure, over outputs."""
+        found = self.measures
+        is_known = (found.errors > 0.0).all()
+        ratio = found.printed_errors / found.errors if is_known else np.array([np.nan])
         figures = {
-            "strongest_alone": float(self.measures.alone.max()),
-            "least_truth": float(terms["greatest_truth"].min()),
-            "greatest_crossing": float(terms["crossing"].max()),
+            "strongest_alone": float(found.alone.max()),
+            "text_over_model": float(ratio.max()),
         }
         return pd.Series(figures, name="readability")
 
     @property
     def findings(self) -> list[str]:
-        """What is not fit to be read, in sentences; an empty list if all is well."""
-        terms = self.terms
-        sentences = _on_truth(terms) + _on_crossings(terms)
+        """What speaks against reading the rules one by one, in sentences; empty if nothing does."""
+        sentences, ratio = [], self.summary["text_over_model"]
+        if ratio > GREATEST_ERROR:
+            sentences.append(
+                f"The text as printed errs {_figure(ratio)} times as much as the model: print "
+                "more digits (precision)."
+            )
+        sentences += _on_signs(self._said) + self._on_few_rows()
         for output, error in zip(self.model.output_names, self.measures.alone, strict=True):
             of_output = f" of {output!r}" if self.model.n_outputs > 1 else ""
             if error > GREATEST_ALONE:
@@ -140,24 +136,32 @@ class Readability:
                 )
         return sentences
 
+    def _on_few_rows(self):
+        """Rules that are the strongest on fewer rows than they have numbers."""
+        numbers, rows = self._said.n_numbers, self.measures.rule_rows
+        few = np.flatnonzero(rows < numbers)
+        if not few.size or self.model.n_rules == 1:
+            return []
+        named = _named([f"{r} (rows: {rows[r]:.3g}, numbers: {numbers[r]})" for r in few])
+        return [f"Strongest on fewer rows than its sentence has numbers: rule {named}."]
+
     @property
     def line(self) -> str:
-        """The summary as one line of text."""
-        found = self.summary
-        parts = [f"strongest rule alone {_figure(found['strongest_alone'])} sd off the model"]
-        if np.isfinite(found["least_truth"]):
-            parts.append(f"least true term {_figure(found['least_truth'])}")
-        if np.isfinite(found["greatest_crossing"]):
-            parts.append(f"highest crossing {_figure(found['greatest_crossing'])}")
-        return "; ".join(parts)
+        """How many numbers there are to read, and what the text as printed errs."""
+        ratio, cost = self.summary["text_over_model"], self.reading_cost
+        numbers = f"{cost} number{'' if cost == 1 else 's'}"
+        if np.isnan(ratio):
+            return numbers
+        more = round(100.0 * (ratio - 1.0))
+        errs = f"{abs(more)} % {'more' if more > 0 else 'less'} than" if more else "as much as"
+        return f"{numbers}; the text as printed errs {errs} the model"
 
     def __repr__(self):
         return f"<Readability of {self.model!r}: {self.line}>"
 
     def __str__(self):
         nothing = "Nothing measured here speaks against reading the rules one by one."
-        summary = f"{self.line[0].upper()}{self.line[1:]}."
-        return "\n".join([summary, *(self.findings or [nothing])])
+        return "\n".join([f"{self.line}.", *(self.findings or [nothing])])
 
 
 def readability(
@@ -169,8 +173,8 @@ def readability(
 ) -> Readability:
     """Measure whether the rules can be read one by one, and say what speaks against it.
 
-    Measured are how far the strongest rule of a row lies from the model, how true each term
-    becomes on the rows, and where neighbouring terms cross; see :doc:`/reading_rules`.
+    Measured are how far the strongest rule of a row lies from the model and from the target, and
+    what the text as printed errs; see :doc:`/reading_rules`.
 
     Parameters
     ----------
@@ -239,37 +243,31 @@ def readability_of_rows(model, X, y=None, sample_weight=None):
     return Readability(model, measure(model, lambda part: X[part], X.shape[0], y, sample_weight))
 
 
-def _on_truth(terms):
-    never = terms[terms["greatest_truth"] < LEAST_TRUTH]
-    if never.empty:
+def _on_signs(said):
+    """Inputs whose slopes are up in some rules and down in others, all beyond chance."""
+    model = said.model
+    if model.posterior is None or not model.order:
         return []
-    what = "A term is" if len(never) == 1 else f"{len(never)} of {len(terms)} terms are"
-    named = _named(
-        [f"{t.term!r} of {t.input!r} ({_figure(t.greatest_truth)})" for t in never.itertuples()]
-    )
-    return [f"{what} never truer than {LEAST_TRUTH} on any row: {named}."]
+    found = []
+    deviations = model.posterior.of_coefficients(model.n_rules)[:, 1:]
+    heavy = model.rule_weights >= _LEAST_WEIGHT
+    for k, output in enumerate(model.output_names):
+        for place, j in enumerate(model.posterior.inputs):
+            slopes = said.slopes[:, j, k]
+            is_clear = heavy & (np.abs(slopes) > _DEVIATIONS * deviations[:, place, k])
+            up, down = (np.flatnonzero(is_clear & (sign * slopes > 0.0)) for sign in (1.0, -1.0))
+            if up.size and down.size:
+                name = model.input_names[j] + (f" (of {output})" if model.n_outputs > 1 else "")
+                rises, falls = (", ".join(map(str, rules)) for rules in (up, down))
+                found.append(f"by {name} up in rule {rises} and down in rule {falls}")
+    named = _named(found, "; ")
+    return [f"Rules go different ways, beyond chance: {named}."] if found else []
 
 
-def _on_crossings(terms):
-    # The last term of an input crosses no other: its crossing is NaN.
-    found = [
-        f"{a.term!r} and {b.term!r} of {a.input!r} ({_figure(a.crossing)})"
-        for a, b in pairwise(terms.itertuples())
-        if a.crossing > GREATEST_CROSSING
-    ]
-    if not found:
-        return []
-    many = f"{len(found)} of {terms['crossing'].count()} pairs of neighbouring terms"
-    return [
-        f"{many if len(found) > 1 else 'Two terms'} can hardly be told apart, for they cross "
-        f"above {GREATEST_CROSSING}: {_named(found)}."
-    ]
-
-
-def _named(parts):
+def _named(parts, between=", "):
     if len(parts) <= _MOST_NAMED:
-        return ", ".join(parts)
-    return f"{', '.join(parts[:_MOST_NAMED])} and {len(parts) - _MOST_NAMED} more"
+        return between.join(parts)
+    return f"{between.join(parts[:_MOST_NAMED])} and {len(parts) - _MOST_NAMED} more"
 
 
 def _figure(value):

@@ -1,6 +1,5 @@
-"""The rules as one frame, from which text, tables and pictures are made; public tables of it."""
+"""The rules in words and in tables: what they ask, what they say, what fired on a row."""
 
-import warnings
 from dataclasses import replace
 from typing import Any
 
@@ -8,64 +7,53 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from .._validation import check_choice, check_count
-from ..exceptions import ReadabilityWarning
+from .._validation import check_count
 from ..export import fold, fold_with_rows
 from ..export.folding import last_step
 from ..model import TSKModel
+from .sentences import MOST_DIGITS, Sentences
 
 
-def rules_frame(model, reference):
-    """A row per rule: ("if", input), ("data", "weight" or "rows"), ("then output", coefficient).
-
-    Consequents are by the inputs' distances from ``reference``; no term is None.
-    """
-    model = writable(model)
+def conditions(model):
+    """What each rule asks, a dict from the place of an input to its terms: "low", "> 6.8 ± 0.3"."""
     inputs, names = model.antecedent.term_inputs, model.term_names
-    terms: list[dict[int, str]] = [{} for _ in range(model.n_rules)]
-    for rule, of_rule in zip(terms, model.antecedent.rule_terms.tolist(), strict=True):
-        for t in of_rule:
+    rules: list[dict[int, str]] = [{} for _ in range(model.n_rules)]
+    for rule, terms in zip(rules, model.antecedent.rule_terms.tolist(), strict=True):
+        for t in terms:
             if t >= 0:
                 before = f"{rule[inputs[t]]} and " if inputs[t] in rule else ""
                 rule[inputs[t]] = before + names[t]
-    columns: dict = {
-        ("if", model.input_names[j]): [rule.get(j) for rule in terms]
-        for j in sorted({j for rule in terms for j in rule})
-    }
-    columns["data", "weight"] = model.rule_weights
-    columns["data", "rows"] = model.rule_rows
-    consequents = np.zeros((model.n_rules, 1 + model.n_inputs, model.n_outputs))
-    consequents[:, : model.coefficients.shape[1]] = model.coefficients
-    consequents[:, 0] += np.einsum("j,rjo->ro", reference - model.reference, consequents[:, 1:])
-    for k, output in enumerate(model.output_names):
-        for i, name in enumerate(("constant", *model.input_names)):
-            columns[f"then {output}", name] = consequents[:, i, k]
-    return pd.DataFrame(columns, index=pd.RangeIndex(model.n_rules, name="rule"))
+    return [dict(sorted(rule.items())) for rule in rules]
 
 
-def premise_texts(frame):
+def premise_texts(model, levels=None):
     """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" of a rule that asks nothing."""
-    if "if" not in frame:
-        return ["anything"] * len(frame)
+    names = model.input_names
     return [
-        " AND ".join(condition(*one) for one in rule.items() if isinstance(one[1], str))
-        or "anything"
-        for rule in frame["if"].to_dict("records")
+        " AND ".join(condition(names[j], term, levels) for j, term in rule.items()) or "anything"
+        for rule in conditions(model)
     ]
 
 
-def condition(name, term):
-    """Say "temperature is low" or "rate > 6.8 ± 0.3"."""
-    return f"{name} {term}" if term.startswith(("<", ">")) else f"{name} is {term}"
+def condition(name, term, levels=None):
+    """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator.
+
+    ``levels`` are the raw columns and levels of indicators (``Reader.levels``).
+    """
+    if term.startswith(("<", ">")):
+        return f"{name} {term}"
+    if term in ("0", "1") and levels and name in levels:
+        column, level = levels[name]
+        return f"{column} is {'' if term == '1' else 'not '}{level}"
+    return f"{name} is {term}"
 
 
-def weightiest(frame, max_shown):
+def weightiest(model, max_shown):
     """The rules to show, the weightiest first."""
     if max_shown is not None:
         check_count("max_shown", max_shown, 1)
     # Rounded, so that rules alike but for rounding errors stay in the order of their numbers.
-    weight = np.round(frame["data", "weight"].to_numpy(), 9)
-    return frame.iloc[np.argsort(-weight, kind="stable")][:max_shown]
+    return np.argsort(-np.round(model.rule_weights, 9), kind="stable")[:max_shown].tolist()
 
 
 def rule_values(model, rows):
@@ -81,32 +69,11 @@ def has_training_data(model):
     return bool(np.any(model.rule_rows))
 
 
-def rounded_reference(model):
-    """The inputs' means, rounded to the leading digit of their spreads."""
-    digits = [int(np.floor(np.log10(spread))) for spread in model.spread]
-    return np.array([round(float(x), -d) for x, d in zip(model.reference, digits, strict=True)])
-
-
 def readability_in_training(estimator, model):
     """The fit's ``readability_`` in the names of ``model``, the whole; None where there is none."""
     last = None if isinstance(estimator, TSKModel) else last_step(estimator)
     found = getattr(last, "readability_", None)
     return None if found is None else replace(found, model=model)
-
-
-def warn_of_findings(estimator, model):
-    """Issue a ReadabilityWarning where the fit found that its rules cannot be read one by one."""
-    found = readability_in_training(estimator, model)
-    if found is not None and found.findings:
-        lines = [
-            "The rules are not fit to be read one by one:",
-            *(f"- {sentence}" for sentence in found.findings),
-            "The predictions may be good all the same. For rules that can be read, let them agree "
-            "more (agreement=0.01, say; it costs some accuracy), or take fewer terms (n_mfs) or "
-            "inputs (premise_features, consequent_features). skanfis.inspection.readability has "
-            "the figures.",
-        ]
-        warnings.warn("\n".join(lines), ReadabilityWarning, stacklevel=3)
 
 
 def writable(model):
@@ -138,15 +105,13 @@ def _checked_names(parameter, names, count):
     return tuple(names)
 
 
-def rules_table(estimator: Any, *, about: str = "origin") -> Any:
+def rules_table(estimator: Any) -> Any:
     """Tabulate the rules: what they ask, how much of the data they hold for, what they say.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
-    about : {"origin", "mean"}, default="origin"
-        Where the constants are the rule's value: at the origin, or the mean of the training inputs.
 
     Returns
     -------
@@ -154,17 +119,13 @@ def rules_table(estimator: Any, *, about: str = "origin") -> Any:
         One row per rule, by its number, with two levels of columns. ``"if"``: the term on each
         input, missing where the rule does not look at it. ``"data"``: "weight", the part of the
         training data on which it fires, and "rows", the number of rows on which it is the
-        strongest. ``"then y"``, per output: the "constant", and the slope by each input.
+        strongest. ``"at"``: its centre, the mean of the rows by its strength, or a place near it.
+        ``"then y"``, per output: the "value" that it says there, and the slope by each input.
 
     Raises
     ------
     ValueError
-        If a parameter is out of its range, or a step of a pipeline cannot be folded.
-
-    Warns
-    -----
-    ReadabilityWarning
-        If the fit found that the rules cannot be read one by one; see ``readability_``.
+        If a step of a pipeline cannot be folded.
 
     Examples
     --------
@@ -175,13 +136,23 @@ def rules_table(estimator: Any, *, about: str = "origin") -> Any:
     >>> list(rules["if", "x1"])
     ['low', 'high', 'low', 'high']
     >>> list(rules["then y"])
-    ['constant', 'x0', 'x1']
+    ['value', 'x0', 'x1']
     """
-    check_choice("about", about, ("origin", "mean"))
-    model = fold(estimator)
-    warn_of_findings(estimator, model)
-    reference = model.reference if about == "mean" else 0.0 * model.reference
-    return rules_frame(model, reference)
+    model = writable(fold(estimator))
+    asked, said = conditions(model), Sentences.of(model, MOST_DIGITS)
+    columns: dict = {
+        ("if", model.input_names[j]): [rule.get(j) for rule in asked]
+        for j in sorted({j for rule in asked for j in rule})
+    }
+    columns["data", "weight"] = model.rule_weights
+    columns["data", "rows"] = model.rule_rows
+    for j, name in enumerate(model.input_names):
+        columns["at", name] = said.places[:, j]
+    for k, output in enumerate(model.output_names):
+        columns[f"then {output}", "value"] = said.values[:, k]
+        for j, name in enumerate(model.input_names):
+            columns[f"then {output}", name] = said.slopes[:, j, k]
+    return pd.DataFrame(columns, index=pd.RangeIndex(model.n_rules, name="rule"))
 
 
 def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
@@ -285,7 +256,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     # Numbers of rules first, then those of the other lines.
     source = np.hstack([order, np.tile(np.arange(n_rules, strength.shape[1]), (n_rows, 1))])
     source = source[row, place]
-    texts = premise_texts(rules_frame(model, model.reference))
+    texts = premise_texts(model)
     texts += [*(f"beyond {name}" for name in model.input_names), "held"]
     return pd.DataFrame(
         {

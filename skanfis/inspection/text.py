@@ -3,35 +3,43 @@
 from collections.abc import Sequence
 from html import escape
 from math import floor, log10
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from .._validation import check_choice, check_count
-from ..export import fold
+from .._validation import check_count
+from ..export.folding import fold_with_reader
+from ..policies import policy_in_words
 from .rules import (
+    condition,
     has_training_data,
     premise_texts,
     readability_in_training,
     rename,
-    rounded_reference,
-    rules_frame,
-    warn_of_findings,
     weightiest,
     writable,
 )
+from .sentences import MOST_DIGITS, PRECISION, Sentences
 
-# More than these give back no other double.
-_MOST_DIGITS = 17
-_IN_PLACE = "It is added to what a rule says; a slope that a rule states stands in its place."
+# Letters of a line; digits of a range.
+_WIDTH, _DIGITS_OF_RANGE = 96, 3
+_HOW = (
+    "A prediction is the mean of what the rules say, weighted by how true their conditions are: "
+    "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; AND multiplies. A "
+    "rule says its value, less the common line's part in it, plus the common line, plus its own "
+    "slopes. What it errs is its RMSE alone, on the rows on which it is the strongest."
+)
+_IN_PLACE = (
+    "A part of every value is from this line; a slope that a rule states stands in its place."
+)
 
 
 def export_text(
     estimator: Any,
     *,
-    precision: int = 4,
-    about: str = "mean",
+    precision: int = PRECISION,
     max_shown: int | None = None,
     show_terms: bool = True,
     feature_names: Sequence[str] | None = None,
@@ -39,17 +47,17 @@ def export_text(
 ) -> str:
     """Write the rules as IF-THEN sentences in the units of the data.
 
-    Sentences and terms are the whole model: :doc:`/inspection`.
+    A rule says what it is about on its own rows, and by how much that changes with an input, and
+    from where. Sentences and terms are the whole model: :doc:`/inspection`.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
-    precision : int, default=4
-        Significant digits, from 1 to 17. Slopes that move no such digit are left out.
-    about : {"mean", "origin"}, default="mean"
-        Consequents by the inputs' distances from a round number near their mean, ``1.2 + 0.3 *
-        (temperature - 290)``, or in the textbook form, ``-85.8 + 0.3 * temperature``.
+    precision : int, default=2
+        Numbers are written to so many digits of what the noise's standard deviation makes of them,
+        from 1 to 17: with noise of 3.2, values to 0.1. Slopes that make no such digit over a
+        standard deviation of their input are left out.
     max_shown : int, default=None
         Most rules to write, the weightiest first; None for all.
     show_terms : bool, default=True
@@ -60,18 +68,15 @@ def export_text(
     Returns
     -------
     text : str
-        Rules by their number, with the part of the training data on which each fires, and the
-        number of rows on which it is the strongest. A last line says what was left out.
+        Rules by their number, with the part of the training rows on which each is the strongest,
+        and the RMSE of the rule alone there. The last lines say how many numbers there are, what
+        the text as printed errs over the model on the training rows (with the default precision),
+        and what the fit found against reading the rules one by one.
 
     Raises
     ------
     ValueError, TypeError
         If a parameter is out of its range, a step cannot be folded, or there are no rules.
-
-    Warns
-    -----
-    ReadabilityWarning
-        If the fit found that the rules cannot be read one by one; see ``readability_``.
 
     Examples
     --------
@@ -81,45 +86,48 @@ def export_text(
     >>> hours = np.linspace(0.0, 10.0, 41).reshape(-1, 1)
     >>> drift = 0.1 * hours[:, 0] + 5.0 * np.exp(-hours[:, 0])
     >>> model = ANFISRegressor(n_mfs=2, solver="lse", agreement=0.1).fit(hours, drift)
-    >>> print(export_text(model, precision=3, feature_names=["hours"], show_terms=False))
+    >>> print(export_text(model, feature_names=["hours"], show_terms=False))
     2 rules, 1 input.
     <BLANKLINE>
-    Rule 0, 50 % of the weight, strongest on 21 rows:
+    Rule 0, strongest on 51 % of the rows, errs by 0.86 there:
       IF hours is low
-      THEN y = 0.338 - 0.555 * (hours - 5)
+      THEN y is about 1.17: -0.55 per hours from 3.5
     <BLANKLINE>
-    Rule 1, 50 % of the weight, strongest on 20 rows:
+    Rule 1, strongest on 49 % of the rows, errs by 0.41 there:
       IF hours is high
-      THEN y = 0.649 + 0.195 * (hours - 5)
+      THEN y is about 0.94: +0.2 per hours from 6.5
+    <BLANKLINE>
+    6 numbers; the text as printed errs as much as the model.
+    Rules go different ways, beyond chance: by hours up in rule 1 and down in rule 0.
     """
-    check_count("precision", precision, 1, _MOST_DIGITS)
-    check_choice("about", about, ("mean", "origin"))
-    model = rename(fold(estimator), feature_names, output_names)
-    warn_of_findings(estimator, model)
-    reference = rounded_reference(model) if about == "mean" else 0.0 * model.reference
-    frame = rules_frame(model, reference)
-    chosen = weightiest(frame, max_shown)
-    consequents, common = _consequent_texts(model, frame, reference, precision)
+    check_count("precision", precision, 1, MOST_DIGITS)
+    folded, reader = fold_with_reader(estimator)
+    model = rename(folded, feature_names, output_names)
+    said, found = Sentences.of(model, precision), readability_in_training(estimator, model)
+    levels = reader.levels
+    chosen = weightiest(model, max_shown)
     parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
-    parts += [f"Common to the rules, {name}: {text}" for name, text in common.items()]
+    common = _common_lines(said, levels)
+    parts += [fill(f"Common to the rules, {line}.", _WIDTH) for line in common]
     if common:
         parts[-1] += f"\n{_IN_PLACE}"
-    for r, premise in zip(chosen.index, premise_texts(chosen), strict=True):
-        heading = f"Rule {r}"
-        if has_training_data(model):
-            rows = rows_text(model.rule_rows[r])
-            share = f"{100.0 * model.rule_weights[r]:.3g} %"
-            heading += f", {share} of the weight, strongest on {rows}"
-        then = "\n   AND ".join(f"{name} = {texts[r]}" for name, texts in consequents.items())
-        parts.append(f"{heading}:\n  IF {premise}\n  THEN {then}")
+    premises = premise_texts(said.model, levels)
+    for r in chosen:
+        heading = ", ".join([f"Rule {r}", *_on_rows(model, found, r)])
+        then = "\n".join(
+            fill(f"{word} {sentence}", _WIDTH, initial_indent="  ", subsequent_indent="       ")
+            for word, sentence in zip(_words(model), _conclusions(said, r, levels), strict=True)
+        )
+        parts.append(f"{heading}:\n  IF {premises[r]}\n{then}")
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
     if show_terms:
-        parts.append(_legend(model, precision))
+        parts.append(_legend(said, precision))
+    parts.append("\n".join(_last_lines(said, found, precision)))
     return "\n\n".join(parts)
 
 
-def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = 4) -> str:
+def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = PRECISION) -> str:
     """Write the rules as HTML, the weightiest first.
 
     Parameters
@@ -128,13 +136,14 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = 4) -> st
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     max_shown : int, default=10
         Most rules to show; a last line says what was left out.
-    precision : int, default=4
-        Significant digits of the numbers, from 1 to 17.
+    precision : int, default=2
+        As of :func:`export_text`.
 
     Returns
     -------
     html : str
-        One ``<div>``, with names escaped, and nothing to run or to load; ``readability_`` below.
+        One ``<div>``, with names escaped, and nothing to run or to load; what speaks against
+        reading the rules one by one is folded away below them.
 
     Raises
     ------
@@ -149,88 +158,121 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = 4) -> st
     >>> rules_html(ANFISRegressor(n_mfs=3).fit(*make_jang_sinc())).count("</tr>")
     11
     """
-    check_count("precision", precision, 1, _MOST_DIGITS)
-    model = writable(fold(estimator))
-    reference = rounded_reference(model)
-    frame = rules_frame(model, reference)
-    chosen = weightiest(frame, max_shown)
-    consequents, common = _consequent_texts(model, frame, reference, precision)
+    check_count("precision", precision, 1, MOST_DIGITS)
+    folded, reader = fold_with_reader(estimator)
+    model, levels = writable(folded), reader.levels
+    said, found = Sentences.of(model, precision), readability_in_training(estimator, model)
+    chosen, premises = weightiest(model, max_shown), premise_texts(said.model, levels)
     cells: dict = {}
     if has_training_data(model):
-        notes = np.where(chosen["data", "rows"] < 0.5, " (no row)", "")
-        shares = zip(chosen["data", "weight"], notes, strict=True)
-        cells["data", "weight"] = [f"{100.0 * share:.3g} %{note}" for share, note in shares]
-    for name in chosen.get("if", ()):
-        low, high = range_text(model, model.input_names.index(name), precision)
-        cells["if", f"{name}, {low} to {high}"] = chosen["if", name].fillna("any")
-    for name, texts in consequents.items():
-        cells["then", name] = [texts[r] for r in chosen.index]
+        cells["data", "rows"] = [_share(model, r) for r in chosen]
+        if found is not None:
+            cells["data", "error"] = [_errors(found, r) for r in chosen]
+    cells["rule", "if"] = [premises[r] for r in chosen]
+    for k, name in enumerate(model.output_names):
+        cells["then", name] = [_conclusion(said, r, k, levels) for r in chosen]
     with pd.option_context("display.max_colwidth", None):
-        table = pd.DataFrame(cells, index=list(chosen.index))
+        table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}"
     parts = [f"<div>{counts}</div>", table]
-    parts += [
-        f"<div>common to the rules, {escape(name)}: {escape(text)}. {_IN_PLACE}</div>"
-        for name, text in common.items()
-    ]
+    lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said, levels)]
     if len(chosen) < model.n_rules:
-        parts.append(f"<div>and {_left_out(model, chosen)}</div>")
-    found = readability_in_training(estimator, model)
-    parts += [f"<div>{escape(line)}</div>" for line in str(found or "").splitlines()]
+        lines.append(f"and {_left_out(model, chosen)}")
+    numbers, *findings = _last_lines(said, found, precision)
+    parts += [f"<div>{escape(line)}</div>" for line in [*lines, numbers]]
+    if findings:
+        told = "".join(f"<div>{escape(line)}</div>" for line in findings)
+        parts.append(f"<details><summary>Can they be read one by one?</summary>{told}</details>")
     style = "font-family:sans-serif;font-size:90%;margin:0.5em 0"
     return f'<div style="{style}">{"".join(parts)}</div>'
 
 
-def _consequent_texts(model, frame, reference, precision):
-    """By output and rule "a + b * (x - x0) + ..."; by output what all rules have in common."""
-    texts, common = {}, {}
-    is_common = np.pad(model.common_slopes, ((0, 0), (1, 0)))
-    first = is_common.argmax(axis=0), np.arange(1 + model.n_inputs)
-    for output in model.output_names:
-        values = frame[f"then {output}"].to_numpy(copy=True)
-        # Slopes that move the output by less than the last digit written.
-        change = np.abs(values[:, 1:]) * (model.maximum - model.minimum)
-        scale = max(np.abs(values[:, 0]).max(), change.max(initial=0.0))
-        is_small = change < 10.0 ** -(precision + 2) * scale
-        # Where others have one in common, it would be taken for theirs.
-        is_small &= is_small.all(axis=0) | ~is_common[:, 1:].any(axis=0)
-        values[:, 1:][is_small] = 0.0
-        line = np.where(is_common.any(axis=0), values[first], 0.0)
-        if line.any():
-            common[output] = _formula(line, model.input_names, reference, precision)
-        values[is_common] = 0.0
-        texts[output] = [_formula(row, model.input_names, reference, precision) for row in values]
-    return texts, common
+def _common_lines(said, levels):
+    """Of every output that has one: "y: -0.12 per rate from 20, ..."."""
+    model = said.model
+    slopes = [
+        _slopes(said, said.common[:, k], said.common_place, said.common[:, k] != 0.0, levels)
+        for k in range(model.n_outputs)
+    ]
+    pairs = zip(model.output_names, slopes, strict=True)
+    return [f"{name}: {', '.join(own)}" for name, own in pairs if own]
 
 
-def _formula(coefficients, input_names, reference, precision):
-    text = number(coefficients[0], precision) if coefficients[0] else ""
-    for name, slope, origin in zip(input_names, coefficients[1:], reference, strict=True):
-        if slope == 0.0:
-            continue
-        # A name such as "rate / s" would be read as arithmetic.
-        factor = name if name.isidentifier() else f"[{name}]"
-        if origin != 0.0:
-            factor = f"({factor} {'-' if origin > 0.0 else '+'} {abs(origin):.15g})"
-        sign = "-" if slope < 0.0 else "+"
-        text += f" {sign} {number(abs(slope), precision)} * {factor}"
-    return text.removeprefix(" + ").removeprefix(" ") or number(0.0, precision)
+def _words(model):
+    return ["THEN", *[" AND"] * (model.n_outputs - 1)]
 
 
-def _legend(model, precision):
-    lines = ["Terms:"]
-    memberships = model.memberships()
+def _conclusions(said, r, levels):
+    """Of every output what rule r says: "y is about 33.6, of it +4.2 from the common line: ..."."""
+    names = said.model.output_names
+    return [f"{name} is {_conclusion(said, r, k, levels)}" for k, name in enumerate(names)]
+
+
+def _conclusion(said, r, k, levels):
+    own = _slopes(said, said.slopes[r, :, k], said.places[r], said.is_own[r, :, k], levels)
+    has_common = (said.model.common_slopes[r] & (said.common[:, k] != 0.0)).any()
+    text = f"{'about ' if own or has_common else ''}{plain(said.values[r, k])}"
+    if said.of_common[r, k]:
+        text += f", of it {_signed(said.of_common[r, k])} from the common line"
+    return f"{text}: {', '.join(own)}" if own else text
+
+
+def _slopes(said, slopes, places, is_said, levels):
+    """Say "+5.8 per rooms from 6.3", or "-2.1 if private is 1"."""
+    parts = []
+    for j in np.flatnonzero(is_said):
+        name, slope, place = said.model.input_names[j], slopes[j], places[j]
+        if said.two_valued[j]:
+            other = 1.0 - place
+            case = condition(name, plain(other), levels)
+            parts.append(f"{_signed(slope * (other - place))} if {case}")
+        else:
+            parts.append(f"{_signed(slope)} per {name} from {plain(place)}")
+    return parts
+
+
+def _on_rows(model, found, r):
+    """On which part of the rows a rule is the strongest, and what it errs there alone."""
+    if not has_training_data(model):
+        return []
+    share = [f"strongest on {_share(model, r)} of the rows"]
+    return share if found is None else [*share, f"errs by {_errors(found, r)} there"]
+
+
+def _share(model, r):
+    share = 100.0 * model.rule_rows[r] / model.rule_rows.sum()
+    return f"{share:{'.0f' if share >= 10.0 else '.2g'}} %"
+
+
+def _errors(found, r):
+    errors, names = found.rule_errors[r], found.model.output_names
+    if len(names) == 1:
+        return number(errors[0], 2)
+    return ", ".join(f"{number(e, 2)} ({n})" for e, n in zip(errors, names, strict=True))
+
+
+def _last_lines(said, found, precision):
+    """How many numbers there are to read, and, after a fit, what speaks against reading them."""
+    if found is None or precision != PRECISION:
+        return [f"{_count(said.reading_cost, 'number')}."]
+    return str(found).splitlines()
+
+
+def _legend(said, precision):
+    model, lines = said.model, ["Inputs, as they were trained:"]
+    named = [
+        term
+        for term, is_said in zip(model.memberships(), said.says_where, strict=True)
+        if not is_said
+    ]
     for j, name in enumerate(model.input_names):
-        low, high = range_text(model, j, precision)
-        heading = f"  {name}, trained from {low} to {high}"
-        terms = [term for term in memberships if term["input"] == name]
-        lines.append(heading if terms else f"{heading}: no terms")
+        lines.append(f"  {name}: {' to '.join(range_text(model, j))}")
+        terms = [term for term in named if term["input"] == name]
         width = max((len(term["name"]) for term in terms), default=0)
-        lines += [
-            f"    {term['name'] + ':':<{width + 1}} {_term_text(term, precision)}" for term in terms
-        ]
-    lines.append(f"Outside these ranges: {model.policy}.")
+        lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term)}" for term in terms]
+    words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
+    lines.append(fill(f"Outside these ranges {words}: {model.policy}.", _WIDTH))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         ends = [low, high]
         if np.isfinite(ends).all():
@@ -244,31 +286,42 @@ def _legend(model, precision):
         noise = zip(model.output_names, model.posterior.noise, strict=True)
         values = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)
         lines.append(f"Standard deviation of the noise about the rules: {values}.")
-    return "\n".join(lines)
+    if model.target is not None:
+        spread = zip(model.output_names, model.target.spread, strict=True)
+        values = ", ".join(f"{name} {number(value, precision)}" for name, value in spread)
+        lines.append(f"Standard deviation of the target: {values}.")
+    return "\n".join([*lines, "", fill(_HOW, _WIDTH)])
 
 
-def _term_text(term, precision):
+def _term_text(term):
     """Write "gaussian, center 21.3, width 4.2" of an entry of TSKModel.memberships."""
     numbers = {k: v for k, v in term.items() if k not in ("input", "name", "function")}
-    location, *lengths = numbers.values()
-    written = [place(location, precision, lengths[0])]
-    written += [number(length, precision) for length in lengths]
-    pairs = zip(numbers, written, strict=True)
-    return ", ".join([term["function"], *(f"{name} {value}" for name, value in pairs)])
+    # Of a logarithm the last digit is rounding's.
+    return ", ".join([term["function"], *(f"{k} {number(v, 15)}" for k, v in numbers.items())])
 
 
 def _left_out(model, chosen):
     text = _count(model.n_rules - len(chosen), "rule")
     if not has_training_data(model):
         return text
-    weight = max(1.0 - chosen["data", "weight"].sum(), 0.0)
+    weight = max(1.0 - model.rule_weights[chosen].sum(), 0.0)
     return f"{text} with {100.0 * weight:.3g} % of the weight"
 
 
-def range_text(model, j, precision):
+def range_text(model, j):
     """Lowest and highest value of input j in training."""
     low, high = model.minimum[j], model.maximum[j]
-    return [place(edge, precision, (high - low) or model.spread[j]) for edge in (low, high)]
+    resolution = (high - low) or model.spread[j]
+    return [place(edge, _DIGITS_OF_RANGE, resolution) for edge in (low, high)]
+
+
+def plain(value):
+    """A number that has been rounded, as it is."""
+    return repr(float(value) + 0.0).removesuffix(".0")
+
+
+def _signed(value):
+    return f"{'-' if value < 0.0 else '+'}{plain(abs(value))}"
 
 
 def number(value, precision):
@@ -281,11 +334,6 @@ def place(value, precision, resolution):
     """Write a place on an axis, to so many digits of a length that matters there."""
     rounded = round(float(value), precision - floor(log10(resolution)))
     return repr(rounded + 0.0).removesuffix(".0")
-
-
-def rows_text(count):
-    """Write "13 rows"; weights make fractions of rows."""
-    return _count(f"{count:.0f}" if count >= 10.0 else f"{count:.2g}", "row")
 
 
 def _count(number_of, what):

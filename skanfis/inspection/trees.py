@@ -12,15 +12,16 @@ from ..model import TSKModel
 from .displays import _position, _pyplot, _section
 from .labels import as_label
 from .rules import condition, writable
-from .text import number
+from .sentences import Sentences
+from .text import plain
 
 # Inches: of a letter, of a leaf, around the tree.
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
 # Line widths, in points, of a branch that no row takes and more of one that all do.
 _THIN, _THICK = 0.6, 6.0
-# Digits of a leaf's value; points of the plane along each input; parts of the plane's sides that
-# the place of a leaf must have for its value to stand there.
-_DIGITS, _N_POINTS, _ROOM = 3, 200, np.array([0.13, 0.07])
+# Points of the plane along each input; parts of the plane's sides that the place of a leaf must
+# have for its value to stand there.
+_N_POINTS, _ROOM = 200, np.array([0.13, 0.07])
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -98,16 +99,12 @@ class TreeDisplay:
     @property
     def values(self) -> np.ndarray:
         """Of every leaf, the rule's value where its rows lie, (n_rules,)."""
-        model, coefficients = self.model, self.model.coefficients[:, :, self.output]
-        if model.support is None or not model.order:
-            return coefficients[:, 0]
-        away = model.support.center - model.reference
-        return coefficients[:, 0] + np.einsum("rj,rj->r", away, coefficients[:, 1:])
+        return Sentences.of(self.model).values[:, self.output]
 
     @property
     def leaves(self) -> list[str]:
         """Of every leaf, what stands at it."""
-        values = [number(value, _DIGITS) for value in self.values]
+        values = [plain(value) for value in self.values]
         shares = [f"{100.0 * share:.2g} %" for share in self.model.rule_weights]
         return [f"{value}  ({share})" for value, share in zip(values, shares, strict=True)]
 
@@ -207,5 +204,5 @@ class TreeDisplay:
             (low if is_above else high)[k] = cut
         if (high - low > room).all():
             box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "boxstyle": "round"}
-            middle, text = 0.5 * (low + high), number(value, _DIGITS)
+            middle, text = 0.5 * (low + high), plain(value)
             ax.text(*middle, text, fontsize="small", ha="center", va="center", bbox=box)

@@ -2,8 +2,7 @@
 
 Rules come from a search, or are given: by terms per input, by a clusterer, by a model. Of rules
 that are given the weights are found in the same way, on a sample. Their terms may leave their
-bounds, as in classic ANFIS, where that leaves less than a tenth of the expected squared error:
-for data next to exact.
+bounds, as in classic ANFIS, where that leaves less than nine tenths of the expected squared error.
 """
 
 from dataclasses import dataclass, field, replace
@@ -35,10 +34,10 @@ from .tuning import (
     with_most_agreement,
 )
 
+# What terms without bounds must leave of the expected squared error: nearer, chance decides.
+_LESS_ERROR = 0.9
 # The weights of rules that are given are found on at most so many representative rows.
 _MOST_ROWS = 1000
-# What terms without bounds must leave of the expected squared error.
-_LESS_ERROR = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +60,9 @@ def started(tuned: Tuned, plan: Plan, left: float, candidates, is_free=False) ->
     ``left`` is the factor by which the squared error may still rise.
     """
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
-    premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
-    if not is_free:
-        tuned = with_most_agreement(tuned, premise, plan.free, n_rows, left)
+    low, high = problem.rows.inputs.box
+    premise = Premise.of(problem.antecedent, low, high, is_free)
+    tuned = with_most_agreement(tuned, premise, plan.free, n_rows, left)
     return Start(
         problem.antecedent,
         scaled(tuned.penalty, plan.free, n_rows / plan.n_all, tuned.agreement_is_raised),

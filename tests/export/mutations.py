@@ -11,21 +11,8 @@ from .rule_bases import MODELS, build
 
 HOSTILE = [
     *(b"nan", b"-Infinity", b"1e999", b"1e50", b"-9.9e49", b"0", b"1_0", b"9" * 5000, b"1,,2"),
-    *(
-        b"",
-        b"\x00",
-        b"\xff\xfe",
-        b"\r",
-        b"\n\n",
-        b"\t",
-        b"'",
-        b"[",
-        b"]",
-        b"=",
-        b"(",
-        b"%",
-        b"[Rules]",
-    ),
+    *(b"", b"\xff\xfe", b"\n\n", b"[Rules]"),
+    *(bytes([one]) for one in b"\x00\r\t'[]=(%"),
     *(b"NumRules=100000", b"NumMFs=10000", b"NumInputs=1000", b"MF1='x':'trimf',[0 0 0]"),
     *(b"__import__('os').system('true')", b"'sigmf'", b"'trimf'", b"'mamdani'", b"1 1, 1 (1) : 1"),
 ]

@@ -12,22 +12,21 @@ from sklearn.cluster import KMeans
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import RobustScaler
 
+from skanfis.antecedent import RuleTableAntecedent
 from skanfis.bounds import bounds
 from skanfis.export import export_c, fold
 from skanfis.export.c.builder import in_digits
 from skanfis.export.c.dialect import STATUS
 from skanfis.export.c.self_test import size_of_sum
 from skanfis.learning import VariableProjection
-from skanfis.membership import MEMBERSHIPS, Gaussian
-from skanfis.model import TSKModel
+from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation
 from skanfis.policies import OUT_OF_BOUNDS
 
-from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from .every_model import CASES, FEWEST, full_scale, rows, surface
-from .rule_bases import MODELS
+from .rule_bases import MODELS, build
 
 MIN_COVERAGE = 0.3
 TOLERANCE = {"double": 1e-12, "float": 1e-5}
@@ -387,12 +386,11 @@ def test_bad_argument(arguments, message):
         export_c(CASES[0].model, **arguments)
 
 
-def test_grid_too_deep_for_c89():
-    antecedent = random_grid(np.random.default_rng(0), [Gaussian] * 13, [2] * 13)
-    n_rules, ones = antecedent.n_rules, np.ones(13)
-    names = tuple(f"x{j}" for j in range(13))
-    parts = (np.ones((n_rules, 1, 1)), 0.0 * ones, ones, -ones, ones)
-    model = TSKModel(antecedent, antecedent, *parts, *np.ones((2, n_rules)), names)
-    with pytest.raises(ValueError, match=r"12 loops in one another .* terms on 13 inputs"):
-        export_c(model, name="m", std="c89")
-    assert export_c(model, name="m").cost.exponentials == 26
+@needs_compiler
+@pytest.mark.parametrize("policy", ["clip", "linear"])
+def test_rules_that_look_at_nothing_are_their_mean(policy, tmp_path):
+    antecedent = RuleTableAntecedent((), np.empty((3, 0), dtype=int))
+    model = build(antecedent, out_of_bounds=policy)
+    X = rows(np.float64, 50)
+    found, _ = answers_of(export_c(model, name="m", min_coverage=None), X, tmp_path)
+    np.testing.assert_allclose(found, model.predict(X), rtol=1e-12)

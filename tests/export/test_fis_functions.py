@@ -98,6 +98,7 @@ def test_what_is_written_is_the_family_and_is_read(family, rng):
         ("trapmf", [-1.0, 0.5, 0.5, 2.0]),  # no plateau
         ("pimf", [-1.0, 0.5, 0.5, 2.0]),
         ("dsigmf", [-3.0, 1.0, -3.0, -1.0]),  # both sigmoids fall
+        ("dsigmf", [3.0, 1.0, 3.0, -1.0]),  # the greater place first
         ("psigmf", [-3.0, 1.0, 2.0, -1.0]),  # the fall first
         ("psigmf", [3.0, 1.0, 2.0, -1.0]),  # the greater place first
     ],

@@ -72,12 +72,18 @@ def test_curves_and_pairs_are_means_over_the_product(kind):
             assert_allclose(pair["effect"][b, a], expected, atol=1e-9)
 
 
-def test_terms_are_shares_and_the_strongest_inputs_are_shown():
+def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
     model = KINDS["grid"]
     X = rows_of(model, 1.0, 30)
     display = EffectsDisplay.from_estimator(model, X)
     for curve in display.curves:
-        assert_allclose(curve["terms"].sum(axis=0), 1.0)
+        group = next(
+            one
+            for one in model.antecedent.groups
+            if model.input_names[one.inputs[0]] == curve["input"]
+        )
+        expected = group.family.value(np.tile(curve["points"], (group.n_terms, 1)), group.theta)
+        assert_allclose(curve["terms"], expected, atol=1e-9)
     fewer = EffectsDisplay.from_estimator(model, X, max_shown=1)
     assert [one["input"] for one in fewer.curves] == [display.curves[0]["input"]]
     with pytest.raises(ValueError, match="max_shown"):

@@ -1,4 +1,4 @@
-"""Readability: its tables and sentences, pipelines and tables of every kind, the warning."""
+"""Readability: its tables and sentences, pipelines and tables of every kind."""
 
 from dataclasses import replace
 
@@ -10,16 +10,12 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.antecedent import TreeAntecedent
-from skanfis.exceptions import ReadabilityWarning
 from skanfis.inspection import (
     export_text,
     measures,
     readability,
     rules_html,
-    rules_table,
 )
-from skanfis.inspection.measures import crossings
 from skanfis.inspection.readability import readability_of_rows
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
@@ -33,34 +29,26 @@ def found_of(model, **changes):
     X = rows_of(model, 1.0)
     y = np.random.default_rng(0).normal(size=(len(X), model.n_outputs))
     found = readability_of_rows(model, X, y)
-    passing = {"truth": np.ones_like(found.measures.truth), "alone": np.full(model.n_outputs, 0.5)}
+    ones, rows = np.ones(model.n_outputs), np.full(model.n_rules, 50.0)
+    passing = {"alone": 0.5 * ones, "errors": ones, "printed_errors": ones, "rule_rows": rows}
     return replace(found, measures=replace(found.measures, **(passing | changes)))
 
 
 @pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 def test_tables_hold_the_measures(model):
-    found = readability_of_rows(model, rows_of(model, 1.0))
-    measures, terms, rules = found.measures, found.terms, found.rules
-    assert_array_equal(terms["greatest_truth"], measures.truth[terms.index])
-    assert_array_equal(terms["crossing"], crossings(model.antecedent)[terms.index])
-    every = model.memberships()
-    assert [(every[t]["input"], every[t]["name"]) for t in terms.index] == list(
-        zip(terms["input"], terms["term"], strict=True)
+    found = readability_of_rows(
+        model, rows_of(model, 1.0), 2.0 * rows_of(model, 1.0)[:, -1:] + np.zeros(model.n_outputs)
     )
-    for name in set(terms["input"]):
-        own = terms.index[terms["input"] == name]
-        gaps = np.diff([list(every[t].values())[3] for t in own])
-        # Both sides of a cut have one place.
-        assert np.all(gaps >= 0.0 if isinstance(model.antecedent, TreeAntecedent) else gaps > 0.0)
+    measures, rules = found.measures, found.rules
     for k, output in enumerate(model.output_names):
         own = rules[rules["output"] == output]
         assert_array_equal(own.index, np.arange(model.n_rules))
         assert_array_equal(own["weight"], measures.rule_weights)
         assert_array_equal(own["rows"], measures.rule_rows)
         assert_array_equal(own["alone"], measures.rule_alone[:, k])
-    expected = [measures.alone.max(), terms["greatest_truth"].min(), terms["crossing"].max()]
-    assert_array_equal(found.summary, expected)
-    assert set(found.limits) == set(found.summary.index)
+        assert_array_equal(own["error"], measures.rule_errors[:, k] * measures.deviation[k])
+    ratio = (measures.printed_errors / measures.errors).max()
+    assert_array_equal(found.summary, [measures.alone.max(), ratio])
 
 
 def test_the_numerals_of_the_sentences_are_counted():
@@ -74,46 +62,53 @@ def test_the_numerals_of_the_sentences_are_counted():
 
 def test_what_is_common_counts_once():
     common = A_GRID.coefficients.copy()
-    common[:, 2] = 3.0
-    common[1:, 1] = 2.0
+    common[:, 2] = 3.0 / 15.0
+    common[1:, 1] = 2.0 / 600.0
     # Twelve of the last slope, two and one of what is common.
     found = found_of(replace(A_GRID, coefficients=common))
     assert found.reading_cost == 12 * (3 + 1) + 12 + 2 + 1
 
 
 def test_nothing_is_found_at_the_limits():
-    found = found_of(A_GRID)
+    found = found_of(A_GRID, printed_errors=np.array([1.05]))
     assert found.findings == []
-    assert str(found).splitlines()[1:] == [WELL]
+    assert str(found).splitlines() == [
+        "84 numbers; the text as printed errs 5 % more than the model.",
+        WELL,
+    ]
     assert found.rules["if"][0] == "time is low AND chip temperature is low AND rate is low"
+    assert found_of(A_GRID, errors=np.zeros(1)).line == "84 numbers"
 
 
 def test_what_is_beyond_a_limit_is_said():
-    truth = np.ones(7)
-    truth[0] = 0.49
-    (sentence,) = found_of(A_GRID, truth=truth).findings
-    assert sentence == "A term is never truer than 0.5 on any row: 'low' of 'time' (0.49)."
-    (sentence,) = found_of(A_GRID, truth=np.full(7, 0.123456)).findings
-    assert sentence.startswith("7 of 7 terms are never truer than 0.5 on any row: 'low' of 'time'")
-    assert sentence.endswith("(0.123) and 2 more.")
     (sentence,) = found_of(A_GRID, alone=np.array([0.51])).findings
     assert sentence.startswith("No rule can be read without the others: the strongest alone misses")
     two = found_of(MODELS["grid, order 1, 2 outputs"], alone=np.array([0.0, 3.0]))
     assert "No rule of 'y1'" in two.findings[0]
     assert two.summary["strongest_alone"] == 3.0
+    (sentence,) = found_of(A_GRID, printed_errors=np.array([1.06])).findings
+    assert sentence.startswith("The text as printed errs 1.06 times as much as the model: print")
+    (sentence,) = found_of(A_GRID, rule_rows=np.array([*[50.0] * 11, 6.0])).findings
+    assert sentence == (
+        "Strongest on fewer rows than its sentence has numbers: rule 11 (rows: 6, numbers: 7)."
+    )
 
 
-def test_neighbours_that_cannot_be_told_apart():
-    # Widths of ten times, which are all parameters but the location.
-    time, *others = A_GRID.antecedent.groups
-    theta = time.theta + np.log(10.0) * (np.arange(len(time.theta)) > 0)[:, None]
-    groups = (replace(time, theta=theta), *others)
-    wide = replace(A_GRID, antecedent=replace(A_GRID.antecedent, groups=groups))
-    height = crossings(wide.antecedent)[0]
-    assert found_of(wide).findings == [
-        f"Two terms can hardly be told apart, for they cross above 0.9: 'low' and 'high' of 'time' "
-        f"({height:.3g})."
-    ]
+def test_rules_that_go_different_ways_beyond_chance():
+    rng = np.random.default_rng(0)
+    X = pd.DataFrame(rng.normal(size=(500, 2)), columns=["rate", "time"])
+    y = np.abs(X["rate"]) + X["time"] + 0.1 * rng.standard_normal(500)
+    found = ANFISRegressor(partition="tree", max_rules=2).fit(X, y).readability_
+    (sentence,) = [one for one in found.findings if "ways" in one]
+    assert sentence == (
+        "Rules go different ways, beyond chance: by rate up in rule 0 and down in rule 1."
+    )
+    # Of a slope whose deviation is a hundred times as large nothing can be said.
+    posterior = replace(
+        found.model.posterior, consequents=100.0 * found.model.posterior.consequents
+    )
+    unsure = replace(found, model=replace(found.model, posterior=posterior))
+    assert not [one for one in unsure.findings if "ways" in one]
 
 
 def target_of(X):
@@ -121,9 +116,10 @@ def target_of(X):
 
 
 def assert_same(found, expected, rtol=1e-9):
-    assert_allclose(found.summary, expected.summary, rtol=rtol)
+    # Digits go by powers of ten of the units: what is printed is another model.
+    key = "strongest_alone"
+    assert_allclose(found.summary[key], expected.summary[key], rtol=rtol)
     assert_allclose(found.rules["alone"], expected.rules["alone"], rtol=rtol)
-    assert_allclose(found.terms["greatest_truth"], expected.terms["greatest_truth"], rtol=rtol)
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
@@ -132,7 +128,7 @@ def test_estimators_around_the_model_are_measured_in_their_own_units(fitted):
     y = target_of(X)
     found = readability(pipe, X, y)
     assert_same(found, readability(pipe[-1], pipe[:-1].transform(X), y))
-    assert list(found.terms["input"]) == ["kelvin"] * 3 + ["rate"] * 2
+    assert found.rules["if"][0] == "kelvin is low AND rate is low"
     assert_same(readability(pipe, X), readability(pipe, X, pipe.predict(X)))
 
 
@@ -160,41 +156,16 @@ def test_errors_name_the_row_and_the_column(monkeypatch):
         readability(None, X)
 
 
-def unreadable():
-    """A pipeline whose two rules were driven apart: 30 standard deviations up, and as many down."""
-    X = pd.DataFrame({"rate": np.linspace(-300.0, 300.0, 201)})
-    y = np.tanh(X["rate"] / 100.0)
-    pipeline = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2, solver="lse")).fit(X, y)
-    last = pipeline[-1]
-    apart = last.model_.coefficients.copy()
-    apart[:, 0, 0] += 30.0 * np.array([y.std(), -y.std()])
-    last.model_ = replace(last.model_, coefficients=apart)
-    last.readability_ = readability(last.model_, StandardScaler().fit_transform(X), y)
-    return pipeline, readability(pipeline, X, y)
-
-
-@pytest.mark.parametrize("read", [export_text, rules_table])
-def test_reading_rules_that_cannot_be_read_warns_once(read):
-    pipeline, found = unreadable()
-    with pytest.warns(ReadabilityWarning) as caught:
-        read(pipeline)
-    assert len(caught) == 1
-    assert caught[0].filename == __file__
-    title, *findings, what_helps = str(caught[0].message).splitlines()
-    assert title == "The rules are not fit to be read one by one:"
-    assert findings == [f"- {line}" for line in found.findings]
-    assert "let them agree more (agreement=0.01, say" in what_helps
-
-
 def test_findings_of_the_fit_are_in_the_names_of_the_whole():
-    pipeline, _ = unreadable()
-    last = pipeline[-1]
-    measures = replace(last.readability_.measures, truth=np.array([1.0, 0.2]), alone=np.zeros(1))
-    last.readability_ = replace(last.readability_, measures=measures)
-    with pytest.warns(ReadabilityWarning, match=r"'high' of 'rate' \(0\.2\)"):
-        export_text(pipeline)
-    with pytest.warns(ReadabilityWarning, match=r"'high' of 'turn rate' \(0\.2\)"):
-        export_text(pipeline, feature_names=["turn rate"])
+    X = pd.DataFrame({"rate": np.linspace(-300.0, 300.0, 201)})
+    y = np.abs(X["rate"]) + np.random.default_rng(0).normal(size=201)
+    model = ANFISRegressor(partition="tree", max_rules=2)
+    pipeline = make_pipeline(StandardScaler().set_output(transform="default"), model).fit(X, y)
+    assert "by x0 up in rule 0 and down in rule 1." in pipeline[-1].readability_.findings[0]
+    assert "by rate up in rule 0 and down in rule 1." in export_text(pipeline)
+    text = export_text(pipeline, feature_names=["turn rate"])
+    assert "by turn rate up in rule 0 and down in rule 1." in text
     page = rules_html(pipeline)
-    assert "Strongest rule alone 0 sd off the model" in page
-    assert "&#x27;high&#x27; of &#x27;rate&#x27; (0.2)" in page
+    assert "by rate up in rule 0 and down in rule 1." in page.partition("<details>")[2]
+    # In other digits than those that the fit has measured nothing is said of them.
+    assert "errs" not in export_text(pipeline, precision=5).splitlines()[-1]

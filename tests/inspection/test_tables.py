@@ -31,13 +31,14 @@ def test_rules_table_holds_consequents_and_support(model):
     assert_array_equal(table.index, np.arange(model.n_rules))
     assert_array_equal(table["data"]["weight"], model.rule_weights)
     assert_array_equal(table["data"]["rows"], model.rule_rows)
+    known = model.support.share > 0.0
+    assert_allclose(table["at"][known], model.support.center[known], rtol=1e-12)
     for k, name in enumerate(model.output_names):
-        consequents = table[f"then {name}"]
-        assert list(consequents) == ["constant", *NAMES]
-        assert_allclose(consequents, model.consequents[:, :, k], rtol=1e-12)
-        about_mean = rules_table(model, about="mean")[f"then {name}"]
-        assert_array_equal(about_mean["constant"], model.coefficients[:, 0, k])
-        assert_array_equal(about_mean[list(NAMES)], consequents[list(NAMES)])
+        said = table[f"then {name}"]
+        assert list(said) == ["value", *NAMES]
+        assert_allclose(said[list(NAMES)], model.consequents[:, 1:, k], rtol=1e-12)
+        at_center = model.consequents[:, 0, k] + np.sum(table["at"] * said[list(NAMES)], axis=1)
+        assert_allclose(said["value"], at_center, rtol=1e-9, atol=1e-9)
 
 
 def test_what_a_rule_does_not_look_at_is_missing():
@@ -64,8 +65,11 @@ def test_a_pipeline_is_told_in_raw_units():
     scaled = [term["center"] for term in pipe[-1].memberships_]
     assert_allclose(centers, pipe[0].mean_[0] + pipe[0].scale_[0] * np.array(scaled), rtol=1e-12)
     table = rules_table(pipe)
-    mean = table["then y", "constant"] + table["then y"][["kelvin", "rate"]] @ X.mean()
-    assert_allclose(mean, rules_table(pipe, about="mean")["then y", "constant"], rtol=1e-9)
+    scaled = rules_table(pipe[-1])
+    assert_allclose(table["then y", "value"], scaled["then y", "value"], rtol=1e-9)
+    strengths = pipe[-1].model_.strengths(pipe[0].transform(X))
+    centers = strengths.T @ X.to_numpy() / strengths.sum(axis=0)[:, None]
+    assert_allclose(table["at"], centers, rtol=1e-6)
 
 
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
@@ -119,5 +123,3 @@ def test_rules_come_by_falling_strength():
 def test_what_is_wrong_is_refused():
     with pytest.raises(ValueError, match="X lies outside the training data: 'time' in"):
         explain(A_GRID.with_out_of_bounds("raise"), rows_of(A_GRID, 2.0))
-    with pytest.raises(ValueError, match="about='here'"):
-        rules_table(A_GRID, about="here")

@@ -58,7 +58,6 @@ def test_a_fit_is_no_worse_than_the_mean(table, settings):
 
 # What is drawn is not there to be read.
 @pytest.mark.theory
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ReadabilityWarning")
 @given(tables(), settings_of_fit, st.floats(1.0, 1e3))
 def test_a_model_answers_everywhere_and_comes_back(table, settings, reach):
     model = fitted(table, settings)

@@ -1,23 +1,20 @@
 """The .c file: constant tables, and the functions that read them.
 
 The order of work is that of ``skanfis.model``. A grid normalises each input by itself and
-multiplies shares in nested loops: one exponential per term, not per rule and input. A tree parts
-the strength that comes to a node, from the root on: one exponential per node, nothing to normalise.
-"linear" is worked out only outside the box, by the derivative along the way back.
+multiplies shares: one exponential per term, not per rule and input. A tree parts the strength that
+comes to a node, from the root on: one exponential per node, nothing to normalise. "linear" is
+worked out only outside the box, by the derivative along the way back.
 """
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...policies import SILENT
 from . import templates
-from ._families import BODIES, COSTS, HELPERS
+from ._expressions import body_of, cost_of
 from .dialect import index_type, kept_lines
 
-# C89 promises 15 levels of nested blocks; the function and the loop over outputs take three.
-_MOST_LOOPS = 12
 # What there is nearly everywhere.
 _INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 
@@ -65,17 +62,9 @@ class Source:
     def __init__(self, numbers, dialect, policy, min_coverage, limits=None, is_part=False):
         self.numbers, self.dialect, self.policy = numbers, dialect, policy
         self.min_coverage, self.limits, self.is_part = min_coverage, limits, is_part
-        n_loops = len(numbers.counts or ())
-        if dialect.std == "c89" and n_loops > _MOST_LOOPS:
-            raise ValueError(
-                f"std='c89' has {_MOST_LOOPS} loops in one another at most, and the grid has "
-                f"terms on {n_loops} inputs. Export as 'c99', or put terms on fewer inputs."
-            )
         self.model, self.n_terms = numbers.model, numbers.model.antecedent.n_terms
         self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
         self.is_tree = numbers.nodes is not None
-        # Whether the terms of a table of rules follow from the order of its rules.
-        self.is_in_order = np.array_equal(numbers.rule_terms.ravel(), np.arange(self.n_terms))
         # Logarithms of terms, and the zero of "none".
         self.n_logarithms = self.n_terms + int((numbers.rule_terms == self.n_terms).any())
         self.facts = self._facts()
@@ -89,9 +78,8 @@ class Source:
         linear = self.policy == "linear" and not is_constant and bool(numbers.reach.any())
         moves = linear and numbers.tangent_group is not None
         facts = {
-            "shares": self.n_terms > 0 or not self.is_grid,
-            # Strengths that have to be made to sum to one.
-            "normal": (self.n_terms > 0 or not self.is_grid) and not self.is_tree,
+            # Strengths, of terms that a table has of every rule, have to be made to sum to one.
+            "normal": not self.is_tree and numbers.counts != (),
             "slopes": self.n_slopes > 0,
             "covers": covers,
             # Rows outside the box get no answer; are less covered; are followed along the tangent.
@@ -112,7 +100,7 @@ class Source:
         numbers, itemsize = self.numbers, self.numbers.dtype.itemsize
         n_inputs = self.model.n_inputs
         of_terms = [
-            len(terms.constants) * np.array(COSTS[terms.family.name]) for terms in numbers.terms
+            len(terms.constants) * np.array(cost_of(terms.family)) for terms in numbers.terms
         ]
         exponentials, logarithms, multiply_adds = map(int, sum(of_terms, np.zeros(3)))
         n_shares = self.n_terms if self.is_grid else self.model.n_rules
@@ -121,8 +109,8 @@ class Source:
             # The place on the sigmoid, its other side, and what goes above and below.
             n_shares, divisions = 0, self.n_terms // 2
             exponentials, logarithms, multiply_adds = divisions, 0, 4 * divisions
-        # Of a grid, products of shares: after two inputs, after three, ...
-        products = int(np.cumprod(numbers.counts or (), dtype=int)[1:].sum())
+        # Of a grid, products of shares.
+        products = self.model.n_rules * max(len(numbers.counts or ()) - 1, 0)
         # The strongest rule is asked, then all that have data.
         asked = "covers" in self.facts and 1 + int(np.count_nonzero(numbers.support[:, 0]))
         main, tangent = self.arrays()
@@ -151,21 +139,17 @@ class Source:
         """What follows the lines that include other files."""
         dialect, indices = self.dialect, ["r", "o"]
         main, tangent = self.arrays()
-        loops = [f"i{k}" for k in range(len(self.numbers.counts or ()))]
-        indices += ["j"] * (self.n_slopes > 0) + loops
-        indices += ["k"] * (not self.is_grid and not self.is_tree)
-        # What the place of a row is told by: z, and what the strengths are made of.
-        taken = ["z", "l" if self.is_grid else "w"] if "shares" in self.facts else ["z"]
+        indices += ["j"] * (self.n_slopes > 0) + ["k"] * ("normal" in self.facts)
+        # What the place of a row is told by: z, the shares of a grid's terms, and the strengths.
+        taken = ["z", "l", "w"] if self.numbers.counts else ["z", "w"]
         words = {
             "rejection": templates.rejection(self.policy, dialect.std).strip("\n"),
             "finite_input": templates.FINITE_INPUT.strip("\n"),
             "linkage": "static " if self.is_part else "",
-            "given": ", ".join(f"const $real *{name}" for name in taken),
             "taken": ", ".join(taken),
-            "coverage_indices": ", ".join(["r", *loops]),
             "tangent_given": "const $real *at, const $real *way, $int g"
             if "moves" in self.facts
-            else f"{', '.join(f'const $real *{name}' for name in taken)}, const $real *e",
+            else ", ".join(f"const $real *{name}" for name in [*taken, "e"]),
             "n_groups": str(1 + np.max(self.numbers.tangent_group, initial=0))
             if "moves" in self.facts
             else "1",
@@ -213,7 +197,7 @@ class Source:
         found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
         if self.n_terms and not self.is_tree:
             found["term_input"] = numbers.term_inputs
-        if not self.is_grid and not self.is_tree and not self.is_in_order:
+        if "normal" in facts:
             found["rule_terms"] = numbers.rule_terms
         if 0 < self.n_slopes < self.model.n_inputs:
             found["slope_input"] = numbers.slope_inputs
@@ -231,36 +215,27 @@ class Source:
             main["change"] = self.model.n_outputs
         if "normal" in self.facts:
             main["l"] = tangent["t"] = self.n_logarithms
-        if not self.is_grid:
-            # Of leaves, then of nodes.
-            main["w"] = tangent["s"] = self.model.n_rules + self.is_tree * self.n_terms // 2
+        # Of a tree those of its leaves, then of its nodes.
+        main["w"] = tangent["s"] = self.model.n_rules + self.is_tree * self.n_terms // 2
         if "moves" in self.facts:
             own = {name: main[name] for name in ("l", "w") if name in main}
             tangent |= own | {"z": self.model.n_inputs, "e": self.model.n_inputs}
         return main, tangent
 
     def _memberships(self):
-        """Functions of the families in use, after those that they call."""
+        """Functions of the families in use."""
         if self.is_tree:
-            return []
-        functions = []
+            return
         for family in {terms.family: None for terms in self.numbers.terms}:
-            suffixes = ["", "_slope"] if "linear" in self.facts else [""]
-            for suffix, body in zip(suffixes, BODIES[family], strict=False):
+            for suffix in ["", "_slope"] if "linear" in self.facts else [""]:
                 what = "Derivative of the logarithm" if suffix else "Logarithm"
                 head = f"/* {what} of a membership: {family.name}. */\n"
-                head += f"static $real $name_{family.name}{suffix}($real x, const $real *p)\n"
-                functions.append(self.dialect.write(f"{head}{{{body}}}\n"))
-        calls = "".join(functions)
-        helpers = [
-            self.dialect.write(code).lstrip()
-            for name, code in HELPERS.items()
-            if re.search(rf"\b{self.dialect.name}_{name}\(", calls)
-        ]
-        return helpers + functions
+                head += f"static $real $name_{family.name}{suffix}($real x, const $real *p)\n{{\n"
+                body = _indented(body_of(family, self.dialect, bool(suffix)))
+                yield f"{self.dialect.write(head)}{body}\n}}\n"
 
     def _strengths(self, logarithms, rules, slope):
-        """Terms, then shares (of a grid, in place) or strengths; or their derivatives along e."""
+        """Terms, then strengths; or the derivatives of their logarithms along e."""
         if self.is_tree:
             body = kept_lines(templates.TREE_SLOPE if slope else templates.TREE, self.facts)
             words = {"$n_nodes": self.n_terms // 2, "$n_rules": self.model.n_rules}
@@ -268,6 +243,8 @@ class Source:
                 body = body.replace(word, str(number))
             return _indented(body.splitlines())
         numbers, lines = self.numbers, []
+        if numbers.counts == ():
+            return _indented([f"{rules}[0] = {'0.0R' if slope else '1.0R'};"])
         for k, terms in enumerate(numbers.terms):
             at = _at(terms.start, "i")
             value = (
@@ -276,45 +253,27 @@ class Source:
             value += f" * e[$name_term_input[{at}]]" if slope else ""
             lines += _loop("i", len(terms.constants), [f"{logarithms}[{at}] = {value};"])
         finish = "$name_centre({0}, {1}, {2});" if slope else "$name_normalise({0}, {2});"
-        if self.is_grid:
-            for start, count in zip(numbers.block_starts, numbers.counts, strict=True):
-                of_input = (
-                    (f"{logarithms} + {start}", f"l + {start}") if start else (logarithms, "l")
-                )
-                lines.append(finish.format(*of_input, count))
-        else:
-            if self.n_logarithms > self.n_terms:
-                lines.append(f"{logarithms}[{self.n_terms}] = 0.0R;")
-            n_each = numbers.rule_terms.shape[1]
-            term = f"r * {n_each} + k" if self.is_in_order else "$name_rule_terms[r][k]"
-            total = _loop("k", n_each, [f"{rules}[r] += {logarithms}[{term}];"])
-            lines += _loop("r", self.model.n_rules, [f"{rules}[r] = 0.0R;", *total])
+        for start, count in zip(numbers.block_starts, numbers.counts or (), strict=True):
+            of_input = (f"{logarithms} + {start}", f"l + {start}") if start else (logarithms, "l")
+            lines.append(finish.format(*of_input, count))
+        if self.n_logarithms > self.n_terms:
+            lines.append(f"{logarithms}[{self.n_terms}] = 0.0R;")
+        # Strengths of a grid are products of shares; the rest is sums of logarithms.
+        first, join = ("1.0R", "*=") if self.is_grid and not slope else ("0.0R", "+=")
+        each = f"{rules}[r] {join} {logarithms}[$name_rule_terms[r][k]];"
+        of_rule = [f"{rules}[r] = {first};", *_loop("k", numbers.rule_terms.shape[1], [each])]
+        lines += _loop("r", self.model.n_rules, of_rule)
+        if not self.is_grid:
             lines.append(finish.format(rules, "w", self.model.n_rules))
         return _indented(lines)
 
     def _over_rules(self, template):
-        """What a template does with every rule r, its strength $w and its change $s."""
-        numbers = self.numbers
+        """What a template does with every rule r."""
         body = kept_lines(template, self.facts)
         body = body.replace("$n_slopes", str(self.n_slopes))
         selects = 0 < self.n_slopes < self.model.n_inputs
         body = body.replace("$input", "$name_slope_input[j]" if selects else "j")
-        if not self.is_grid:
-            body = body.replace("$w", "w[r]").replace("$s", "s[r]")
-            return _indented(_loop("r", self.model.n_rules, body.splitlines()))
-        if not numbers.counts:
-            body = body.replace("$w", "1.0R").replace("$s", "0.0R")
-            return _indented(["r = 0;", *body.splitlines()])
-        last = len(numbers.counts) - 1
-        lines = body.replace("$w", f"w{last}").replace("$s", f"s{last}").splitlines()
-        lines.append("++r;")
-        for k in reversed(range(last + 1)):
-            at = _at(numbers.block_starts[k], f"i{k}")
-            declared = [f"const $real w{k} = {f'w{k - 1} * ' if k else ''}l[{at}];"]
-            if "$s" in template:
-                declared.append(f"const $real s{k} = {f's{k - 1} + ' if k else ''}t[{at}];")
-            lines = _loop(f"i{k}", numbers.counts[k], declared + lines)
-        return _indented(["r = 0;", *lines])
+        return _indented(_loop("r", self.model.n_rules, body.splitlines()))
 
 
 def _at(start, index):

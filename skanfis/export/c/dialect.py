@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from ..._validation import check_choice
-from .._numbers import FLOOR, SMALLEST_LOG_SQUARE, rounded_within
+from .._numbers import rounded_within
 
 _DTYPES = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
 _INTEGERS = {"int_least16_t": np.dtype(np.int16), "int_least32_t": np.dtype(np.int32)}
@@ -59,9 +59,6 @@ class Dialect:
         """The template with everything filled in."""
         prefix = self.name.upper()
         words = {
-            "floor": self.number(FLOOR),
-            "log_floor": self.number(np.log(FLOOR)),
-            "smallest_log_square": self.number(SMALLEST_LOG_SQUARE),
             "name": self.name,
             "NAME": prefix,
             "real": self.real,

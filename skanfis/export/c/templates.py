@@ -96,10 +96,10 @@ covers        |    return p[0] * $EXP(-0.5R * beyond * beyond);
 covers        |}
 covers        |
 covers        |/* The coverage in the box, or a part of it that is enough. */
-covers        |static $real $name_coverage($given, $real enough)
+covers        |static $real $name_coverage(const $real *z, const $real *w, $real enough)
 covers        |{
 covers        |    $real covered = 0.0R;
-covers        |    $int $coverage_indices;
+covers        |    $int r;
 covers        |
 covers        |$add_support
 covers        |    return covered;
@@ -110,7 +110,7 @@ moves         |/* Adds the derivative along the way of inputs of group g, where 
 moves         |   the first are held elsewhere. */
 linear        |static void $name_tangent($tangent_given, $real *change)
 linear        |{
-linear shares |    $real $tangent_arrays;
+linear        |    $real $tangent_arrays;
 linear        |    $int $tangent_indices;
 linear        |
 moves         |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
@@ -119,7 +119,7 @@ moves         |        e[i] = group == g ? way[i] : 0.0R;
 moves         |        z[i] = group == 0 || group == g ? at[i] : $name_tangent_at[i];
 moves         |    }
 moves         |$strengths_inside
-linear shares |$strengths_slope
+linear        |$strengths_slope
 linear        |$add_changes
 linear        |}
 linear        |
@@ -150,7 +150,7 @@ linear        |
  silent       |    if (status != $NAME_IN_RANGE) {
  silent       |        return $NAME_REJECT(y, status);
  silent       |    }
- shares       |$strengths_inside
+              |$strengths_inside
               |
               |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
               |        sum[o] = 0.0R;
@@ -188,7 +188,7 @@ linear        |
  linear       |        }
  beyond       |    }
  covers       |    if (top * $name_near(z, $name_support[best]) < enough
- covers       |        && $name_coverage($taken, enough) < enough) {
+ covers       |        && $name_coverage(z, w, enough) < enough) {
  covers       |        status |= $NAME_UNCOVERED;
  covers       |    }
               |    /* Last, so that y may be x. */
@@ -242,12 +242,12 @@ TREE_SLOPE = """
 """
 ADD_SUPPORT = """
  |if (covered < enough && $name_support[r][0] > 0.0R) {
- |    covered += $w * $name_near(z, $name_support[r]);
+ |    covered += w[r] * $name_near(z, $name_support[r]);
  |}
 """
 ADD_RULE = """
-covers |if ($w > top) {
-covers |    top = $w;
+covers |if (w[r] > top) {
+covers |    top = w[r];
 covers |    best = r;
 covers |}
        |for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
@@ -255,7 +255,7 @@ covers |}
 slopes |    for (j = 0; j < $n_slopes; ++j) {
 slopes |        f += $name_consequents[r][o][1 + j] * z[$input];
 slopes |    }
-       |    sum[o] += $w * f;
+       |    sum[o] += w[r] * f;
        |}
 """
 ADD_CHANGE = """
@@ -265,7 +265,7 @@ slopes |    for (j = 0; j < $n_slopes; ++j) {
 slopes |        f += $name_consequents[r][o][1 + j] * z[$input];
 slopes |        ahead += $name_consequents[r][o][1 + j] * e[$input];
 slopes |    }
-       |    change[o] += $w * ($s * f + ahead);
+       |    change[o] += w[r] * (s[r] * f + ahead);
        |}
 """
 

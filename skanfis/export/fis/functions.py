@@ -96,20 +96,15 @@ def _about_middle(left, shoulder, right, other_shoulder):
     return [0.5 * (shoulder + other_shoulder), left, right, plateau]
 
 
-def _from_sigmoids(rise, fall):
-    return [0.5 * (rise + fall), 0.5 * (fall - rise)]
-
-
 def _difference_from_file(slope, place, other_slope, other_place):
-    if slope != other_slope or slope == 0.0:
+    if slope != other_slope:
         raise ValueError(
             f"dsigmf with slopes {slope:g} and {other_slope:g} is not supported: they must be the "
             "same and not zero. With two slopes the difference is below zero in one tail; use "
             "psigmf."
         )
-    # s(-u) = 1 - s(u): with both slopes negative the rise is the second sigmoid.
-    ends = (place, other_place) if slope > 0.0 else (other_place, place)
-    return [*_from_sigmoids(*ends), 1.0 / abs(slope)]
+    # It counts by its size: neither the sign of the slope nor the order makes a difference.
+    return _sides_from_file(slope, place, other_slope, other_place)[:3]
 
 
 def _sides_from_file(*numbers):
@@ -117,8 +112,9 @@ def _sides_from_file(*numbers):
     slopes, places = _from_the_left(numbers)
     if 0.0 in slopes:
         raise ValueError("a sigmoid of slope 0 is one half everywhere: leave it out.")
-    flanks = [1.0 / abs(slope) for slope in slopes]
-    return [*(_from_sigmoids(*places) if len(places) > 1 else places), *flanks]
+    left, *right = places
+    ends = [0.5 * (left + right[0]), 0.5 * (right[0] - left)] if right else [left]
+    return [*ends, *(1.0 / abs(slope) for slope in slopes)]
 
 
 def _from_the_left(numbers):

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from math import prod
 from os import PathLike
 from typing import NamedTuple
 
@@ -351,22 +352,16 @@ def _grid_rows(inputs, antecedents):
 
     A grid has at least two terms of one family, in order, on every input that it looks at.
     """
-    n_combinations = 1
-    for variable, column in zip(inputs, antecedents.T, strict=True):
-        own = np.unique(column)
-        if not own.any():
-            continue
-        n_combinations *= own.size
-        terms = [variable.terms[k - 1] for k in own]
-        is_one_family = len({family for family, _ in terms}) == 1
-        is_ordered = np.all(np.diff([theta[0] for _, theta in terms]) > 0.0)
-        if own.size == 1 or own[0] == 0 or not (is_one_family and is_ordered):
+    used = [(one, np.unique(own)) for one, own in zip(inputs, antecedents.T, strict=True)]
+    used = [(variable, own) for variable, own in used if own.any()]
+    for variable, own in used:
+        families, thetas = zip(*(variable.terms[k - 1] for k in own), strict=True)
+        is_ordered = np.all(np.diff([theta[0] for theta in thetas]) > 0.0)
+        if own.size == 1 or own[0] == 0 or len(set(families)) > 1 or not is_ordered:
             return None
-    if n_combinations != len(antecedents):
-        return None
-    rows = np.lexsort(antecedents.T[::-1])
-    distinct = np.any(np.diff(antecedents[rows], axis=0), axis=1)
-    return rows if distinct.all() else None
+    rows = np.unique(antecedents, axis=0, return_index=True)[1]
+    is_full = len(antecedents) == rows.size == prod(own.size for _, own in used)
+    return rows if is_full else None
 
 
 def _is_scattered(inputs, antecedents):

@@ -1,0 +1,210 @@
+r"""What the rules say, number by number, in the digits that matter.
+
+Every rule r has a centre c_r, the mean of the training rows weighted by its strength, and says
+
+    f_r(x) = v_r + sum_(j in common) b_j (x_j - c_rj) + sum_(j its own) b_rj (x_j - c_rj) ,
+
+its own value v_r there, slopes that it has in common with other rules, and slopes of its own. What
+is common is said once, as a line about the mean x0 of all rows. Of v_r the part
+
+    sum_(j in common) b_j (c_rj - x0_j)
+
+is that line's at the centre, so that f_r is also v_r less this part, plus the line at x, plus the
+rule's own slopes. Text, HTML, tables, and the model as it is printed are made of these numbers.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..model import TSKModel
+from ..naming import SIGNS, default_term_names, written_side
+
+# Digits of the noise's deviation to which numbers are written.
+PRECISION = 2
+# More than these give back no other double.
+MOST_DIGITS = 17
+# Digits of a deviation of an input to which the places are written that slopes count from.
+_DIGITS_OF_PLACE = 2
+# As rounding leaves a 0 or a 1.
+_DIGITS_OF_CASE = 6
+# In deviations of an output: numbers are not written finer, and as they are where nothing is known
+# of the noise.
+_FINEST, _UNKNOWN_NOISE = 1e-4, 1e-2
+
+
+@dataclass(frozen=True, eq=False)
+class Sentences:
+    """What the rules of a model say; built by :meth:`of`.
+
+    Attributes
+    ----------
+    model : TSKModel
+        Whose rules these are; its terms as they are written.
+    says_where : ndarray of bool of shape (n_terms,)
+        Terms whose name says where they turn.
+    places : ndarray of shape (n_rules, n_inputs)
+        Centre of each rule, to few digits; of an input that is 0 or 1 the more frequent of these.
+    values, of_common : ndarray of shape (n_rules, n_outputs)
+        What each rule says there, and what of it is the common line's part.
+    slopes : ndarray of shape (n_rules, n_inputs, n_outputs)
+        Whole slopes, those in common as well.
+    is_own : ndarray of bool, of the same shape
+        Which of them the rule states itself.
+    common_place : ndarray of shape (n_inputs,)
+    common : ndarray of shape (n_inputs, n_outputs)
+        The common line; zero where nothing is in common.
+    two_valued : ndarray of bool of shape (n_inputs,)
+        Inputs that are 0 or 1.
+    """
+
+    model: TSKModel
+    says_where: np.ndarray
+    places: np.ndarray
+    values: np.ndarray
+    of_common: np.ndarray
+    slopes: np.ndarray
+    is_own: np.ndarray
+    common_place: np.ndarray
+    common: np.ndarray
+    two_valued: np.ndarray
+
+    @classmethod
+    def of(cls, model: TSKModel, precision: int = PRECISION):
+        """What a model says; of 17 digits nothing is lost."""
+        slopes = np.zeros((model.n_rules, model.n_inputs, model.n_outputs))
+        slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
+        scale, noise = _resolution(model, slopes)
+        two_valued = _two_valued(model)
+        digits = max(_DIGITS_OF_PLACE, precision)
+        places, common_place = (
+            np.where(two_valued, np.round(np.clip(at, 0.0, 1.0)), rounded(at, model.spread, digits))
+            for at in (rule_centers(model), model.reference)
+        )
+        away = places - model.reference
+        values = model.coefficients[:, 0] + np.einsum("rj,rjo->ro", away, slopes)
+        slopes = rounded(slopes, noise / model.spread[:, None], precision)
+        is_common = model.common_slopes
+        first = is_common.argmax(axis=0), np.arange(model.n_inputs)
+        common = np.where(np.any(is_common, axis=0, keepdims=True).T, slopes[first], 0.0)
+        part = np.where(is_common[:, :, None], common, 0.0)
+        of_common = np.einsum("rj,rjo->ro", places - common_place, part)
+        # Beside a common slope that of nothing is to be said as well.
+        is_own = ~is_common[:, :, None] & ((slopes != 0.0) | (common != 0.0))
+        digits = min(precision + _more_digits(scale, noise), MOST_DIGITS)
+        written, says_where = _written_terms(model, digits)
+        return cls(
+            written,
+            says_where,
+            places,
+            rounded(values, noise, precision),
+            rounded(of_common, noise, precision),
+            slopes,
+            is_own,
+            common_place,
+            common,
+            two_valued,
+        )
+
+    @property
+    def printed(self) -> TSKModel:
+        """The model that the written numbers are."""
+        model = self.model
+        own = np.where(self.is_own, self.slopes, 0.0)
+        part = np.where(self.is_own, 0.0, self.common)
+        part = np.where(model.common_slopes[:, :, None], part, 0.0)
+        constant = self.values - self.of_common
+        constant -= np.einsum("rj,rjo->ro", self.places - model.reference, own)
+        constant -= np.einsum("j,rjo->ro", self.common_place - model.reference, part)
+        coefficients = np.concatenate([constant[:, None], own + part], axis=1)
+        return replace(model, coefficients=coefficients[:, : model.coefficients.shape[1]])
+
+    @property
+    def n_numbers(self) -> np.ndarray:
+        """Numerals in the sentence of each rule, (n_rules,)."""
+        conditions = (self.model.antecedent.rule_terms >= 0).sum(axis=1)
+        return conditions + self.model.n_outputs + self.is_own.sum(axis=(1, 2))
+
+    @property
+    def reading_cost(self) -> int:
+        """Numerals in the sentences of all rules, and in the common line."""
+        return int(self.n_numbers.sum() + np.count_nonzero(self.common))
+
+
+def rule_centers(model):
+    """Mean of the training rows by each rule's strength, (n_rules, n_inputs), where it is known."""
+    if model.support is None:
+        return np.tile(model.reference, (model.n_rules, 1))
+    return np.where(model.support.share[:, None] > 0.0, model.support.center, model.reference)
+
+
+def rounded(values, unit, precision):
+    """Values to so many digits of a unit; each is the number nearest to its decimals."""
+    decimals = precision - 1 - np.floor(np.log10(unit)).astype(int)
+    # Python's own rounding is right to the last digit, and at every size.
+    return np.vectorize(round, otypes=[float])(values, decimals) + 0.0
+
+
+def _resolution(model, slopes):
+    """Deviation of every output, and of the noise about it, (n_outputs,) each; positive."""
+    if model.target is None:
+        change = np.abs(slopes) * (model.maximum - model.minimum)[:, None]
+        scale = np.ptp(model.coefficients[:, 0], axis=0) + change.max(axis=(0, 1))
+    else:
+        scale = model.target.spread
+    scale = np.where(scale > 0.0, scale, 1.0)
+    noise = _UNKNOWN_NOISE * scale if model.posterior is None else model.posterior.noise
+    return scale, np.clip(noise, _FINEST * scale, scale)
+
+
+def _more_digits(scale, noise):
+    """Of terms: what they may be off by is a part of the output's deviation, not of the noise."""
+    return int(np.floor(np.log10(scale / noise)).max(initial=0.0))
+
+
+def _two_valued(model) -> np.ndarray:
+    """Inputs that are 0 or 1 on all training rows; none where the rows are not known."""
+    found = np.zeros(model.n_inputs, dtype=bool)
+    marginals = () if model.support is None else model.support.marginals
+    for j, (_, quantiles) in enumerate(marginals):
+        if (model.minimum[j], model.maximum[j]) == (0.0, 1.0):
+            seen = np.round(model.reference[j] + model.spread[j] * quantiles, _DIGITS_OF_CASE)
+            found[j] = np.isin(seen, (0.0, 1.0)).all()
+    return found
+
+
+def _written_terms(model, digits):
+    """The model with its terms as they are written, and which of them say by name where they turn.
+
+    These are the sides of cuts; a name that somebody has given stays.
+    """
+    antecedent, box = model.antecedent, (model.minimum, model.maximum)
+    default = default_term_names(antecedent, *box)
+    of_digits = default_term_names(antecedent, *box, digits)
+    names, says_where = list(model.term_names), np.zeros(len(default), dtype=bool)
+    groups, start = [], 0
+    for group in antecedent.groups:
+        theta = _rounded_theta(group, digits)
+        for k, t in enumerate(range(start, start + group.n_terms)):
+            says_where[t] = group.family in SIGNS and names[t] == default[t]
+            if says_where[t]:
+                names[t] = of_digits[t]
+                theta[:, k] = written_side(of_digits[t], group.theta[:, k])
+        groups.append(replace(group, theta=theta))
+        start += group.n_terms
+    written = replace(antecedent, groups=tuple(groups))
+    return replace(model, antecedent=written, term_names=tuple(names)), says_where
+
+
+def _rounded_theta(group, digits):
+    """Parameters of terms: places to digits of the width, all others to so many digits."""
+    natural = group.family.natural(group.theta)
+    parameters = group.family.parameters
+    width = natural[[one.kind for one in parameters].index("log_width")]
+    theta = np.empty_like(natural)
+    for row, parameter, values in zip(theta, parameters, natural, strict=True):
+        if parameter.kind == "location":
+            row[:] = rounded(values, width, digits)
+        else:
+            row[:] = np.log(rounded(values, values, digits))
+    return theta
