@@ -116,15 +116,20 @@ def constrained(
     return kept, report
 
 
+def at_equal_widths(problem, evaluation, constraints: Constraints):
+    """The evaluation where Gaussian terms have one width on every input that has a sign."""
+    inputs = np.flatnonzero(constraints.signs.any(axis=0))
+    antecedent = with_equal_widths(evaluation.antecedent, inputs)
+    if (antecedent.parameters == evaluation.antecedent.parameters).all():
+        return evaluation
+    return problem.evaluate(antecedent.parameters)
+
+
 def in_order(problem, evaluation, constraints: Constraints, equal, equal_to) -> Ordered:
     """The nearest rules in order, or the nearest line; InfeasibleError where there is neither.
 
     ``equal`` are sums over the consequents on [1, z], and ``equal_to`` what each output has there.
     """
-    inputs = np.flatnonzero(constraints.signs.any(axis=0))
-    antecedent = with_equal_widths(evaluation.antecedent, inputs)
-    if (antecedent.parameters != evaluation.antecedent.parameters).any():
-        evaluation = problem.evaluate(antecedent.parameters)
     try:
         return _nearest(problem, evaluation, constraints, equal, equal_to, is_line=False)
     except InfeasibleError:
@@ -143,6 +148,7 @@ def held_in_search(constraints: Constraints | None):
 
     def held(problem, evaluation):
         no_points = np.empty((0, problem.n_columns)), np.empty((0, problem.n_outputs))
+        evaluation = at_equal_widths(problem, evaluation, signs)
         ordered = in_order(problem, evaluation, signs, *no_points)
         return ordered.free.antecedent, problem.local.to_global(ordered.local)
 
@@ -202,6 +208,7 @@ class _ConstrainedFit:
 
     def certified_order(self, evaluation) -> Ordered:
         """Rules in order, or a line; an error that says which constraints cannot be kept."""
+        evaluation = at_equal_widths(self.problem, evaluation, self.constraints)
         equal, equal_to = self._fixed(self._columns(evaluation.antecedent))
         try:
             ordered = in_order(self.problem, evaluation, self.constraints, equal, equal_to)
