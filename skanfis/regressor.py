@@ -172,7 +172,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         "weight", its part of the data's weight. ``without_rules`` drops them.
     constraints_ : dict or None
         With constraints: "certified", that they hold everywhere; "drawn", how much of the way to
-        rules that are certain it took; "loss_before" and "loss_after", of training; "boxes".
+        rules in order, or to one line, it took; "loss_before" and "loss_after", of training.
     validation_loss_curve_ : ndarray of shape (n_iter,) or None
         With ``early_stopping``: as ``loss_curve_``, of the rows held out.
     robust_weights_ : ndarray of shape (n_samples,) or None

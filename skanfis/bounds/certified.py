@@ -11,7 +11,7 @@ from scipy.stats import qmc
 
 from .._validation import check_count, position_of
 from ..model import TSKModel
-from .construction import order_of
+from .construction import is_in_order
 from .enclosure import Enclosure, reach_of
 from .search import largest
 from .terms import is_known
@@ -229,11 +229,10 @@ def monotonicity(
     is_promised = in_range or model.out_of_bounds != "linear" or not goes_on
     for k in range(model.n_outputs):
         for sign in (1, -1):
-            if is_promised:
-                order, *ends = order_of(model, sign * (np.arange(model.n_inputs) == j))
-                if order is not None and order.holds(model.coefficients[:, :, k], *ends):
-                    signs[k] = sign
-                    break
+            own = sign * (np.arange(model.n_inputs) == j)
+            if is_promised and is_in_order(model, k, own):
+                signs[k] = sign
+                break
             slope = partial(Enclosure(model, k, -float(sign)).slope, j=j)
             found = largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0)
             if found.bound <= 0.0:

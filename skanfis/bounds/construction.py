@@ -1,93 +1,80 @@
-r"""Promises kept by how a model is made: inequalities on the consequents, proven by themselves.
+r"""Rules in order: predictions that rise, or keep within limits, by how a model is made.
 
-Let no rule's slope b_r by x_j be negative. A prediction then rises with x_j all over a box where
-pairs of rules (r, s) keep, with a weight D of each pair,
+Let no rule's slope by x_j be negative, and let certain rules ("above") be no less than others
+("below") at every corner of a box, and so all over it. Then predictions rise with x_j there:
 
-    (3 b_r + b_s) / D + f_r - f_s >= 0   and   (b_r + 3 b_s) / D + f_r - f_s >= 0 .
+*Tree.* At a cut of x_j every rule above it is at least every rule below it. With sigma the truth of
+"above", y = sigma A + (1 - sigma) B, where A and B are means over the rules above and below: A is
+at least B, sigma rises, and A and B rise themselves, by induction from the leaves.
 
-*Tree.* At a cut of x_j of width 1 / D, with r above it and s below: what both add to dy / dx_j is,
-but for a factor, t b_r + (1 - t) b_s + t (1 - t) D (f_r - f_s) with t = sigma. Over t (1 - t), the
-part of the slopes is at least (sqrt b_r + sqrt b_s)^2, which is no less than either sum. A slope is
-shared among the cuts of x_j on the path of its rule.
+*Gaussian terms of one width on x_j.* Rules are ordered as their centres c in x_j are; on a grid,
+those that have all other terms alike. With w the strengths and f the values of rules, b their
+slopes, and a = (c - x_j) / width^2 the slopes of log w: dy / dx_j = E b + Cov(a, f), and the
+covariance of two things in the same order, the sum over pairs of w_r w_s (a_r - a_s) (f_r - f_s),
+is not negative.
 
-*Any other rule base*, with w = softmax of log-strengths and a_r their slopes by x_j: dy / dx_j =
-E b + Cov(a, f). The covariance is the sum over pairs of w_r w_s D (f_r - f_s), with D = a_r - a_s,
-and E b at least that of w_r w_s (b_r + b_s + 2 sqrt(b_r b_s) / (n - 1)), of n rules. On a grid all
-that is along the input's own axis, of n terms. Where D changes its sign, either order counts.
+*One line for all rules* rises where its slope does not fall.
 
-A prediction is within limits where every rule is. All of it is linear in the consequents, and a
-linear function is least at a corner of the box.
+To fall is the same with all orders reversed. A prediction is within limits where every rule is.
+All of it is linear in the consequents, and a linear function is least at a corner of the box.
 """
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from ..antecedent import Antecedent, TreeAntecedent
+from ..antecedent import Antecedent, GridAntecedent, TreeAntecedent
 from ..membership import Gaussian
 from ..model import TSKModel
-from .inequalities import InfeasibleError, nearest
-from .terms import EPS, is_known, term_ranges
+from .quadratic_program import InfeasibleError, nearest
+from .terms import EPS
 
 # In standard deviations of the target, what inequalities are kept by; slopes are by so much more.
 _MARGIN, _SLOPE = 1e-9, 1e3
-# Rounds in which corners are added. Pieces of the range in which slopes of log-strengths are
-# enclosed; those of Gaussians are straight lines, compared this far beyond its ends, in its widths.
-_MOST_ROUNDS, _PIECES, _BEYOND = 60, 64, 1e-9
+# Rounds in which corners are added.
+_MOST_ROUNDS = 60
+ONE_RULE = GridAntecedent.build([], [], [])
 
 
 @dataclass(frozen=True, eq=False)
 class RuleOrder:
-    """What rules of one output must keep on a box, an entry of each array for an inequality.
+    """What the rules of one output must keep: f[above] - f[below] >= least, on all of a box.
 
-    f[above] - f[below] + gains @ (slopes of both by the input of ``column``) >= least; -1 is no
-    rule, and no column. ``signs`` are those of the slopes, by column.
+    Rule -1 is zero everywhere. ``signs`` are those of the slopes, by column.
     """
 
     above: np.ndarray
     below: np.ndarray
-    gains: np.ndarray
-    column: np.ndarray
     least: np.ndarray
     signs: np.ndarray
 
     @classmethod
-    def of(cls, antecedent: Antecedent, signs, limits, low, high, slope_inputs):
-        """None where nothing is known that is enough; columns are those of ``slope_inputs``."""
-        n_rules, found = antecedent.n_rules, []
+    def of(cls, antecedent: Antecedent, signs, limits, slope_inputs):
+        """None where no order is known that is enough; columns are those of ``slope_inputs``."""
+        pairs = [np.empty((0, 2), dtype=int)]
         for j in np.flatnonzero(signs):
-            pairs = _pairs(antecedent, j, low[j], high[j])
-            if pairs is None:
+            found = _pairs(antecedent, j)
+            if found is None:
                 return None
-            rules, weight, gains = pairs
-            own = weight > 0.0
-            rules, gains = rules[own], gains[own] / weight[own, None]
-            place = np.flatnonzero(slope_inputs == j)
-            column = np.full(len(rules), place[0] if place.size else -1)
-            # What must not be below and what must not be above, where it is to fall.
-            found.append((rules[:, :: signs[j]], signs[j] * gains[:, :: signs[j]], column))
-        nothing = np.empty((0, 2), dtype=int), np.empty((0, 2)), np.empty(0, dtype=int)
-        rules, gains, column = map(np.concatenate, zip(nothing, *found, strict=True))
-        least, every = np.zeros(len(rules)), np.arange(n_rules)
-        none = np.full(n_rules, -1)
-        for limit, both in ((limits[0], (every, none)), (-limits[1], (none, every))):
+            pairs.append(found[:, :: signs[j]])
+        n_ordered = sum(map(len, pairs))
+        least = [np.zeros(n_ordered)]
+        every = np.arange(antecedent.n_rules)
+        nothing = np.full(every.size, -1)
+        for limit, both in ((limits[0], (every, nothing)), (-limits[1], (nothing, every))):
             if np.isfinite(limit):
-                rules = np.vstack([rules, np.column_stack(both)])
-                gains, column = np.vstack([gains, np.zeros((n_rules, 2))]), np.append(column, none)
-                least = np.append(least, np.full(n_rules, limit))
-        return cls(rules[:, 0], rules[:, 1], gains, column, least, signs[slope_inputs])
+                pairs.append(np.column_stack(both))
+                least.append(np.full(every.size, limit))
+        above, below = np.vstack(pairs).T
+        return cls(above, below, np.concatenate(least), signs[slope_inputs])
 
     def left(self, rules, low, high):
         """By how much each holds for rules a + b x on a box, its worst corner, and its rounding."""
-        # No rule is zero, and no column too.
-        rules = np.pad(rules, ((0, 1), (0, 1)))
-        apart = (rules[self.above] - rules[self.below])[:, :-1]
+        rules = np.vstack([rules, np.zeros((1, rules.shape[1]))])
+        apart = rules[self.above] - rules[self.below]
         corner = np.where(apart[:, 1:] > 0.0, low, high)
-        column = np.where(self.column < 0, -1, 1 + self.column)
-        slopes = np.stack([rules[self.above, column], rules[self.below, column]], axis=1)
-        parts = np.column_stack(
-            [-self.least, apart[:, :1], apart[:, 1:] * corner, self.gains * slopes]
-        )
+        parts = np.column_stack([-self.least, apart[:, 0], apart[:, 1:] * corner])
         return parts.sum(axis=1), corner, (8 + parts.shape[1]) * EPS * np.abs(parts).sum(axis=1)
 
     def holds(self, rules, low, high):
@@ -96,94 +83,65 @@ class RuleOrder:
         return bool((left >= rounding).all() and (self.signs * rules[:, 1:] >= 0.0).all())
 
 
-def order_of(model: TSKModel, signs, limits=(-np.inf, np.inf)):
-    """The order of a frozen model's rules, and the range about its reference."""
-    inputs = np.arange(model.coefficients.shape[1] - 1)
-    order = RuleOrder.of(model.antecedent, signs, limits, model.minimum, model.maximum, inputs)
-    return order, *((end - model.reference)[inputs] for end in (model.minimum, model.maximum))
+def is_in_order(model: TSKModel, output, signs, limits=(-np.inf, np.inf)):
+    """Whether a frozen model keeps signs and limits all over its range, by the order of its rules.
 
-
-def _pairs(antecedent, j, low, high):
-    """Pairs of rules (above, below), the most that D can be, and what slopes gain, times D.
-
-    D of no more than zero asks for nothing. None where slopes of log-strengths have no bound.
+    This is the certificate: it knows nothing of how the model was found.
     """
+    antecedent, rules = model.antecedent, model.coefficients[:, :, output]
+    if (rules == rules[0]).all():
+        antecedent, rules = ONE_RULE, rules[:1]
+    inputs = np.arange(rules.shape[1] - 1)
+    order = RuleOrder.of(antecedent, signs, limits, inputs)
+    ends = ((end - model.reference)[inputs] for end in (model.minimum, model.maximum))
+    return order is not None and order.holds(rules, *ends)
+
+
+def _pairs(antecedent, j):
+    """Rules (above, below) that must be in order for predictions to rise with x_j, (n, 2)."""
     if isinstance(antecedent, TreeAntecedent):
         return _pairs_of_tree(antecedent, j)
-    terms = np.flatnonzero(antecedent.term_inputs == j)
-    steep = _slopes(antecedent, j, low, high)
-    if steep is None:
-        return None
-    rules = np.arange(antecedent.n_rules)
-    if antecedent.grid_counts is None:
-        table = antecedent.rule_terms
-        rules, steep = rules[:, None], [end[:, table].sum(axis=2) for end in steep]
-    elif terms.size:
-        axis = antecedent.share_inputs.index(j)
-        rules = np.moveaxis(rules.reshape(antecedent.grid_counts), axis, 0)
-        rules, steep = rules.reshape(terms.size, -1), [end[:, terms] for end in steep]
-    else:
-        return np.empty((0, 2), dtype=int), np.empty(0), np.empty((0, 2))
-    n = len(rules)
-    above, below = (one.ravel() for one in np.meshgrid(range(n), range(n), indexing="ij"))
-    apart = above != below
-    above, below = above[apart], below[apart]
-    weight = (steep[1][:, above] - steep[0][:, below]).max(axis=0)
-    both = np.stack([rules[above], rules[below]], axis=-1).reshape(-1, 2)
-    return _both_sums(
-        both, np.repeat(weight, rules.shape[1]), np.ones(both.shape), 2.0 / max(n - 1, 1)
-    )
-
-
-def _both_sums(rules, weight, gains, more):
-    """Either sum of slopes, in which one of both counts for more."""
-    sums = [gains * (1.0 + more * np.array(one)) for one in ((1.0, 0.0), (0.0, 1.0))]
-    return np.tile(rules, (2, 1)), np.tile(weight, 2), np.vstack(sums)
-
-
-def _slopes(antecedent, j, low, high):
-    """Least and largest slopes by x_j of log-memberships on pieces of its range.
-
-    Two arrays (n_pieces, n_terms + 1), the last for no term; None where they have no bound.
-    """
+    is_own = np.append(antecedent.term_inputs == j, False)
+    has_own = is_own[antecedent.rule_terms]
+    if not has_own.any():
+        return np.empty((0, 2), dtype=int)
+    # One term each, of one width: else no order of the rules is known to be enough.
     groups = [group for group in antecedent.groups if (group.inputs == j).any()]
-    if not all(is_known(group.family) for group in groups):
+    is_gaussian = all(group.family is Gaussian for group in groups)
+    if not is_gaussian or (has_own.sum(axis=1) != 1).any():
         return None
-    own = np.append(antecedent.term_inputs == j, False)
-    ends = np.array([low, high]) + _BEYOND * (high - low) * np.array([-1.0, 1.0])
-    if all(group.family is Gaussian for group in groups):
-        # At both ends: in between they are straight lines, and so are differences.
-        found, start = np.zeros((2, own.size)), 0
-        for group in antecedent.groups:
-            stop = start + group.n_terms
-            place = start + np.flatnonzero(group.inputs == j)
-            if place.size:
-                center, log_width = group.theta[:, place - start]
-                found[:, place] = (center - ends[:, None]) * np.exp(-2.0 * log_width)
-            start = stop
-        return found, found
-    edges = np.linspace(ends[0], ends[1], _PIECES + 1)
-    n_inputs = 1 + antecedent.term_inputs.max()
-    pieces = (np.broadcast_to(edge, (n_inputs, _PIECES)) for edge in (edges[:-1], edges[1:]))
-    with np.errstate(all="ignore"):
-        ranges = term_ranges(antecedent, *pieces)
-    least, most = (np.where(own, end.T, 0.0) for end in (ranges.slope_low, ranges.slope_high))
-    return (least, most) if np.isfinite([least, most]).all() else None
+    widths = np.concatenate([group.theta[1, group.inputs == j] for group in groups])
+    if np.ptp(widths) > 0.0:
+        return None
+    centers = np.append(antecedent.term_places, 0.0)[antecedent.rule_terms[has_own]]
+    lines = np.arange(antecedent.n_rules)[None]
+    if antecedent.grid_counts is not None:
+        axis = antecedent.share_inputs.index(j)
+        lines = np.moveaxis(lines.reshape(antecedent.grid_counts), axis, -1)
+        lines = lines.reshape(-1, antecedent.grid_counts[axis])
+    return np.vstack([_neighbours(line, centers[line]) for line in lines])
+
+
+def _neighbours(rules, places):
+    """Rules (above, below) that are next to each other; of the same place all, in no order."""
+    levels = [rules[places == place] for place in np.unique(places)]
+    pairs = [_all_pairs(above, below) for below, above in pairwise(levels)]
+    return np.vstack([np.empty((0, 2), dtype=int), *pairs])
 
 
 def _pairs_of_tree(antecedent, j):
-    nodes, paths = antecedent.groups[0], [dict(path) for path in antecedent.paths]
-    cuts = np.flatnonzero(nodes.inputs == j)
-    share = 1.0 / np.array([max(np.isin(cuts, list(path)).sum(), 1) for path in paths])
-    rules, weight = [np.empty((0, 2), dtype=int)], [np.empty(0)]
-    for node in cuts:
-        sides = (
+    paths = [dict(path) for path in antecedent.paths]
+    pairs = [np.empty((0, 2), dtype=int)]
+    for node in np.flatnonzero(antecedent.groups[0].inputs == j):
+        above, below = (
             [r for r, path in enumerate(paths) if path.get(node) is side] for side in (True, False)
         )
-        rules.append(np.stack(np.meshgrid(*sides), axis=-1).reshape(-1, 2))
-        weight.append(np.full(len(rules[-1]), np.exp(-nodes.theta[1, node])))
-    both = np.vstack(rules)
-    return _both_sums(both, np.concatenate(weight), share[both], 2.0)
+        pairs.append(_all_pairs(above, below))
+    return np.vstack(pairs)
+
+
+def _all_pairs(above, below):
+    return np.stack(np.meshgrid(above, below), axis=-1).reshape(-1, 2)
 
 
 def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
@@ -198,55 +156,34 @@ def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
     return replace(antecedent, groups=tuple(groups))
 
 
-def held_by_order(order, evaluation, problem, k, equal, equal_to, is_line=False):
-    """The nearest local consequents of output k that keep an order, (n_columns,).
+def nearest_in_order(order: RuleOrder, factor, start, to_rules, box, equal, equal_to):
+    """The u nearest to ``start`` that keep an order on a box; and what is met with equality.
 
-    ``equal`` are local rows, and ``equal_to`` what they are; of a line all rules are one. Then what
-    is met with equality: rows on [1, z], (n, n_rules, n_basis). InfeasibleError where none do.
+    Rules on [1, z] are ``to_rules @ u``. ``equal`` are rows of sums over them, (n, n_columns), and
+    ``equal_to`` what these are; so is what is met. InfeasibleError where nothing keeps all.
     """
-    n_rules, n_basis = evaluation.antecedent.n_rules, problem.n_basis
-    low, high = (end[problem.consequent_inputs] for end in problem.rows.inputs.box)
-    normal, targets, basis = evaluation.normal, problem.rows.targets, np.eye(n_basis)
-
-    def in_local(rows):
-        flat = rows.reshape(len(rows), n_rules * n_basis)
-        return problem.local.transform_rows(np.array(flat.T, order="C")).T if len(flat) else flat
-
-    same = np.zeros((n_rules - 1 if is_line else 0, n_basis, n_rules, n_basis))
-    for r, rows in enumerate(same, start=1):
-        rows[:, r], rows[:, 0] = basis, -basis
-    same = same.reshape(-1, n_rules, n_basis)
-    equal = np.vstack([equal, in_local(same)])
-    equal_to = np.append(equal_to, np.zeros(len(same)))
-    # Slopes have their signs; limits are in standardised units, an order has none.
-    columns = np.flatnonzero(order.signs)
-    every = np.repeat(np.arange(1 if is_line else n_rules), columns.size)
-    columns = np.resize(columns, every.size)
-    held = np.zeros((every.size, n_rules, n_basis))
-    held[np.arange(every.size), every, 1 + columns] = order.signs[columns]
-    at_least = np.full(len(held), _SLOPE * _MARGIN)
-    alone = np.sign(order.below - order.above) * (np.minimum(order.above, order.below) < 0)
-    least = (order.least + alone * targets.offset[k]) / targets.scale[k] + _MARGIN
-    order, local = replace(order, least=least), in_local(held)
+    n_basis = 1 + order.signs.size
+    n_columns = len(to_rules)
+    n_rules = n_columns // n_basis
+    # First the signs of the slopes.
+    signs = np.flatnonzero(order.signs)
+    rules, columns = (one.ravel() for one in np.meshgrid(range(n_rules), signs, indexing="ij"))
+    held = np.zeros((rules.size, n_rules, n_basis))
+    held[np.arange(rules.size), rules, 1 + columns] = order.signs[columns]
+    at_least, least = np.full(len(held), _SLOPE * _MARGIN), order.least + _MARGIN
+    order = replace(order, least=least)
     for _ in range(_MOST_ROUNDS):
-        start = normal.coefficients[:, k]
-        solved, active = nearest(normal.factor, start, equal, equal_to, local, at_least)
-        rules = problem.local.to_global(solved[:, None]).reshape(n_rules, n_basis)
-        left, corner, _ = order.left(rules, low, high)
+        rows = held.reshape(len(held), n_columns) @ to_rules
+        solved, active = nearest(factor, start, equal @ to_rules, equal_to, rows, at_least)
+        left, corner, _ = order.left((to_rules @ solved).reshape(n_rules, n_basis), *box)
         short = np.flatnonzero(left < -0.5 * _MARGIN)
         if not short.size:
-            break
-        rows, place = np.zeros((short.size, n_rules + 1, n_basis + 1)), np.arange(short.size)
-        at = np.column_stack([np.ones(short.size), corner[short], np.zeros(short.size)])
-        column = np.where(order.column[short] < 0, -1, 1 + order.column[short])
-        for own, sign, gain in zip(
-            (order.above[short], order.below[short]), (1.0, -1.0), order.gains[short].T, strict=True
-        ):
-            rows[place, own] += sign * at
-            rows[place, own, column] += gain
-        held = np.concatenate([held, rows[:, :-1, :-1]])
-        local = np.vstack([local, in_local(rows[:, :-1, :-1])])
+            return solved, held[active]
+        # Then every pair that is not in order, at the corner where it is worst.
+        at = np.column_stack([np.ones(short.size), corner[short]])
+        more, place = np.zeros((short.size, n_rules + 1, n_basis)), np.arange(short.size)
+        more[place, order.above[short]] += at
+        more[place, order.below[short]] -= at
+        held = np.concatenate([held, more[:, :-1]])
         at_least = np.append(at_least, order.least[short])
-    else:
-        raise InfeasibleError(False)
-    return solved, np.concatenate([same, held[active]])
+    raise InfeasibleError(False)

@@ -24,7 +24,7 @@ from .sample import effective_weight, n_distinct_inputs
 from .search import StructureSearch
 from .size import check_clusters_fit, check_columns_fit, check_grid_fits, term_counts
 from .start import Start, imported_antecedent, tuned_start
-from .trials import Plan
+from .trials import Held, Plan
 from .tuning import FIRST_PENALTY, scaled
 
 _MIB = 2**20
@@ -54,6 +54,8 @@ class StructureRequest:
     simplicity : float
         What may be given up for a model that costs less to read.
     max_rules : int or None
+    held : callable, optional
+        See ``Plan``.
     """
 
     n_mfs: Any
@@ -68,6 +70,7 @@ class StructureRequest:
     names: Sequence[str]
     simplicity: float
     max_rules: int | None
+    held: Held | None = None
 
     @property
     def is_searched(self):
@@ -97,8 +100,11 @@ class StructureRequest:
         """What is searched. A tree has sides of cuts, and no terms of a family that was given."""
         if self.partition != "auto":
             return (self.partition,)
-        has_family = any(family is not Gaussian for family in self.families)
-        return [kind for kind in KINDS if kind != "tree" or not has_family]
+        left_out = ["tree"] if any(family is not Gaussian for family in self.families) else []
+        if self.held is not None:
+            # An order of scattered rules all over the range binds hard.
+            left_out.append("scattered")
+        return [kind for kind in KINDS if kind not in left_out]
 
     def _plan(self, rows):
         given: dict[str, Any] = {**self.weights}
@@ -116,6 +122,7 @@ class StructureRequest:
             replace(FIRST_PENALTY, **given),
             effective_weight(rows),
             self.max_rules,
+            self.held,
         )
 
     def _antecedent(self, rows):

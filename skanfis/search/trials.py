@@ -8,14 +8,15 @@ error on rows that had no part in anything (``judging``).
 A candidate sees as many rows as its parameters need, and not more.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..antecedent import Antecedent
 from ..consequent import in_user_units
 from ..learning.data import StandardisedData
-from ..learning.objective import SeparableProblem
+from ..learning.objective import Evaluation, SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..membership import Membership
@@ -40,6 +41,8 @@ _TRIED = 4
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
 _SIGNIFICANT = 2.0
 
+Held = Callable[[SeparableProblem, Evaluation], tuple[Antecedent, np.ndarray]]
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -61,6 +64,9 @@ class Plan:
     n_all : float
         Rows by weight that the final model will be trained on.
     most_rules : int or None
+    held : callable, optional
+        Of a problem and an evaluation: the consequents that keep what is known of the outputs. They
+        are what is judged; training is free.
     """
 
     families: Sequence[type[Membership]]
@@ -72,6 +78,7 @@ class Plan:
     first: Penalty
     n_all: float
     most_rules: int | None
+    held: Held | None = None
 
     @property
     def n_basis(self):
@@ -201,15 +208,21 @@ class Trials:
         weight = effective_weight(rows)
         return tune(problem, premise, plan.free, weight, turns, first_steps, begun=begun)
 
+    def _answering(self, tuned):
+        """The premises and consequents that new rows are predicted with."""
+        if self.plan.held is None:
+            return tuned.evaluation.antecedent, tuned.solved.coefficients
+        return self.plan.held(tuned.problem, tuned.solved)
+
     def squared_errors(self, tuned: Tuned, rows: StandardisedData):
         """Of rows that were not trained on, as predict answers; summed over outputs."""
-        seen, evaluation = tuned.problem.rows, tuned.evaluation
+        seen, (antecedent, coefficients) = tuned.problem.rows, self._answering(tuned)
         n_inputs, low, high = seen.X.shape[1], seen.y.min(axis=0), seen.y.max(axis=0)
         model = TSKModel(
-            antecedent=evaluation.antecedent,
-            initial_antecedent=evaluation.antecedent,
+            antecedent=antecedent,
+            initial_antecedent=antecedent,
             coefficients=in_user_units(
-                tuned.solved.coefficients,
+                coefficients,
                 seen.inputs,
                 unit_scale(seen.y),
                 tuned.problem.consequent_inputs,
@@ -219,8 +232,8 @@ class Trials:
             spread=np.ones(n_inputs),
             minimum=seen.inputs.minimum,
             maximum=seen.inputs.maximum,
-            rule_weights=evaluation.masses,
-            rule_rows=evaluation.masses,
+            rule_weights=tuned.evaluation.masses,
+            rule_rows=tuned.evaluation.masses,
             input_names=tuple(f"x{j}" for j in range(n_inputs)),
             target=TargetRange(low, high, np.ones(low.size)),
         )

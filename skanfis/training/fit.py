@@ -18,7 +18,7 @@ from sklearn.exceptions import ConvergenceWarning
 
 from .._threads import map_in_threads
 from .._validation import warn_user
-from ..bounds.exchange import constrained
+from ..bounds.fitting import constrained, held_in_search
 from ..inspection.anova import input_marginals
 from ..learning import SOLVERS, LeastSquares, Solver, VariableProjection
 from ..learning.covariance import posterior_of
@@ -104,7 +104,11 @@ class _Fit:
             self.rows = with_sample(self.rows)
         # A slope by a column that never changes is nothing that data could tell of.
         slopes, is_constant = request.consequent_inputs, self.rows.inputs.is_constant
-        self.request = replace(request, consequent_inputs=slopes[~is_constant[slopes]])
+        self.request = replace(
+            request,
+            consequent_inputs=slopes[~is_constant[slopes]],
+            held=held_in_search(data.constraints),
+        )
 
     @property
     def builder(self) -> ModelBuilder:

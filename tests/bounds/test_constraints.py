@@ -70,6 +70,20 @@ def test_predictions_rise_everywhere(params, rng):
         assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+def test_the_search_judges_what_is_kept(rng):
+    """Of a valley told to rise: what is expected of new rows is what the held model leaves."""
+    X, X_new = rng.uniform(-1.0, 1.0, (2, 400, 2))
+    y, y_new = (x[:, 0] ** 2 + 0.5 * x[:, 1] + 0.1 * rng.normal(size=400) for x in (X, X_new))
+    held = ANFISRegressor(monotonic_cst=[1, 0]).fit(X, y)
+    assert {one["kind"] for one in held.structures_} == {"one rule", "grid", "tree"}
+    expected = next(one["expected_error"] for one in held.structures_ if one["chosen"])
+    left = np.sqrt(np.mean((held.predict(X_new) - y_new) ** 2))
+    assert_allclose(expected * y.std(), left, rtol=0.1)
+    # A free fit leaves little more than the noise.
+    assert left > 2.0 * np.sqrt(np.mean((ANFISRegressor().fit(X, y).predict(X_new) - y_new) ** 2))
+
+
 @pytest.mark.parametrize("kind", ["tree", "grid", "scattered"])
 def test_predictions_rise_beyond_the_range_too(kind):
     """Steps up, and steps that an optimiser takes, from anywhere; the free fit falls there."""
@@ -212,6 +226,15 @@ def test_what_cannot_be_proven_is_drawn_to_a_line(rng):
     # Not the line of least squares, for the penalty: but next to it.
     line = np.linalg.lstsq(np.column_stack([np.ones(len(y)), X]), y, rcond=None)[0]
     assert_allclose(held.consequents_[0], line, atol=0.1)
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+def test_there_is_always_a_line(rng):
+    """Of triangles, slopes of which jump, with slopes in common."""
+    X, _, y = planted(rng)
+    held = ANFISRegressor(n_mfs=3, mf="triangular", monotonic_cst=[1, 0]).fit(X, y)
+    assert held.constraints_["certified"]
+    assert falls(held, 0, rng) <= 1e-12
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import nnls
 
-from skanfis.bounds.inequalities import InfeasibleError, nearest
+from skanfis.bounds.quadratic_program import InfeasibleError, nearest
 from skanfis.consequent import NormalFactor
 
 N = 8

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.export import export_fis
 from skanfis.export.fis.reader import parse_fis
 from skanfis.membership import MEMBERSHIPS
-from skanfis.policies import OUT_OF_BOUNDS
+from skanfis.policies import OUT_OF_BOUNDS, TargetRange
 
 from .. import oracles
 from .rule_bases import EVERY_PAIR, MODELS, build, rows_of
@@ -89,3 +89,14 @@ def test_what_is_written_can_be_read_or_is_refused(family, scale, rng):
     rows = rows_of(moved, 1.0)
     found = parse_fis(text).predict(rows)
     assert_allclose(found, moved.predict(rows), rtol=1e-9, atol=1e-9 * np.abs(found).max())
+
+
+def test_says_that_constraints_hold_in_the_range_alone():
+    told = "constraints of the fit hold within the Range"
+    assert told not in export_fis(A_GRID)
+    at = np.full(A_GRID.n_inputs, np.nan)
+    at[0] = 0.5 * (A_GRID.minimum[0] + A_GRID.maximum[0])
+    assert told in export_fis(replace(A_GRID, tangent_at=at))
+    n = A_GRID.n_outputs
+    limited = TargetRange(np.zeros(n), np.ones(n), np.ones(n), lower=np.full(n, -9.0))
+    assert told in export_fis(replace(A_GRID, target=limited))

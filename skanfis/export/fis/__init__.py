@@ -190,6 +190,10 @@ def _comments_and_names(model):
     ]
     if model.out_of_bounds != "clip":
         comments.append(f"% In skanfis, beyond it: {model.policy}.")
+    target = model.target
+    has_limits = target and np.isfinite(np.append(target.lower, target.upper)).any()
+    if model.tangent_at is not None or has_limits:
+        comments.append("% The constraints of the fit hold within the Range: beyond it, not here.")
     found = []
     for kind, given in (("Input", model.input_names), ("Output", model.output_names)):
         names = _identifiers(given, kind.lower())

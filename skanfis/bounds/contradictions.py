@@ -1,0 +1,67 @@
+"""Whether data contradict a constraint: what the free fit is certain of, and does against it.
+
+A slope: the mean change of the free fit over a third of the rows, as the input goes from the least
+to the largest of these, is against the sign by more than four of its own standard deviations. A
+limit: at some row the free fit is beyond it by as many.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+
+# Squared errors over the free fit's from which on it matters.
+_PLAIN = 1.01**2
+# Standard deviations; of all slopes by an input, the part of wrong sign that rules do not explain.
+_CERTAIN, _MUCH = 4.0, 0.25
+_MOST_ROWS, _ROWS_TOLD, _PARTS = 2048, 5, 3
+
+
+def contradicted(free, held, inequalities, rows, raised):
+    """A sentence for every output whose constraints the data contradict.
+
+    ``free`` and ``held`` are models in the user's units, ``rows`` X, y and their numbers, and
+    ``raised`` the squared error of training over the free fit's.
+    """
+    if free.posterior is None or raised <= _PLAIN:
+        return
+    X, y, numbers = rows
+    some = X[:: max(len(X) // _MOST_ROWS, 1)]
+    for k, output in enumerate(free.output_names):
+        guilty = [
+            one.name for one in inequalities if one.output == k and _speaks_against(one, free, some)
+        ]
+        if not guilty:
+            continue
+        before, after = ((y[:, k] - model.predict(X)[:, k]) ** 2 for model in (free, held))
+        worst = np.sort(numbers[np.argsort(before - after)[:_ROWS_TOLD]])
+        yield (
+            f"The data contradict {' and '.join(guilty)}: kept, it raises the error of training "
+            f"of {output!r} from {np.sqrt(before.mean()):.3g} to {np.sqrt(after.mean()):.3g}, far "
+            f"more than noise would; rows {', '.join(map(str, worst))} speak most against it. "
+            "Leave the constraint out, or look at the data."
+        )
+
+
+def _speaks_against(one, free, X):
+    """Whether the free fit is certain of what an inequality forbids."""
+    if one.input is None:
+        beyond = one.sign * (one.limit - free.predict(X)[:, one.output])
+        of_rows, of_noise = free.posterior.inside(free, X.T), free.posterior.noise[:, None]
+        deviation = np.sqrt(np.maximum(of_rows**2 - of_noise**2, 0.0))[one.output]
+        return bool((beyond > _CERTAIN * deviation).any())
+    slopes = one.sign * free.gradient(X)[:, one.input, one.output]
+    if -slopes[slopes < 0.0].sum() <= _MUCH * np.abs(slopes).sum():
+        return False
+    column = X[:, one.input]
+    edges = np.quantile(column, np.linspace(0.0, 1.0, _PARTS + 1))
+    for low, high in pairwise(edges):
+        before = X[(low <= column) & (column <= high)]
+        after = before.copy()
+        before[:, one.input], after[:, one.input] = low, high
+        falls = -one.sign * (free.predict(after) - free.predict(before)).mean(axis=0)[one.output]
+        if (
+            falls
+            > _CERTAIN * free.posterior.of_mean(free, after.T.copy(), before.T.copy())[one.output]
+        ):
+            return True
+    return False

@@ -1,0 +1,64 @@
+"""The nearest consequents that keep linear constraints.
+
+(u - u0)' M (u - u0), with M = L L' the matrix of the normal equations, is to be least over
+E u = e, G u >= h. In v = L' (u - u0) equalities are eliminated by a QR factorisation; the rest is
+least-distance programming by non-negative least squares (Lawson and Hanson 1974, chapter 23).
+"""
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.optimize import nnls
+
+from ..consequent import NormalFactor
+
+# A minimum below this is zero; rows are of length one.
+_ZERO = 1e-10
+# Equalities of which one follows from others.
+_DEPENDENT = 1e-10
+
+
+class InfeasibleError(Exception):
+    """No consequents keep the constraints; ``by_equalities``: not even the equalities alone."""
+
+    def __init__(self, by_equalities):
+        super().__init__()
+        self.by_equalities = by_equalities
+
+
+def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
+    """The u nearest to ``start`` with E u = e and G u >= h, and which of these hold it back."""
+    half = factor.half_solve(at_least.T)
+    base, toward = np.empty((len(half), 0)), np.empty(0)
+    if equal.size:
+        base, triangle = np.linalg.qr(factor.half_solve(equal.T))
+        sizes = np.abs(np.diagonal(triangle))
+        if (sizes <= _DEPENDENT * sizes.max(initial=0.0)).any() or equal.shape[0] > len(half):
+            raise InfeasibleError(True)
+        toward = solve_triangular(triangle, equal_to - equal @ start, trans="T")
+    short = least - at_least @ start - half.T @ (base @ toward)
+    free = half - base @ (base.T @ half)
+    length = np.sqrt(np.sum(free**2, axis=0))
+    # What equalities decide, or nothing can change: met, or not to be met.
+    fixed = length <= _DEPENDENT * np.sqrt(np.sum(half**2, axis=0)) + np.finfo(float).tiny
+    if (short[fixed] > _ZERO * (1.0 + np.abs(least[fixed]))).any():
+        raise InfeasibleError(False)
+    multipliers = np.zeros(least.size)
+    kept = ~fixed
+    if (short[kept] > 0.0).any():
+        found = _least_distance(free[:, kept] / length[kept], short[kept] / length[kept])
+        multipliers[kept] = found / length[kept]
+    step = base @ toward + free @ multipliers
+    return start + factor.back_solve(step), multipliers > 0.0
+
+
+def _least_distance(columns, short):
+    """Multipliers of the shortest t with columns' t >= short."""
+    scale = short.max()
+    rows = np.vstack([columns, short / scale])
+    target = np.zeros(rows.shape[0])
+    target[-1] = 1.0
+    multipliers, distance = nnls(rows, target, maxiter=30 * max(rows.shape))
+    rest = 1.0 - (short / scale) @ multipliers
+    if distance <= _ZERO or rest <= _ZERO**2:
+        raise InfeasibleError(False)
+    return scale * multipliers / rest

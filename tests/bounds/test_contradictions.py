@@ -1,0 +1,50 @@
+"""What data say against a constraint: against a t statistic, on shapes, and on what is true."""
+
+import numpy as np
+import pytest
+
+from skanfis import ANFISRegressor
+from skanfis.bounds.contradictions import contradicted
+from skanfis.bounds.fitting import Inequality
+
+RISES = Inequality(0, 1.0, 0, 0.0, "rises")
+BELOW = Inequality(0, -1.0, None, 1.0, "limit")
+
+
+def told(model, X, y, inequality):
+    rows = X, y[:, None], np.arange(len(y))
+    return list(contradicted(model.model_, model.model_, [inequality], rows, 2.0))
+
+
+@pytest.mark.parametrize("t", [-6.0, -3.0, 6.0])
+def test_a_line_speaks_by_its_t_statistic(t, rng):
+    """Of a single rule the mean change over its deviation is slope over standard error."""
+    x, noise = rng.uniform(-1.0, 1.0, 200), rng.normal(size=200)
+    design = np.column_stack([np.ones(200), x])
+    noise -= design @ np.linalg.lstsq(design, noise, rcond=None)[0]
+    deviation = np.sqrt(noise @ noise / 198.0 / np.sum((x - x.mean()) ** 2))
+    X, y = x[:, None], t * deviation * x + noise
+    line = ANFISRegressor(n_mfs=1, alpha=1e-9, agreement=0.0).fit(X, y)
+    assert bool(told(line, X, y, RISES)) == (t < -4.0)
+
+
+def test_a_hump_speaks_against_rising_and_against_a_limit(rng):
+    X = rng.uniform(-1.0, 1.0, (300, 2))
+    y = 1.5 - 2.0 * X[:, 0] ** 2 + 0.1 * rng.normal(size=300)
+    free = ANFISRegressor(n_mfs=[3, 1]).fit(X, y)
+    assert told(free, X, y, RISES)
+    assert told(free, X, y, BELOW)
+    assert not told(free, X, y, Inequality(0, -1.0, None, 1.6, "limit"))
+
+
+def test_what_is_true_is_not_contradicted():
+    """Forty draws of a saturation, which is flat for half of the range, by three terms."""
+    n_told = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        X = rng.uniform(-1.0, 1.0, (100, 2))
+        y = np.minimum(X[:, 0], 0.0) + 0.3 * rng.normal(size=100)
+        free = ANFISRegressor(n_mfs=[3, 1]).fit(X, y)
+        n_told += bool(told(free, X, y, RISES))
+        n_told += bool(told(free, X, y, Inequality(0, -1.0, None, 0.0, "limit")))
+    assert n_told <= 1
