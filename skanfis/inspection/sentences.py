@@ -28,9 +28,8 @@ MOST_DIGITS = 17
 _DIGITS_OF_PLACE = 2
 # As rounding leaves a 0 or a 1.
 _DIGITS_OF_CASE = 6
-# In deviations of an output: numbers are not written finer, and as they are where nothing is known
-# of the noise.
-_FINEST, _UNKNOWN_NOISE = 1e-4, 1e-2
+# Of an output's deviation: numbers are written no finer, and so fine where the noise is not known.
+_FINEST = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +152,7 @@ def _resolution(model, slopes):
     else:
         scale = model.target.spread
     scale = np.where(scale > 0.0, scale, 1.0)
-    noise = _UNKNOWN_NOISE * scale if model.posterior is None else model.posterior.noise
+    noise = 0.0 * scale if model.posterior is None else model.posterior.noise
     return scale, np.clip(noise, _FINEST * scale, scale)
 
 

@@ -28,6 +28,8 @@ from .trials import Held, Plan
 from .tuning import FIRST_PENALTY, scaled
 
 _MIB = 2**20
+# Columns that a warning names; it counts the others.
+_MOST_NAMED = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -263,6 +265,8 @@ def report_constant(rows, names):
         for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
         if is_flat
     ]
+    if len(flat) > _MOST_NAMED:
+        flat = [*flat[:_MOST_NAMED], f"and {len(flat) - _MOST_NAMED:,} more"]
     warn_user(
         f"Constant in the training data: column {', '.join(flat)}. Nothing can be learnt from "
         "it: it gets no fuzzy terms and no slope. Drop it, or train on data where it varies.",

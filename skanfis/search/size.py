@@ -24,7 +24,7 @@ def n_bytes(n_rules: int, n_terms: int, n_basis: int, n_outputs: int) -> int:
 
 
 def check_columns_fit(n_inputs, limit):
-    """Raise ValueError where the products of all pairs of columns need more than ``limit`` bytes."""
+    """Raise ValueError where products of all pairs of columns need more than ``limit`` bytes."""
     needed = 8 * _ROWS_OF_PAIRS * (1 + n_inputs) ** 2 // 2
     if needed > limit:
         raise ValueError(

@@ -91,8 +91,10 @@ def test_what_cannot_be_drawn_is_refused(rng):
 
 
 def test_text_says_sides_with_the_length_over_which_they_turn():
-    # Of 1,000,360 plus or minus 527.3 as many digits are written as the outputs ask for.
-    path = "IF time > 1000360 ± 527.3 and > 1000660 ± 263.7 AND chip temperature < 14 ± 26.37\n"
+    # Of 1,000,360 plus or minus 527.334 as many digits are written as the outputs ask for.
+    path = (
+        "IF time > 1000360 ± 527.334 and > 1000660 ± 263.667 AND chip temperature < 14 ± 26.3667\n"
+    )
     text = export_text(A_TREE)
     assert path in text
     # They say all: no list repeats them.

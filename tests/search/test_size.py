@@ -8,6 +8,7 @@ from sklearn import config_context
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
+from skanfis.exceptions import ConstantInputWarning
 from skanfis.learning import VariableProjection
 from skanfis.search import size
 
@@ -55,9 +56,8 @@ def test_clusters_that_are_too_many_are_refused_before_memory_is_asked_for(rng, 
     assert peak < max(8 * n_columns**2, 8e6)
 
 
-def test_more_columns_than_pairs_have_room_for_are_refused_at_once():
-    X = np.zeros((30, 20_000))
-    X[:, 0] = np.arange(30.0)
+def test_more_columns_than_pairs_have_room_for_are_refused_at_once(rng):
+    X = rng.normal(size=(30, 20_000))
     tracemalloc.start()
     try:
         with pytest.raises(ValueError, match=r"X has 20,000 columns: .* 205 GB, and the limit"):
@@ -66,3 +66,10 @@ def test_more_columns_than_pairs_have_room_for_are_refused_at_once():
     finally:
         tracemalloc.stop()
     assert peak < 20 * X.nbytes
+
+
+def test_of_many_constant_columns_ten_are_named(rng):
+    X = np.zeros((30, 15))
+    X[:, 0] = rng.normal(size=30)
+    with pytest.warns(ConstantInputWarning, match=r"'x10' \(always 0\), and 4 more\. Nothing"):
+        ANFISRegressor().fit(X, X[:, 0])
