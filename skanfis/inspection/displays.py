@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._validation import check_count, position_of
+from ..antecedent import TreeAntecedent
 from ..export import fold, fold_with_rows
 from .labels import as_label
 from .rules import has_training_data
@@ -49,7 +50,8 @@ class MembershipDisplay:
     ----------
     inputs : list of InputTerms
         For each input "input_name", "term_names", a "grid" of values, the memberships "before" and
-        "after" training, (n_terms, n_points), "edges" and "counts" of the histogram, or None.
+        "after" training, (n_terms, n_points), "edges" and "counts" of the histogram, or None. Of
+        the cuts of a tree there are the sides above.
 
     Examples
     --------
@@ -105,6 +107,9 @@ class MembershipDisplay:
 def _terms_on(model, j, rows):
     grid = np.linspace(model.minimum[j], model.maximum[j], _N_POINTS)
     own = np.flatnonzero(model.antecedent.term_inputs == j)
+    if isinstance(model.antecedent, TreeAntecedent):
+        # Of a cut the side above; the one below is the rest to one.
+        own = own[own < model.antecedent.n_nodes]
     Z = np.zeros((model.n_inputs, _N_POINTS))
     Z[j] = grid
     names = tuple(model.term_names[t] for t in own)
@@ -120,7 +125,8 @@ def _draw_terms(axes, terms):
         heights = terms.counts / max(terms.counts.max(), 1)
         axes.stairs(heights, terms.edges, fill=True, color="0.9", zorder=0)
     # Colours in the order of places: scattered terms come in the order of their rules.
-    rank = np.argsort(np.argsort(terms.after.argmax(axis=1), kind="stable"))
+    places = terms.after @ terms.grid / terms.after.sum(axis=1)
+    rank = np.argsort(np.argsort(places, kind="stable"))
     shades = _pyplot().get_cmap()(np.linspace(0.0, _BRIGHTEST, len(names)))[rank]
     for name, before, after, shade in zip(names, terms.before, terms.after, shades, strict=True):
         axes.plot(terms.grid, before, "--", color=shade, linewidth=1.0, alpha=0.7)
