@@ -258,10 +258,14 @@ def _on_signs(said):
             up, down = (np.flatnonzero(is_clear & (sign * slopes > 0.0)) for sign in (1.0, -1.0))
             if up.size and down.size:
                 name = model.input_names[j] + (f" (of {output})" if model.n_outputs > 1 else "")
-                rises, falls = (", ".join(map(str, rules)) for rules in (up, down))
-                found.append(f"by {name} up in rule {rises} and down in rule {falls}")
+                rises, falls = map(_rules, (up, down))
+                found.append(f"by {name} up in {rises} and down in {falls}")
     named = _named(found, "; ")
     return [f"Rules go different ways, beyond chance: {named}."] if found else []
+
+
+def _rules(numbers):
+    return f"rule{'' if len(numbers) == 1 else 's'} {', '.join(map(str, numbers))}"
 
 
 def _named(parts, between=", "):

@@ -219,9 +219,9 @@ def _conclusion(said, r, k, levels):
 
 
 def _slopes(said, slopes, places, is_said, levels):
-    """Say "+5.8 per rooms from 6.3", or "-2.1 if private is 1"."""
-    parts = []
-    for j in np.flatnonzero(is_said):
+    """Say "+5.8 per rooms from 6.3", or "-2.1 if private is 1"; what does most comes first."""
+    parts, does = [], np.abs(slopes) * said.model.spread
+    for j in sorted(np.flatnonzero(is_said), key=lambda j: -does[j]):
         name, slope, place = said.model.input_names[j], slopes[j], places[j]
         if said.two_valued[j]:
             other = 1.0 - place
