@@ -12,7 +12,7 @@ def readability(model, X, y):
 
     "strongest": the strongest rule alone, RMS to the model in deviations of the target. "false" and
     "alike": terms that are nowhere on the rows truer than 0.5, and pairs of neighbours that cross
-    above 0.9. "cost": numerals in the rules' sentences.
+    above 0.9. "cost": numerals in the rules' sentences. "text": RMSE of the text over the model's.
     """
     strengths, consequents = model.strengths(X), model.consequents_
     rows = np.arange(X.shape[0])
@@ -26,6 +26,7 @@ def readability(model, X, y):
         "alike": n_alike,
         "rules": int(model.n_rules_),
         "cost": model.readability_.reading_cost,
+        "text": float(model.readability_.summary["text_over_model"]),
     }
 
 

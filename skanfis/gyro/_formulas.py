@@ -32,7 +32,7 @@ def rules_text(calibration, found=None):
     found = readability_of(calibration) if found is None else found
     caution = ""
     if found.findings:
-        head = "The rules are not fit to be read one by one:"
+        head = "What speaks against reading the rules one by one:"
         caution = "\n".join([head, *found.findings, "", ""])
     estimator = calibration.model
     # Folded, a model knows of no readability in training, and the text has the caution once.

@@ -116,7 +116,7 @@ def errors_and_verdict(calibration):
     others = "as --write asks" if asked else "as recommended; --write names another"
     lines.append(f"written is     {what}, {others}")
     if calibration.writes_model and (findings := readability_of(calibration).findings):
-        lines.append(f"rules          not fit to be read one by one. {findings[0]}")
+        lines.append(f"rules          against reading them one by one: {findings[0]}")
     return lines
 
 
