@@ -18,8 +18,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ..membership import GREATEST_CROSSING, LEAST_TRUTH
-
 # Neighbouring gaps differ at most by this factor, the outer ones by the second from the next.
 _LOG_RATIO, _LOG_OUTER = np.log(2.2), np.log(1.45)
 # A ratio of gaps changes by so much, as a logarithm, per displacement: a term between two others
@@ -36,6 +34,9 @@ LOG_FLATTER = np.log(1.5)
 _BEYOND, _FREE_BEYOND = 0.25, 1.0
 # A gap that a step has closed, as part of the range.
 _SMALLEST_GAP = 1e-9
+# Between two terms one is at least so true, and at most so true is the smaller: more, and no reader
+# can say which of the two is meant.
+_LEAST_TRUTH, _GREATEST_CROSSING = 0.5, 0.9
 # Factors of a width that are looked at for the least and the most.
 _CHANGES = 256
 
@@ -187,9 +188,9 @@ def _range(term, raw, reach):
     places = np.array([[[-0.5]], [[0.5]]]).repeat(_CHANGES, axis=1)
     truth = np.exp([term.family.log_value(place, moved)[:, 0] for place in places])
     # A term that is true to one side for good has its flank on the other.
-    flanks = [side for side in truth if side[0] < GREATEST_CROSSING] or [truth[0]]
-    is_true = np.min(flanks, axis=0) >= LEAST_TRUTH
-    is_distinct = np.max(flanks, axis=0) <= GREATEST_CROSSING
+    flanks = [side for side in truth if side[0] < _GREATEST_CROSSING] or [truth[0]]
+    is_true = np.min(flanks, axis=0) >= _LEAST_TRUTH
+    is_distinct = np.max(flanks, axis=0) <= _GREATEST_CROSSING
     least = changes[is_true.argmax()] if is_true.any() else 0.0
     most = changes[np.flatnonzero(is_distinct)[-1]] if is_distinct.any() else 0.0
     return min(least, -_MOBILE), max(most, 0.0)

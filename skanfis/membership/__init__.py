@@ -1,6 +1,6 @@
 """Families of membership functions; ``base`` has the conventions that all of them follow."""
 
-from .base import GREATEST_CROSSING, LEAST_TRUTH, Membership, Parameter
+from .base import Membership, Parameter
 from .bell import Bell
 from .flanked import PiShaped, SShaped, Trapezoidal, Triangular, TwoSidedGaussian, ZShaped
 from .gaussian import Gaussian
@@ -16,8 +16,6 @@ from .sigmoid import (
 
 __all__ = [
     "FAMILIES",
-    "GREATEST_CROSSING",
-    "LEAST_TRUTH",
     "MEMBERSHIPS",
     "NAMES_IN_MATLAB",
     "PRODUCTS",

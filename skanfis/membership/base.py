@@ -28,14 +28,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-__all__ = ["GREATEST_CROSSING", "LEAST_TRUTH", "Membership", "Parameter"]
-
-# A term that is never truer than this is, on every row, more false than true: its name describes
-# no row.
-LEAST_TRUTH = 0.5
-# Neighbours that cross above this are both all but true at one place: no reader can say which of
-# the two is meant. Terms that share an input evenly cross at 0.5 to 0.7.
-GREATEST_CROSSING = 0.9
+__all__ = ["Membership", "Parameter"]
 
 # exp(-u^2 / 2) = 1/2 at this u.
 _HALF_HEIGHT = np.sqrt(2.0 * np.log(2.0))
