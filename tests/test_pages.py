@@ -17,7 +17,7 @@ WITH_PROMPTS = {
     "add_a_membership": 5,
     "files": 5,
     "how_sure": 15,
-    "reading_rules": 12,
+    "reading_rules": 20,
     "training": 20,
     "trees": 9,
 }
