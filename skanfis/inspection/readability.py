@@ -1,7 +1,6 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -72,7 +71,7 @@ class Readability:
     model: TSKModel
     measures: Measures
 
-    @cached_property
+    @property
     def _said(self):
         return Sentences.of(writable(self.model))
 
