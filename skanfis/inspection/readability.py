@@ -12,7 +12,7 @@ from .._validation import check_finite, positive_weights
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .measures import Measures, measure
-from .rules import premise_texts, writable
+from .rules import has_training_data, premise_texts, writable
 from .sentences import Sentences
 
 # In deviations of the target: whoever reads the strongest rule alone is then as wrong as a model
@@ -136,10 +136,10 @@ class Readability:
         return sentences
 
     def _on_few_rows(self):
-        """Rules that are the strongest on fewer rows than they have numbers."""
-        numbers, rows = self._said.n_numbers, self.measures.rule_rows
+        """Rules that are the strongest on fewer training rows than they have numbers."""
+        numbers, rows = self._said.n_numbers, self.model.rule_rows
         few = np.flatnonzero(rows < numbers)
-        if not few.size or self.model.n_rules == 1:
+        if not few.size or self.model.n_rules == 1 or not has_training_data(self.model):
             return []
         named = _named([f"{r} (rows: {rows[r]:.3g}, numbers: {numbers[r]})" for r in few])
         return [f"Strongest on fewer rows than its sentence has numbers: rule {named}."]

@@ -29,9 +29,10 @@ def found_of(model, **changes):
     X = rows_of(model, 1.0)
     y = np.random.default_rng(0).normal(size=(len(X), model.n_outputs))
     found = readability_of_rows(model, X, y)
-    ones, rows = np.ones(model.n_outputs), np.full(model.n_rules, 50.0)
-    passing = {"alone": 0.5 * ones, "errors": ones, "printed_errors": ones, "rule_rows": rows}
-    return replace(found, measures=replace(found.measures, **(passing | changes)))
+    ones, rows = np.ones(model.n_outputs), changes.pop("rule_rows", np.full(model.n_rules, 50.0))
+    passing = {"alone": 0.5 * ones, "errors": ones, "printed_errors": ones}
+    measures = replace(found.measures, **(passing | changes))
+    return replace(found, model=replace(model, rule_rows=rows), measures=measures)
 
 
 @pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
@@ -92,6 +93,17 @@ def test_what_is_beyond_a_limit_is_said():
     assert sentence == (
         "Strongest on fewer rows than its sentence has numbers: rule 11 (rows: 6, numbers: 7)."
     )
+
+
+def test_rows_are_counted_whatever_the_unit_of_the_weights():
+    rng = np.random.default_rng(0)
+    X = rng.normal(size=(300, 2))
+    y, weight = np.abs(X[:, 0]) + 0.1 * rng.standard_normal(300), rng.uniform(0.5, 1.5, 300)
+    model = ANFISRegressor(partition="tree", max_rules=2)
+    for unit in (1e-4, 1.0):
+        assert "fewer rows" not in str(model.fit(X, y, unit * weight).readability_)
+    few = replace(model.model_, rule_rows=np.array([298.0, 2.0]))
+    assert "rule 1 (rows: 2, numbers:" in str(replace(model.readability_, model=few))
 
 
 def test_rules_that_go_different_ways_beyond_chance():
