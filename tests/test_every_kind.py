@@ -38,7 +38,6 @@ from skanfis.inspection import (
     TreeDisplay,
     explain,
     export_text,
-    memberships_table,
     readability,
     rules_html,
     rules_table,
@@ -268,7 +267,6 @@ class TestReading:
         assert text.count("\n  IF ") == estimator.n_rules_
         assert rules_html(estimator).count("</tr>") == estimator.n_rules_ + 2
         assert len(rules_table(estimator)) == estimator.n_rules_
-        assert len(memberships_table(estimator)) == estimator.model_.antecedent.n_terms
         found = readability(estimator, X, Y)
         assert_allclose(found.rules["weight"].sum(), 1.0)
         pytest.importorskip("matplotlib")

@@ -26,7 +26,7 @@ def conditions(model):
     return [dict(sorted(rule.items())) for rule in rules]
 
 
-def premise_texts(model, levels=None):
+def premise_texts(model, levels=()):
     """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" of a rule that asks nothing."""
     names = model.input_names
     return [
@@ -35,14 +35,11 @@ def premise_texts(model, levels=None):
     ]
 
 
-def condition(name, term, levels=None):
-    """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator.
-
-    ``levels`` are the raw columns and levels of indicators (``Reader.levels``).
-    """
+def condition(name, term, levels=()):
+    """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator."""
     if term.startswith(("<", ">")):
         return f"{name} {term}"
-    if term in ("0", "1") and levels and name in levels:
+    if term in ("0", "1") and name in levels:
         column, level = levels[name]
         return f"{column} is {'' if term == '1' else 'not '}{level}"
     return f"{name} is {term}"
@@ -153,39 +150,6 @@ def rules_table(estimator: Any) -> Any:
         for j, name in enumerate(model.input_names):
             columns[f"then {output}", name] = said.slopes[:, j, k]
     return pd.DataFrame(columns, index=pd.RangeIndex(model.n_rules, name="rule"))
-
-
-def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
-    """Tabulate the membership functions.
-
-    Parameters
-    ----------
-    estimator : fitted estimator or TSKModel
-        As :func:`skanfis.export.fold` takes it.
-    trained : bool, default=True
-        Whether to give the memberships after training, or as they were before it.
-
-    Returns
-    -------
-    table : DataFrame
-        One row per term, by its number: "input", "name", "function", and every parameter in the
-        units of the input, missing where a family has none such.
-
-    Examples
-    --------
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.inspection import memberships_table
-    >>> model = ANFISRegressor(n_mfs=[2, 1]).fit(*make_jang_sinc())
-    >>> memberships_table(model, trained=False)
-         input  name  function  center  width
-    term
-    0       x0   low  gaussian   -10.0   9.89
-    1       x0  high  gaussian    10.0   9.89
-    """
-    terms = fold(estimator).memberships(trained)
-    table = pd.DataFrame(terms, columns=None if terms else ["input", "name", "function"])
-    return table.rename_axis(index="term")
 
 
 def explain(estimator: Any, X: ArrayLike) -> Any:

@@ -13,7 +13,6 @@ from skanfis import ANFISRegressor
 from skanfis.inspection import (
     MembershipDisplay,
     ResponseSurfaceDisplay,
-    memberships_table,
 )
 from skanfis.inspection.labels import as_label, printable
 
@@ -46,7 +45,7 @@ class TestMemberships:
             with pytest.raises(ValueError, match="no terms: nothing to draw"):
                 MembershipDisplay.from_estimator(model)
             return
-        table = memberships_table(model)
+        table = pd.DataFrame(model.memberships())
         for one in MembershipDisplay.from_estimator(model).inputs:
             own = table[table["input"] == one.input_name]
             # Of a cut the side above says all.
