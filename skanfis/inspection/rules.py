@@ -53,14 +53,6 @@ def weightiest(model, max_shown):
     return np.argsort(-np.round(model.rule_weights, 9), kind="stable")[:max_shown].tolist()
 
 
-def rule_values(model, rows):
-    """f_r at rows in the box, shape (n_rows, n_rules, n_outputs)."""
-    constant, slopes = model.coefficients[:, 0], model.coefficients[:, 1:]
-    if not model.order:
-        return np.tile(constant, (len(rows), 1, 1))
-    return constant + np.einsum("nj,rjo->nro", rows - model.reference, slopes)
-
-
 def has_training_data(model):
     """Whether the model remembers training data; one read from a .fis file has none."""
     return bool(np.any(model.rule_rows))
@@ -88,18 +80,15 @@ def rename(model, feature_names, output_names):
         ("input_names", "feature_names", feature_names),
         ("output_names", "output_names", output_names),
     ):
-        if names is not None:
-            count = len(getattr(model, kind))
-            model = replace(model, **{kind: _checked_names(parameter, names, count)})
+        if names is None:
+            continue
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
+        count = len(getattr(model, kind))
+        if len(names) != count or len(set(names)) != count:
+            raise ValueError(f"{parameter}={list(names)!r} must be {count} names, all different.")
+        model = replace(model, **{kind: tuple(names)})
     return writable(model)
-
-
-def _checked_names(parameter, names, count):
-    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
-        raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
-    if len(names) != count or len(set(names)) != count:
-        raise ValueError(f"{parameter}={list(names)!r} must be {count} names, all different.")
-    return tuple(names)
 
 
 def rules_table(estimator: Any) -> Any:
@@ -196,7 +185,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
         raise ValueError(model.describe_out_of_bounds(rows))
     nearest = np.clip(rows, model.minimum, model.maximum)
     strengths = model.strengths(nearest)
-    values = rule_values(model, nearest)
+    values = np.einsum("bn,rbo->nro", model.basis(nearest.T), model.coefficients)
     if model.out_of_bounds == "nan":
         values[~inside] = np.nan
     n_rows, (n_rules, n_inputs) = len(rows), (model.n_rules, model.n_inputs)

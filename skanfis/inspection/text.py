@@ -103,7 +103,7 @@ def export_text(
     """
     said, found = _said(estimator, precision, feature_names, output_names)
     model, chosen = said.model, weightiest(said.model, max_shown)
-    parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
+    parts = [f"{counted(model.n_rules, 'rule')}, {counted(model.n_inputs, 'input')}."]
     common = _common_lines(said)
     parts += [fill(f"Common to the rules, {line}.", _WIDTH) for line in common]
     if common:
@@ -167,7 +167,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     with pd.option_context("display.max_colwidth", None):
         table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
-    counts = f"<b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}"
+    counts = f"<b>{counted(model.n_rules, 'rule')}</b> on {counted(model.n_inputs, 'input')}"
     parts = [f"<div>{counts}</div>", table]
     lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
     if len(chosen) < model.n_rules:
@@ -244,7 +244,7 @@ def _errors(found, r):
 def _last_lines(said, found, precision=PRECISION):
     """How many numbers there are to read, and, after a fit, what speaks against reading them."""
     if found is None or precision != PRECISION:
-        return [f"{_count(said.reading_cost, 'number')}."]
+        return [f"{counted(said.reading_cost, 'number')}."]
     return str(found).splitlines()
 
 
@@ -287,7 +287,7 @@ def _term_text(term):
 
 
 def _left_out(model, chosen):
-    text = _count(model.n_rules - len(chosen), "rule")
+    text = counted(model.n_rules - len(chosen), "rule")
     if not has_training_data(model):
         return text
     weight = max(1.0 - model.rule_weights[chosen].sum(), 0.0)
@@ -317,5 +317,6 @@ def number(value, precision):
     return f"{rounded:.{max(precision, 15)}g}"
 
 
-def _count(number_of, what):
+def counted(number_of, what):
+    """Say "1 rule", "12 rules"."""
     return f"{number_of} {what}" + ("" if str(number_of) == "1" else "s")
