@@ -195,30 +195,27 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     beyond = way[:, :, None] * gradient
     said = np.einsum("nr,nro->no", strengths, values) + beyond.sum(axis=1)
     held = np.nan_to_num(np.clip(said, *model.output_limits) - said)
-    order = np.argsort(-strengths, axis=1, kind="stable")
-    strengths = np.take_along_axis(strengths, order, axis=1)
-    values = np.take_along_axis(values, order[:, :, None], axis=1)
-    # By row, and for all that may have a line there: the rules, beyond each input, held.
+    # By row, all that may have a line there: the rules, the way beyond each input, what is held.
     strength = np.hstack([strengths, np.full((n_rows, n_inputs + 1), np.nan)])
     value = np.hstack([values, gradient, np.full((n_rows, 1, model.n_outputs), np.nan)])
     contribution = np.hstack([strengths[:, :, None] * values, beyond, held[:, None]])
     has_line = np.ones(contribution.shape, dtype=bool)
     has_line[:, n_rules:-1] = way[:, :, None] != 0.0
     has_line[:, -1] = held != 0.0
+    # The strongest first, and last what has no strength.
+    order = np.argsort(-strength, axis=1, kind="stable")
+    has_line = np.take_along_axis(has_line, order[:, :, None], axis=1)
     row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
-    # Numbers of rules first, then those of the other lines.
-    source = np.hstack([order, np.tile(np.arange(n_rules, strength.shape[1]), (n_rows, 1))])
-    source = source[row, place]
-    texts = premise_texts(model)
-    texts += [*(f"beyond {name}" for name in model.input_names), "held"]
+    source = order[row, place]
+    texts = [*premise_texts(model), *(f"beyond {name}" for name in model.input_names), "held"]
     return pd.DataFrame(
         {
             "row": row,
             "output": np.array(model.output_names, dtype=object)[output],
             "rule": pd.Series(source, dtype="Int64").where(source < n_rules),
             "if": np.array(texts, dtype=object)[source],
-            "strength": strength[row, place],
-            "value": value[row, place, output],
-            "contribution": contribution[row, place, output],
+            "strength": strength[row, source],
+            "value": value[row, source, output],
+            "contribution": contribution[row, source, output],
         }
     )
