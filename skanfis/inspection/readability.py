@@ -110,10 +110,7 @@ class Readability:
         found = self.measures
         is_known = (found.errors > 0.0).all()
         ratio = found.printed_errors / found.errors if is_known else np.array([np.nan])
-        figures = {
-            "strongest_alone": float(found.alone.max()),
-            "text_over_model": float(ratio.max()),
-        }
+        figures = {"strongest_alone": found.alone.max(), "text_over_model": ratio.max()}
         return pd.Series(figures, name="readability")
 
     @property

@@ -113,17 +113,12 @@ class TreeDisplay:
         self.figure_ = self.ax_.figure
         return self
 
-    def _conditions(self):
-        """Above and below each node in words."""
-        model = self.model
-        names = [as_label(model.input_names[j]) for j in model.antecedent.term_inputs]
-        said = [condition(*pair) for pair in zip(names, model.term_names, strict=True)]
-        return np.array(said, dtype=object).reshape(2, -1).T
-
     def _draw_tree(self, ax):
         model, tree = self.model, cast(TreeAntecedent, self.model.antecedent)
-        order, ends = tree.walk
-        n_rules, words = model.n_rules, self._conditions()[order]
+        (order, ends), n_rules = tree.walk, model.n_rules
+        names = [as_label(model.input_names[j]) for j in tree.term_inputs]
+        # Above and below each node.
+        words = np.reshape(list(map(condition, names, model.term_names)), (2, -1)).T[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
         share = np.concatenate([model.rule_weights, np.zeros(n_rules - 1)])
