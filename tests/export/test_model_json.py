@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.export import export_json, read_json, write_json
+from skanfis.export import export_json, read_fis, read_json, write_json
 from skanfis.export.json_reader import parse_json
 
 from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
@@ -214,8 +214,9 @@ def test_a_rule_table_that_a_tree_leaves_comes_back():
 
 @pytest.mark.parametrize("given", [export_json(A_GRID), '{"a": 1}', b"{}", Path('{"a": 1}')])
 def test_text_in_place_of_a_path_is_named(given):
-    with pytest.raises(ValueError, match="path is the text of a model, not the path of a file"):
-        read_json(given)
+    for read in (read_json, read_fis):
+        with pytest.raises(ValueError, match="path is the text of a model, not the path of a file"):
+            read(given)
 
 
 def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):

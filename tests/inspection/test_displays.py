@@ -26,12 +26,6 @@ EACH = pytest.mark.parametrize(
 )
 
 
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
-
-
 def drawn(display):
     """Draw the figure: what is wrong in it raises or warns now."""
     display.figure_.canvas.draw()
