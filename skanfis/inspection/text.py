@@ -23,15 +23,14 @@ from .sentences import MOST_DIGITS, PRECISION, Sentences, rounded
 
 # Letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 3
-_MEAN = (
+# How to compute a prediction; the parts in braces where there is such a thing.
+_HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
-    "AND multiplies."
+    "AND multiplies. {cuts}A rule says its value{line}, plus its own slopes. What it errs is its "
+    "RMSE alone, on the rows on which it is the strongest."
 )
-_CUTS = "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h."
-_SAYS = (
-    "A rule says its value, less the common line's part in it, plus the common line, plus its own "
-    "slopes. What it errs is its RMSE alone, on the rows on which it is the strongest."
-)
+_CUTS = "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h. "
+_LINE = ", less the common line's part in it, plus the common line"
 _IN_PLACE = (
     "A part of every value is from this line; a slope that a rule states stands in its place."
 )
@@ -274,9 +273,9 @@ def _legend(said, precision):
             pairs = zip(model.output_names, values, strict=True)
             told = ", ".join(f"{name} {number(value, precision)}" for name, value in pairs)
             lines.append(f"Standard deviation of the {what}: {told}.")
-    # Cuts say where they turn, all other terms are listed above.
-    cuts = [_CUTS] if any("±" in name for name in model.term_names) else []
-    return "\n".join([*lines, "", fill(" ".join([_MEAN, *cuts, _SAYS]), _WIDTH)])
+    cuts = _CUTS if any("±" in name for name in model.term_names) else ""
+    how = _HOW.format(cuts=cuts, line=_LINE if said.common.any() else "")
+    return "\n".join([*lines, "", fill(how, _WIDTH)])
 
 
 def _term_text(term):

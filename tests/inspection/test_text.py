@@ -203,8 +203,9 @@ def test_a_grid_in_words():
     assert lines[start + 1] == "  IF time is low AND chip temperature is low AND rate is low"
     assert "Outside these ranges the value at the edge is held: out_of_bounds='clip'." in lines
     assert lines[-1] == "84 numbers."
-    # Of no cut is told how it turns.
+    # Of no cut is told how it turns, of no common line what it is for.
     assert "±" not in text
+    assert "common line" not in text
 
 
 def test_places_are_told_to_digits_of_their_widths():
