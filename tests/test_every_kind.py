@@ -27,8 +27,6 @@ from skanfis.export import (
     fold,
     read_fis,
     read_json,
-    write_fis,
-    write_json,
 )
 from skanfis.export.json_reader import parse_json
 from skanfis.inspection import (
@@ -307,7 +305,7 @@ def assert_file_is(model):
 class TestFiles:
     def test_json_and_pickles(self, kind, tmp_path):
         estimator = fitted(kind)
-        write_json(estimator, tmp_path / "model.json", posterior=True)
+        export_json(estimator, tmp_path / "model.json", posterior=True)
         read = read_json(tmp_path / "model.json")
         assert type(read.antecedent) is KINDS[kind]
         assert_array_equal(read.predict(X), estimator.model_.predict(X))
@@ -316,7 +314,7 @@ class TestFiles:
         assert_array_equal(joblib.load(tmp_path / "model.joblib").predict(X), estimator.predict(X))
 
     def test_fis(self, kind, tmp_path):
-        write_fis(fitted(kind), tmp_path / "model.fis")
+        export_fis(fitted(kind), tmp_path / "model.fis")
         read = read_fis(tmp_path / "model.fis")
         came_back = RuleTableAntecedent if kind == "tree" else KINDS[kind]
         assert type(read.antecedent) is came_back

@@ -66,10 +66,11 @@ def read_fis(path: str | PathLike[str]) -> TSKModel:
     >>> from pathlib import Path
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import read_fis, write_fis
+    >>> from skanfis.export import export_fis, read_fis
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_fis(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()), Path(folder) / "sinc.fis")
-    ...     read_fis(Path(folder) / "sinc.fis").n_rules
+    ...     path = Path(folder) / "sinc.fis"
+    ...     text = export_fis(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()), path)
+    ...     read_fis(path).n_rules
     16
     """
     data = read_bytes(path, _MOST_BYTES)
