@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from html import escape
+from itertools import compress
 from textwrap import fill
 from typing import Any
 
@@ -249,11 +250,7 @@ def _last_lines(said, found, precision=PRECISION):
 
 def _legend(said, precision):
     model, lines = said.model, ["Inputs, as they were trained:"]
-    named = [
-        term
-        for term, is_said in zip(model.memberships(), said.says_where, strict=True)
-        if not is_said
-    ]
+    named = list(compress(model.memberships(), ~said.says_where))
     for name, low, high in zip(model.input_names, model.minimum, model.maximum, strict=True):
         lines.append(f"  {name}: {_range(low, high, _DIGITS_OF_RANGE)}")
         terms = [term for term in named if term["input"] == name]
