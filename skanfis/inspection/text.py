@@ -160,7 +160,8 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     if has_training_data(model):
         cells["data", "rows"] = [_share(model, r) for r in chosen]
         if found is not None:
-            cells["data", "error"] = [_errors(found, r) for r in chosen]
+            fires = model.rule_rows > 0
+            cells["data", "error"] = [_errors(found, r) if fires[r] else "" for r in chosen]
     cells["rule", "if"] = [premises[r] for r in chosen]
     for k, name in enumerate(model.output_names):
         cells["then", name] = [_conclusion(said, r, k) for r in chosen]
@@ -225,6 +226,8 @@ def _on_rows(model, found, r):
     """On which part of the rows a rule is the strongest, and what it errs there alone."""
     if not has_training_data(model):
         return []
+    if not model.rule_rows[r]:
+        return ["strongest on no row"]
     share = [f"strongest on {_share(model, r)} of the rows"]
     return share if found is None else [*share, f"errs by {_errors(found, r)} there"]
 

@@ -264,6 +264,14 @@ def test_a_model_without_data_has_no_weights_to_tell():
     assert "\n10 rules left out.\n" in text
 
 
+def test_a_rule_that_is_the_strongest_on_no_row_errs_on_none():
+    rows = np.ones(12)
+    rows[3] = 0.0
+    text = export_text(replace(A_GRID, rule_weights=rows / 11, rule_rows=rows))
+    assert "\nRule 3, strongest on no row:\n" in text
+    assert text.count("strongest on 9.1 % of the rows") == 11
+
+
 class Page(HTMLParser):
     """Collects tags and text, and checks that every tag is closed in its turn."""
 
