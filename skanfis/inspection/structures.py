@@ -78,9 +78,8 @@ class StructureDisplay:
         # The mean's squared error is one of each output, which are standardised.
         most = max(tolerated(least, float(last.model_.n_outputs), last.simplicity), taken)
         tolerance = float(np.sqrt(most))
-        return cls(structures=structures, tolerance=tolerance, simplicity=last.simplicity).plot(
-            ax=ax
-        )
+        display = cls(structures=structures, tolerance=tolerance, simplicity=last.simplicity)
+        return display.plot(ax=ax)
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the candidates on ``ax``, as of :meth:`from_estimator`."""
