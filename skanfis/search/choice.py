@@ -7,8 +7,9 @@ tolerance of ``simplicity`` s where
 
 s of the error where the signal is clear, and no more than that part of what the best explains where
 it is weak. Of all within it that have no more rules than the best, the one that costs least to read
-is taken; of equal cost, that with the smaller error. What is then left of the tolerance goes into
-agreement (``start``).
+is taken; of equal cost, that with the smaller error. Slopes in common are a claim about each rule:
+what the rules err one by one, e^2 + V by the ambiguity decomposition (see ``penalty``), must not be
+more than v then. What is left of the tolerance goes into agreement (``start``).
 """
 
 from dataclasses import dataclass
@@ -34,12 +35,15 @@ class Judged:
         Expected of new rows, once trained on all rows.
     cost : int
         To read it.
+    squared_error_of_rules : float
+        As ``squared_error``, of the rules one by one, each on the rows on which it fires.
     """
 
     candidate: Candidate
     squares: np.ndarray
     squared_error: float
     cost: int
+    squared_error_of_rules: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +96,6 @@ def within(judged, best: Judged, most):
     return [one for one in judged if one.squared_error <= most and one.candidate.n_rules <= n_rules]
 
 
-def chosen(judged, best: Judged, most):
-    """Of all within, what costs least to read."""
-    return min(within(judged, best, most), key=lambda one: (one.cost, one.squared_error))
+def chosen(found):
+    """What costs least to read."""
+    return min(found, key=lambda one: (one.cost, one.squared_error))

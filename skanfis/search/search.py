@@ -55,10 +55,13 @@ class StructureSearch:
         variance = self._variance()
         most = tolerated(best.squared_error, variance, self.simplicity)
         # Only there: with two looks at every size, chance would have two.
-        rules = [one for one in within(self.judged, best, most) if one.candidate.n_rules > 1]
-        for one in rules:
-            self._judge(*_with_common_slopes(one.candidate, self.in_folds[one.candidate]))
-        found = chosen(self.judged, best, most)
+        for one in within(self.judged, best, most):
+            if one.candidate.n_rules > 1:
+                simpler = _with_common_slopes(one.candidate, self.in_folds[one.candidate])
+                # A slope that rules share is said of each of them: they are to beat the mean alone.
+                if self._judge(*simpler).squared_error_of_rules > variance:
+                    self.judged.pop()
+        found = chosen(within(self.judged, best, most))
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
         left = most / error if error > 0.0 else 1.0
@@ -95,7 +98,8 @@ class StructureSearch:
         factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
         squares *= factor
         error = self.judges.mean(squares)
-        judged = Judged(candidate, squares, error, cost_of(self.trials.tuned(candidate)))
+        tuned = self.trials.tuned(candidate)
+        judged = Judged(candidate, squares, error, cost_of(tuned), error + tuned.disagreement)
         self.judged.append(judged)
         return judged
 

@@ -89,6 +89,12 @@ class Tuned:
         """The evaluation at the weights found, where those it was made at are others."""
         return self.problem.solved_again(self.evaluation)
 
+    @property
+    def disagreement(self):
+        """Of rules that fire together, as in ``penalty``: what the error of each alone exceeds."""
+        normal = self.solved.normal
+        return float(np.vdot(normal.coefficients, normal.disagreement @ normal.coefficients))
+
     @cached_property
     def residual(self):
         """Of the standardised target, (n_rows, n_outputs)."""

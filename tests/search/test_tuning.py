@@ -51,6 +51,18 @@ def test_turns_go_on_from_where_they_were_left(two_rules):
     assert_allclose(more.displacement, whole.displacement, rtol=1e-12)
 
 
+def test_what_rules_err_one_by_one(two_rules):
+    """The mean over rows of sum_r w_r (y - f_r)^2, by its definition."""
+    tuned = tuning.tune(*two_rules, FREE, 100.0, turns=1)
+    rows, evaluation = tuned.problem.rows, tuned.solved
+    Z, target, _ = rows.read(slice(None))
+    basis = np.vstack([np.ones_like(Z[:1]), Z])
+    said = evaluation.coefficients[:, 0].reshape(2, 2) @ basis
+    strengths = evaluation.antecedent.strengths(Z)
+    expected = np.mean(np.sum(strengths * (target - said) ** 2, axis=0))
+    assert_allclose(evaluation.mean_squared_error + tuned.disagreement, expected, rtol=1e-8)
+
+
 def with_agreement(tuned, agreement):
     """The same with consequents alone of another agreement."""
     penalty = replace(tuned.penalty, agreement=agreement)
