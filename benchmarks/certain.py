@@ -22,9 +22,9 @@ from skanfis.bounds import bounds, gradient_bounds, monotonicity
 from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation
 
-from .cases import geometric_mean
+from .cases import folds, geometric_mean
 from .gyro import make_surface
-from .real_sets import SETS, RealSet, folds, load_frame
+from .real_sets import SETS, RealSet, load_frame
 from .report import Measure, Results, Row, Table
 
 __all__ = ["run"]
