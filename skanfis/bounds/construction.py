@@ -23,7 +23,8 @@ have all other terms alike. With w the strengths, a = (center - x_j) / s^2 the s
     dy / dx_j = E b + Cov(a, f) ,    Cov(a, f) = sum over pairs of w_r w_s (a_r - a_s) (f_r - f_s) ,
 
 divided by w_r w_s: the width is s^2 over the distance of their centres, and o = 1. On a grid
-w_r / w_s = e^u, and what is left of E b, w_r^2 b_r, serves all n - 1 pairs of a line: c is 1 / (n - 1).
+w_r / w_s = e^u, and what is left of E b, w_r^2 b_r, serves the n - 1 pairs that r is in: c is
+1 / (n - 1).
 
 *Of one line for all rules* there are none.
 
@@ -50,27 +51,26 @@ ONE_RULE = GridAntecedent.build([], [], [])
 
 
 class _Pairs(NamedTuple):
-    """Rules that must be in order, and what their slopes do for it; widths are negative to fall."""
+    """Pairs of rules, and what must hold of each; widths are negative where predictions fall.
+
+    Rule -1 is zero everywhere; ``column`` is the place of x_j in [1, x].
+    """
 
     above: np.ndarray
     below: np.ndarray
+    column: np.ndarray
     middle: np.ndarray
     width: np.ndarray
     own: np.ndarray  # o
     curved: np.ndarray  # c
+    least: np.ndarray  # in the place of zero
 
 
 @dataclass(frozen=True, eq=False)
 class RuleOrder:
-    """What the rules of one output must keep on all of a box of the inputs of their slopes.
-
-    Rule -1 is zero everywhere. ``columns`` are the places of x_j in [1, x]; the first where
-    slopes by it do nothing. ``signs`` are those of the slopes.
-    """
+    """What the rules of one output must keep on all of a box; ``signs`` are those of slopes."""
 
     pairs: _Pairs
-    columns: np.ndarray
-    least: np.ndarray
     signs: np.ndarray
 
     @classmethod
@@ -78,7 +78,7 @@ class RuleOrder:
         """None where no order is known that is enough; columns are those of ``slope_inputs``."""
         every = np.arange(antecedent.n_rules)
         nothing = np.full(every.size, -1)
-        found, columns, least = [_pairs(nothing[:0], nothing[:0])], [nothing[:0]], [every[:0] * 0.0]
+        found = [_pairs(every[:0], every[:0])]
         for j in np.flatnonzero(signs):
             pairs = _pairs_along(antecedent, j)
             if pairs is None:
@@ -86,23 +86,18 @@ class RuleOrder:
             if signs[j] < 0:
                 pairs = pairs._replace(above=pairs.below, below=pairs.above, width=-pairs.width)
             column = 1 + np.flatnonzero(slope_inputs == j)
-            if not column.size:
-                pairs = _pairs(pairs.above, pairs.below)
-            found.append(pairs)
-            columns.append(np.full(pairs.above.size, column.sum()))
-            least.append(np.zeros(pairs.above.size))
-        for limit, both in ((limits[0], (every, nothing)), (-limits[1], (nothing, every))):
-            if np.isfinite(limit):
-                found.append(_pairs(*both))
-                columns.append(0 * every)
-                least.append(np.full(every.size, limit))
-        pairs = _Pairs(*map(np.concatenate, zip(*found, strict=True)))
-        least = np.concatenate(least)
-        return cls(pairs, np.concatenate(columns), least, signs[slope_inputs])
+            # Without slopes by it there is the plain order.
+            slopes = {"column": column[0]} if column.size else {"own": 0.0, "curved": 0.0}
+            found.append(_pairs(**pairs._asdict() | slopes))
+        if np.isfinite(limits[0]):
+            found.append(_pairs(every, nothing, least=limits[0]))
+        if np.isfinite(limits[1]):
+            found.append(_pairs(nothing, every, least=-limits[1]))
+        return cls(_joined(found), signs[slope_inputs])
 
     def about(self, reference):
         """The same for inputs [1, x] less a reference."""
-        middle = self.pairs.middle - reference[self.columns]
+        middle = self.pairs.middle - reference[self.pairs.column]
         return replace(self, pairs=self.pairs._replace(middle=middle))
 
     def left(self, rules, low, high):
@@ -110,7 +105,7 @@ class RuleOrder:
 
         Beside these, where least is left, the sums over [1, x] of either rule.
         """
-        pairs, columns = self.pairs, self.columns
+        pairs, columns = self.pairs, self.pairs.column
         rules = np.vstack([rules, np.zeros((1, rules.shape[1]))])
         low, high, every = np.append(1.0, low), np.append(1.0, high), np.arange(columns.size)
         above, below = rules[pairs.above], rules[pairs.below]
@@ -127,11 +122,11 @@ class RuleOrder:
         by_above, by_below = at.copy(), at.copy()
         by_above[every, columns] += pairs.width * (pairs.own + pairs.curved * np.exp(u))
         by_below[every, columns] -= pairs.width * (pairs.own + pairs.curved * np.exp(-u))
-        left = (by_above * above - by_below * below).sum(axis=1) - self.least
+        left = (by_above * above - by_below * below).sum(axis=1) - pairs.least
         size = (np.abs(by_above * above) + np.abs(by_below * below)).sum(axis=1)
         # Rounding of u counts as often as it is long.
         far = 1.0 + (np.abs(place) + np.abs(pairs.middle)) / np.abs(pairs.width)
-        rounding = EPS * (ROUNDINGS + at.shape[1]) * (size + np.abs(self.least)) * far
+        rounding = EPS * (ROUNDINGS + at.shape[1]) * (size + np.abs(pairs.least)) * far
         return left, rounding, by_above, by_below
 
     def holds(self, rules, low, high):
@@ -156,10 +151,14 @@ def is_in_order(model: TSKModel, output, signs, limits=(-np.inf, np.inf)):
     return order is not None and order.about(np.append(0.0, model.reference)).holds(rules, *ends)
 
 
-def _pairs(above, below, middle=0.0, width=1.0, own=0.0, curved=0.0):
+def _pairs(above, below, column=0, middle=0.0, width=1.0, own=0.0, curved=0.0, least=0.0):
     """Pairs of rules; numbers that are the same of all are given once."""
-    numbers = (np.broadcast_to(one, np.shape(above)) for one in (middle, width, own, curved))
-    return _Pairs(above, below, *numbers)
+    numbers = (column, middle, width, own, curved, least)
+    return _Pairs(above, below, *(np.broadcast_to(one, len(above)) for one in numbers))
+
+
+def _joined(parts):
+    return _Pairs(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _pairs_along(antecedent, j):
@@ -188,25 +187,22 @@ def _pairs_along(antecedent, j):
     is_above = centers[above] > centers[below]
     above, below = above[is_above], below[is_above]
     width = np.exp(2.0 * widths[0]) / (centers[above] - centers[below])
-    return _pairs(above, below, 0.5 * (centers[above] + centers[below]), width, 1.0, shared)
+    middle = 0.5 * (centers[above] + centers[below])
+    return _pairs(above, below, middle=middle, width=width, own=1.0, curved=shared)
 
 
 def _pairs_of_tree(antecedent, j):
     paths, cuts = [dict(path) for path in antecedent.paths], antecedent.groups[0]
     nodes = np.flatnonzero(cuts.inputs == j)
-    n_cuts, found = np.array([sum(node in path for node in nodes) for path in paths]), []
+    n_cuts = np.array([sum(node in path for node in nodes) for path in paths])
+    found = [_pairs(nodes[:0], nodes[:0])]
     for node in nodes:
-        above, below = _all_pairs(
-            *(
-                [r for r, path in enumerate(paths) if path.get(node) is side]
-                for side in (True, False)
-            )
-        )
+        is_above = np.array([path.get(node, np.nan) for path in paths])
+        above, below = _all_pairs(*(np.flatnonzero(is_above == side) for side in (1.0, 0.0)))
         part = 1.0 / np.maximum(n_cuts[above], n_cuts[below])
-        cut, log_width = cuts.theta[:, node]
-        found.append(_pairs(above, below, cut, np.exp(log_width), part, part))
-    nothing = np.empty(0, dtype=int)
-    return _Pairs(*map(np.concatenate, zip(_pairs(nothing, nothing), *found, strict=True)))
+        cut, width = cuts.theta[0, node], np.exp(cuts.theta[1, node])
+        found.append(_pairs(above, below, middle=cut, width=width, own=part, curved=part))
+    return _joined(found)
 
 
 def _all_pairs(above, below):
@@ -244,7 +240,7 @@ def nearest_in_order(order: RuleOrder, factor, start, to_rules, box, equal, equa
         rows[place, order.pairs.above[short]] += by_above[short]
         rows[place, order.pairs.below[short]] -= by_below[short]
         rows = rows[:, :-1].reshape(short.size, len(to_rules)) @ to_rules
-        return rows, order.least[short] + _MARGIN
+        return rows, order.pairs.least[short] + _MARGIN
 
     least = np.full(len(slopes), _SLOPE)
     return nearest_by_exchange(factor, start, equal, equal_to, slopes, least, violated)

@@ -182,4 +182,4 @@ def test_the_least_change_that_is_in_order(rng):
 def test_where_no_order_is_known_there_is_none(antecedent):
     slopes = np.array([0])
     assert RuleOrder.of(antecedent, np.array([1]), FREE, slopes) is None
-    assert RuleOrder.of(antecedent, np.array([0]), FREE, slopes).columns.size == 0
+    assert RuleOrder.of(antecedent, np.array([0]), FREE, slopes).pairs.above.size == 0
