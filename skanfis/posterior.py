@@ -52,8 +52,8 @@ class Posterior:
     cross : ndarray of shape (n_outputs, n_displacements, n_columns)
         B_k.
     pinned : ndarray of shape (n_outputs, n_pinned, n_columns + n_displacements)
-        Q_k, orthonormal rows: what is known of each output for certain, by constraints that are
-        met with equality. Rows of zeros where outputs have different numbers of them.
+        Q_k, orthonormal rows: what is known of each output for certain, at fixed points. Rows of
+        zeros where outputs have different numbers of them.
     """
 
     noise: np.ndarray

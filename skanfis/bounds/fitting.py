@@ -40,20 +40,6 @@ _HALVINGS, _MOST_BOXES, _ALL_BOXES, _TERMS = 6, 3000, 10_000, 20
 _POINTS_A_ROUND, _SAMPLE, _CORNERS, _MARGIN = 20, 1024, 8, 0.01
 
 
-@dataclass(frozen=True)
-class Inequality:
-    """An inequality on one output: on its slope by ``input``, or, where that is None, its value.
-
-    sign times it must be at least sign times ``limit``.
-    """
-
-    output: int
-    sign: float
-    input: int | None
-    limit: float
-    name: str
-
-
 @dataclass(frozen=True, eq=False)
 class Ordered:
     """Local consequents of rules in order, at premises for which there is an order."""
@@ -191,7 +177,7 @@ class _ConstrainedFit:
         # That outputs are held on top is monotone: what rules keep, predictions do.
         self.model = replace(model.with_out_of_bounds("clip"), target=None)
         self.policy = model.out_of_bounds, model.max_extrapolation
-        self.inequalities = _inequalities_of(constraints, model)
+        self.inequalities = constraints.inequalities(model)
         self.n_boxes, self.part = 0, min(1.0, _TERMS / max(model.antecedent.n_terms, 1))
         self.is_inside = model.in_bounds(constraints.points)
         beyond = constraints.points[~self.is_inside]
@@ -285,7 +271,7 @@ class _ConstrainedFit:
             local[:, k] = u
             now = self._model(ordered, local)
             own = [one for one in self.inequalities if one.output == k]
-            worst = [_worst(one, now, sample) for one in own]
+            worst = [_worst(one.excess(now, sample), sample) for one in own]
             if not any(map(len, worst)) and self.n_boxes <= _ALL_BOXES * self.part:
                 worst = [self._failure(one, now) for one in own]
             pairs = zip(own, worst, strict=True)
@@ -301,13 +287,14 @@ class _ConstrainedFit:
 
     def _rows(self, one, columns, points):
         """Sums over the local consequents that an inequality is about at points; their least."""
-        inputs, targets = self.problem.rows.inputs, self.problem.rows.targets
+        rows, found = self.problem.rows, one.of(columns, points)
         if one.input is None:
+            targets = rows.targets
             least = one.sign * (one.limit - targets.offset[one.output]) / targets.scale[one.output]
-            return one.sign * columns.predict(points), np.full(len(points), least + _MARGIN)
-        slopes = one.sign * inputs.scale[one.input] * columns.gradient(points)[:, one.input]
+            return found, np.full(len(points), least + _MARGIN)
+        found = found * rows.inputs.scale[one.input]
         # Where no consequents have much of a slope, none is asked for.
-        return slopes, _MARGIN * np.minimum(np.abs(slopes).sum(axis=1), 1.0)
+        return found, _MARGIN * np.minimum(np.abs(found).sum(axis=1), 1.0)
 
     def _proof(self, one, model):
         """What branch and bound finds of an inequality, and what its bound must not be above."""
@@ -383,25 +370,7 @@ class _ConstrainedFit:
         return columns.with_out_of_bounds(*self.policy).predict(points), values
 
 
-def _inequalities_of(constraints: Constraints, model: TSKModel):
-    """The inequalities among the constraints, output by output."""
-    found = []
-    for k, name in enumerate(model.output_names):
-        for j, sign in enumerate(constraints.signs[k]):
-            if sign and model.minimum[j] < model.maximum[j]:
-                what = f"monotonic_cst={sign} of {name!r} by {model.input_names[j]!r}"
-                found.append(Inequality(k, float(sign), j, 0.0, what))
-        for sign, limit in ((1.0, constraints.lower[k]), (-1.0, constraints.upper[k])):
-            if np.isfinite(limit):
-                found.append(Inequality(k, sign, None, limit, f"the limit {limit:g} of {name!r}"))
-    return found
-
-
-def _worst(one, model, points):
-    """The points at which an inequality does not hold, the worst of them first, and not all."""
-    if one.input is None:
-        excess = one.sign * (one.limit - model.predict(points)[:, one.output])
-    else:
-        excess = -one.sign * model.gradient(points)[:, one.input, one.output]
+def _worst(excess, points):
+    """The points at which something is in excess, the worst of them first, and not all."""
     order = np.argsort(-excess)[:_POINTS_A_ROUND]
     return points[order[excess[order] > 0.0]]
