@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.metaestimators import available_if
-from sklearn.utils.validation import check_consistent_length, check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted, validate_data
 
 from ._sklearn import (
     CallbackSupportMixin,
@@ -21,30 +21,24 @@ from ._sklearn import (
     Interval,
     StrOptions,
     check_parameters,
-    check_sample_weight,
     fit_context,
 )
 from ._threads import one_blas_thread
 from ._validation import (
-    bearable_weights,
     check_finite,
-    group_numbers,
     named_refusals,
-    positive_weights,
-    refuse_lazy,
 )
 from .bounds import FixedPoint, OutputLimits
-from .bounds.constraints import Constraints
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
 from .inspection.effects import importances
 from .inspection.readability import readability_of_rows
 from .learning import MESSAGES, SOLVERS, Solver, VariableProjection
 from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, Membership
 from .model import TSKModel
-from .naming import default_output_names, given_term_names
+from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .policies import OUT_OF_BOUNDS
-from .training import Callbacks, ValidatedData, chunk_checks, fit_rules, model_without_rules
+from .training import Callbacks, chunk_checks, fit_rules, model_without_rules, validated
 from .training.chunks import RowSums, fitted_weights, solve
 from .training.settings import given_weights, solver_of, structure_request
 
@@ -818,51 +812,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return rules_html(self)
 
     def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
-        """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""
-        refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
-        numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
-        is_first = not (is_chunk and hasattr(self, "model_"))
-        output_names = _target_names(y)
-        with named_refusals(X=X, y=y):
-            X, y = validate_data(
-                self,
-                X,
-                y,
-                reset=is_first,
-                validate_separately=(
-                    {**numeric, "ensure_min_samples": 1 if is_chunk else 2},
-                    {**numeric, "ensure_2d": False},
-                ),
-            )
-        check_consistent_length(X, y)
-        if is_first:
-            self._single_output = y.ndim == 1
-        targets = y.reshape(-1, 1) if y.ndim == 1 else y
-        if output_names is None or len(output_names) != targets.shape[1]:
-            output_names = default_output_names(targets.shape[1])
-        numbered = [f"x{j}" for j in range(X.shape[1])]
-        names = tuple(map(str, getattr(self, "feature_names_in_", numbered)))
-        check_finite(X, "X", names)
-        check_finite(targets, "y", output_names)
-        groups = None if groups is None else group_numbers(groups, len(X))
-        keep = None
-        if sample_weight is not None:
-            # A chunk may be without any weight, which scikit-learn refuses from some version on;
-            # weights of chunks count against one another and stay as they are.
-            if not (is_chunk and np.array_equal(sample_weight, np.zeros(len(X)))):
-                sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
-            sample_weight = np.asarray(sample_weight, dtype=float)
-            sample_weight = sample_weight if is_chunk else bearable_weights(sample_weight)
-            keep = positive_weights(sample_weight, len(X), 0 if is_chunk else 2)
-        if keep is not None:
-            X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
-            groups = None if groups is None else groups[keep]
-        constraints = Constraints.read(
-            self.monotonic_cst, self.constraints, names, targets.shape[1]
-        )
-        return ValidatedData(
-            X, targets, sample_weight, groups, names, output_names, keep, constraints
-        )
+        return validated(self, X, y, sample_weight, groups, is_chunk=is_chunk)
 
     def _check_inputs(self, X):
         """Rows to predict, as an array."""
@@ -883,10 +833,3 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
                 )
         check_finite(X, "X", self.model_.input_names)
         return X
-
-
-def _target_names(y):
-    """Names of a Series or of a frame's columns, if all are str."""
-    names = getattr(y, "columns", None)
-    names = [getattr(y, "name", None)] if names is None else list(names)
-    return tuple(names) if all(isinstance(name, str) and name for name in names) else None

@@ -27,8 +27,6 @@ from skanfis.export import (
     fold,
     read_fis,
     read_json,
-    write_fis,
-    write_json,
 )
 from skanfis.export.json_reader import parse_json
 from skanfis.inspection import (
@@ -38,7 +36,6 @@ from skanfis.inspection import (
     TreeDisplay,
     explain,
     export_text,
-    memberships_table,
     readability,
     rules_html,
     rules_table,
@@ -268,7 +265,6 @@ class TestReading:
         assert text.count("\n  IF ") == estimator.n_rules_
         assert rules_html(estimator).count("</tr>") == estimator.n_rules_ + 2
         assert len(rules_table(estimator)) == estimator.n_rules_
-        assert len(memberships_table(estimator)) == estimator.model_.antecedent.n_terms
         found = readability(estimator, X, Y)
         assert_allclose(found.rules["weight"].sum(), 1.0)
         pytest.importorskip("matplotlib")
@@ -309,7 +305,7 @@ def assert_file_is(model):
 class TestFiles:
     def test_json_and_pickles(self, kind, tmp_path):
         estimator = fitted(kind)
-        write_json(estimator, tmp_path / "model.json", posterior=True)
+        export_json(estimator, tmp_path / "model.json", posterior=True)
         read = read_json(tmp_path / "model.json")
         assert type(read.antecedent) is KINDS[kind]
         assert_array_equal(read.predict(X), estimator.model_.predict(X))
@@ -318,7 +314,7 @@ class TestFiles:
         assert_array_equal(joblib.load(tmp_path / "model.joblib").predict(X), estimator.predict(X))
 
     def test_fis(self, kind, tmp_path):
-        write_fis(fitted(kind), tmp_path / "model.fis")
+        export_fis(fitted(kind), tmp_path / "model.fis")
         read = read_fis(tmp_path / "model.fis")
         came_back = RuleTableAntecedent if kind == "tree" else KINDS[kind]
         assert type(read.antecedent) is came_back

@@ -54,8 +54,8 @@ def test_the_command_is_there(capsys):
 
 def test_every_text_that_a_model_is_written_to(model, tmp_path):
     assert "IF x0 is" in inspection.export_text(model)
-    export.write_json(model, tmp_path / "m.json")
-    export.write_fis(model, tmp_path / "m.fis")
+    export.export_json(model, tmp_path / "m.json")
+    export.export_fis(model, tmp_path / "m.fis")
     read = export.read_json(tmp_path / "m.json")
     X = np.array([[0.1, 0.2]])
     np.testing.assert_array_equal(read.predict(X)[:, 0], model.predict(X))

@@ -18,10 +18,10 @@ from skanfis.datasets import make_jang_sinc, make_ofog
 from skanfis.export import (
     CCode,
     export_c,
+    export_json,
     fold,
     fold_with_rows,
     read_json,
-    write_json,
 )
 from skanfis.gyro import (
     AllanDisplay,
@@ -118,7 +118,7 @@ covered: np.ndarray = model.coverage(frame)
 mean, deviation = model.predict(frame, return_std=True)
 either: np.ndarray | tuple[np.ndarray, np.ndarray] = model.predict(frame, return_std=bool(r2 > 0))
 told_short: str = export_text(model, precision=3, max_shown=4, feature_names=["rate", "time"])
-write_json(model, Path("model.json"))
+export_json(model, Path("model.json"))
 restored: np.ndarray = read_json("model.json").predict(X)
 found: Readability = readability(model, frame, y, sample_weight=weights)
 ResponseSurfaceDisplay.from_estimator(model, frame, features=("x0", "x1"), held={"x1": 0.0})

@@ -2,9 +2,9 @@
 
 from ..membership import FAMILIES
 from .c import CCode, CCost, export_c
-from .fis import export_fis, read_fis, write_fis
+from .fis import export_fis, read_fis
 from .folding import fold, fold_with_rows
-from .model_json import export_json, read_json, write_json
+from .model_json import export_json, read_json
 from .onnx import register_onnx_converter
 
 __all__ = [
@@ -19,8 +19,6 @@ __all__ = [
     "read_fis",
     "read_json",
     "register_onnx_converter",
-    "write_fis",
-    "write_json",
 ]
 
 #: Every type of skanfis that a fitted estimator may hold. None of them runs anything when it is

@@ -325,16 +325,6 @@ class Reader:
     is_named: bool
 
     @property
-    def categories(self) -> dict[str, tuple[int, ...]]:
-        """By raw column, the inputs that are indicators of its levels, two or more of them."""
-        found: dict[str, tuple[int, ...]] = {}
-        for j, column in enumerate(self.inputs):
-            if column.encode is not None:
-                name = self.names[column.source]
-                found[name] = (*found.get(name, ()), j)
-        return {name: own for name, own in found.items() if len(own) > 1}
-
-    @property
     def levels(self) -> dict[str, tuple[str, str]]:
         """By the name of an indicator its raw column and level: "fibre_PM", ("fibre", "PM")."""
         encoded = [one for one in self.inputs if one.encode is not None]

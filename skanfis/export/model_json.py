@@ -21,13 +21,17 @@ from .limits import read_bytes
 _MOST_BYTES = 2**24
 
 
-def export_json(estimator: Any, *, posterior: bool = False) -> str:
-    """Give a trained model as JSON text, exact to the last bit.
+def export_json(
+    estimator: Any, path: str | PathLike[str] | None = None, *, posterior: bool = False
+) -> str:
+    """Write a trained model as JSON, exact to the last bit.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
         As :func:`fold` takes it.
+    path : str or path-like, default=None
+        The file to write; None writes nothing.
     posterior : bool, default=False
         Whether to write what ``predict(X, return_std=True)`` needs: some p^2 / 2 numbers for p
         consequent parameters.
@@ -94,36 +98,14 @@ def export_json(estimator: Any, *, posterior: bool = False) -> str:
         model_of(document)
     except ValueError as error:
         raise ValueError(f"the model cannot be written such that it can be read: {error}") from None
-    return _laid_out(document)
-
-
-def write_json(estimator: Any, path: str | PathLike[str], *, posterior: bool = False) -> None:
-    """Write a trained model to a JSON file.
-
-    Parameters
-    ----------
-    estimator : fitted estimator or TSKModel
-    path : str or path-like
-    posterior : bool, default=False
-        As :func:`export_json`, which raises what this raises, takes it.
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import read_json, write_json
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_json(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()), Path(folder) / "sinc.json")
-    ...     read_json(Path(folder) / "sinc.json").n_rules
-    4
-    """
-    Path(path).write_text(export_json(estimator, posterior=posterior), "utf-8", newline="\n")
+    text = _laid_out(document)
+    if path is not None:
+        Path(path).write_text(text, encoding="utf-8", newline="\n")
+    return text
 
 
 def read_json(path: str | PathLike[str]) -> TSKModel:
-    """Read a model that :func:`write_json` has written; no pickle, nothing is ever run.
+    """Read a model that :func:`export_json` has written; no pickle, nothing is ever run.
 
     Parameters
     ----------
@@ -142,10 +124,16 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
 
     Examples
     --------
-    >>> from skanfis.export import read_json
-    >>> read_json('{"format": "skanfis-model"}')
-    Traceback (most recent call last):
-    ValueError: path is the text of a model, not the path of a file: write it to a file first.
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from skanfis import ANFISRegressor
+    >>> from skanfis.datasets import make_jang_sinc
+    >>> from skanfis.export import export_json, read_json
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "sinc.json"
+    ...     text = export_json(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()), path)
+    ...     read_json(path).n_rules
+    4
     """
     data = read_bytes(path, _MOST_BYTES)
     try:

@@ -173,11 +173,9 @@ class _Formula:
             far = (followed.abs() * numbers.inverse_spread).sum() + 1.0
             way_out = followed / far
         group = numbers.tangent_group
-        is_plain = group is None
-        y, ahead = self._rules(z, way_out if is_plain else None)
-        y = y + numbers.offset
-        changes = [ahead]
-        if way_out is not None and not is_plain:
+        y, ahead = self._rules(z, way_out if group is None else None)
+        y, changes = y + numbers.offset, [ahead]
+        if way_out is not None and group is not None:
             changes = [
                 self._rules(
                     z * np.isin(group, (0, g)).astype(float)
@@ -186,8 +184,8 @@ class _Formula:
                 )[1]
                 for g in np.unique(group)
             ]
-        for change in changes:
-            if change is not None:
+        if way_out is not None:
+            for change in changes:
                 y = y + far * change
         if numbers.output_limits is not None:
             low, high = numbers.output_limits
@@ -200,21 +198,18 @@ class _Formula:
 
     def _rules(self, z, way_out):
         """What the rules say about their offset, and its change along the way out, or None."""
-        strengths, changes = self._strengths(z, way_out)
-        by_rule, values = self._slopes(z), self.numbers.coefficients[:, :, 0]
-        by_rule = values[None] if by_rule is None else by_rule + values
-        ahead = None if way_out is None else self._slopes(way_out)
-        if changes is not None:
+        zero = z.columns([0]) * 0.0
+        strengths, changes = self._strengths(z, way_out, zero)
+        by_rule = self._by_rule(zero + 1.0, z)
+        change = None
+        if way_out is not None:
             of_strengths = changes.reshape(self.numbers.model.n_rules, 1) * by_rule
-            ahead = of_strengths if ahead is None else ahead + of_strengths
-        change = None if ahead is None else self._weigh(strengths, ahead)
+            change = self._weigh(strengths, of_strengths + self._by_rule(zero, way_out))
         return self._weigh(strengths, by_rule), change
 
-    def _strengths(self, z, way_out):
+    def _strengths(self, z, way_out, zero):
         """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
         numbers, logs, slopes = self.numbers, [], []
-        if not numbers.model.antecedent.n_terms:
-            return None, None
         for terms in numbers.terms:
             positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
             formula = FORMULAS[terms.family].of
@@ -222,29 +217,25 @@ class _Formula:
             logs.append(value())
             if way_out is not None:
                 slopes.append(slope() * way_out.columns(positions))
-        # 1 where rule r has term t.
+        # 1 where rule r has term t; the last one is none.
         has_term = np.zeros((numbers.model.antecedent.n_terms + 1, numbers.model.n_rules))
         has_term[numbers.rule_terms.T, np.arange(numbers.model.n_rules)] = 1.0
-        shares = (self.graph.node("Concat", *logs, axis=1) @ has_term[:-1]).softmax()
+        shares = (self._joined(*logs, zero) @ has_term).softmax()
         if way_out is None:
             return shares, None
-        change = self.graph.node("Concat", *slopes, axis=1) @ has_term[:-1]
+        change = self._joined(*slopes, zero) @ has_term
         return shares, change - (shares * change).sum()
 
-    def _slopes(self, z):
-        """What slopes make of z, (n_rows, n_rules, n_outputs); None where there are none."""
-        numbers = self.numbers
-        if not numbers.slope_inputs.size:
-            return None
-        n_rules, n_outputs, _ = numbers.coefficients.shape
-        slopes = numbers.coefficients[:, :, 1:].reshape(n_rules * n_outputs, -1).T
-        return (z.columns(numbers.slope_inputs) @ slopes).reshape(n_rules, n_outputs)
+    def _by_rule(self, one, z):
+        """The constants times ``one`` plus what slopes make of z, (n_rows, n_rules, n_outputs)."""
+        n_rules, n_outputs, n_basis = self.numbers.coefficients.shape
+        sloped = [z.columns(self.numbers.slope_inputs)] * (n_basis > 1)
+        by_output = self.numbers.coefficients.reshape(-1, n_basis).T
+        return (self._joined(one, *sloped) @ by_output).reshape(n_rules, n_outputs)
+
+    def _joined(self, *columns):
+        return self.graph.node("Concat", *columns, axis=1)
 
     def _weigh(self, strengths, by_rule):
         """Sum over rules (n_rows, n_outputs)."""
-        if strengths is not None:
-            return (strengths.reshape(self.numbers.model.n_rules, 1) * by_rule).sum(keep=False)
-        # One rule: its strength is one.
-        if isinstance(by_rule, np.ndarray):
-            return self.graph.node("Identity", by_rule[:, 0])
-        return by_rule.sum(keep=False)
+        return (strengths.reshape(self.numbers.model.n_rules, 1) * by_rule).sum(keep=False)

@@ -4,7 +4,7 @@ from .displays import MembershipDisplay, ResponseSurfaceDisplay
 from .effects import effects
 from .effects_display import EffectsDisplay
 from .readability import Readability, readability
-from .rules import explain, memberships_table, rules_table
+from .rules import explain, rules_table
 from .structures import StructureDisplay
 from .text import export_text, rules_html
 from .trees import TreeDisplay
@@ -19,7 +19,6 @@ __all__ = [
     "effects",
     "explain",
     "export_text",
-    "memberships_table",
     "readability",
     "rules_html",
     "rules_table",

@@ -73,10 +73,9 @@ class RuleSums:
         self.errors, self.printed_errors = np.zeros((2, model.n_outputs))
 
     def _standardised(self, model):
-        """Consequents in deviations of the target about its mean, on standardised inputs."""
+        """Consequents in deviations of the target about its mean."""
         by_rule = model.coefficients / self.target.scale
         by_rule[:, 0] -= self.target.offset / self.target.scale
-        by_rule[:, 1:] *= model.spread[: by_rule.shape[1] - 1, None]
         return np.ascontiguousarray(by_rule.transpose(2, 0, 1))
 
     def add(self, rows, y, weight=None):
@@ -101,14 +100,13 @@ class RuleSums:
         strongest = (strengths >= EQUALLY_STRONG * strengths.max(axis=0)).astype(float)
         strongest *= weight / strongest.sum(axis=0)
         self.rows += strongest.sum(axis=1)
-        Z -= model.reference[:, None]
-        Z /= model.spread[:, None]
+        basis = model.basis(Z)
         for k, y in enumerate(target):
-            values, output = _outputs(self.by_rule[k], strengths, Z)
+            values, output = _outputs(self.by_rule[k], strengths, basis)
             self.alone[:, k] += np.einsum("rn,rn->r", strongest, (values - output) ** 2)
             self.rule_errors[:, k] += np.einsum("rn,rn->r", strongest, (values - y) ** 2)
             self.errors[k] += weight @ (output - y) ** 2
-            printed = _outputs(self.by_printed[k], as_printed, Z)[1]
+            printed = _outputs(self.by_printed[k], as_printed, basis)[1]
             self.printed_errors[k] += weight @ (printed - y) ** 2
 
     def joined(self, other):
@@ -136,7 +134,7 @@ class RuleSums:
         )
 
 
-def _outputs(by_rule, strengths, Z):
+def _outputs(by_rule, strengths, basis):
     """What every rule says at a block of rows, and their sum by strength."""
-    values = by_rule[:, :1] + by_rule[:, 1:] @ Z[: by_rule.shape[1] - 1]
+    values = by_rule @ basis
     return values, np.einsum("rn,rn->n", strengths, values)

@@ -14,6 +14,7 @@ from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts, writable
 from .sentences import Sentences
+from .text import counted, number
 
 # In deviations of the target: whoever reads the strongest rule alone is then as wrong as a model
 # that explains three quarters of the variance; beyond, the rule says too little of the model.
@@ -109,10 +110,7 @@ class Readability:
         found = self.measures
         is_known = (found.errors > 0.0).all()
         ratio = found.printed_errors / found.errors if is_known else np.array([np.nan])
-        figures = {
-            "strongest_alone": float(found.alone.max()),
-            "text_over_model": float(ratio.max()),
-        }
+        figures = {"strongest_alone": found.alone.max(), "text_over_model": ratio.max()}
         return pd.Series(figures, name="readability")
 
     @property
@@ -121,7 +119,7 @@ class Readability:
         sentences, ratio = [], self.summary["text_over_model"]
         if ratio > GREATEST_ERROR:
             sentences.append(
-                f"The text as printed errs {_figure(ratio)} times as much as the model: print "
+                f"The text as printed errs {number(ratio, 3)} times as much as the model: print "
                 "more digits (precision)."
             )
         sentences += _on_signs(self._said) + self._on_few_rows()
@@ -130,7 +128,7 @@ class Readability:
             if error > GREATEST_ALONE:
                 sentences.append(
                     f"No rule{of_output} can be read without the others: the strongest alone "
-                    f"misses the model by {_figure(error)} standard deviations of the target "
+                    f"misses the model by {number(error, 3)} standard deviations of the target "
                     f"(limit {GREATEST_ALONE})."
                 )
         return sentences
@@ -147,8 +145,7 @@ class Readability:
     @property
     def line(self) -> str:
         """How many numbers there are to read, and what the text as printed errs."""
-        ratio, cost = self.summary["text_over_model"], self.reading_cost
-        numbers = f"{cost} number{'' if cost == 1 else 's'}"
+        ratio, numbers = self.summary["text_over_model"], counted(self.reading_cost, "number")
         if np.isnan(ratio):
             return numbers
         more = round(100.0 * (ratio - 1.0))
@@ -271,8 +268,3 @@ def _named(parts, between=", "):
     if len(parts) <= _MOST_NAMED:
         return between.join(parts)
     return f"{between.join(parts[:_MOST_NAMED])} and {len(parts) - _MOST_NAMED} more"
-
-
-def _figure(value):
-    """Three digits, and no exponent where a person would write none."""
-    return f"{float(f'{value:.3g}'):.10g}"

@@ -26,7 +26,7 @@ def conditions(model):
     return [dict(sorted(rule.items())) for rule in rules]
 
 
-def premise_texts(model, levels=None):
+def premise_texts(model, levels=()):
     """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" of a rule that asks nothing."""
     names = model.input_names
     return [
@@ -35,14 +35,11 @@ def premise_texts(model, levels=None):
     ]
 
 
-def condition(name, term, levels=None):
-    """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator.
-
-    ``levels`` are the raw columns and levels of indicators (``Reader.levels``).
-    """
+def condition(name, term, levels=()):
+    """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator."""
     if term.startswith(("<", ">")):
         return f"{name} {term}"
-    if term in ("0", "1") and levels and name in levels:
+    if term in ("0", "1") and name in levels:
         column, level = levels[name]
         return f"{column} is {'' if term == '1' else 'not '}{level}"
     return f"{name} is {term}"
@@ -54,14 +51,6 @@ def weightiest(model, max_shown):
         check_count("max_shown", max_shown, 1)
     # Rounded, so that rules alike but for rounding errors stay in the order of their numbers.
     return np.argsort(-np.round(model.rule_weights, 9), kind="stable")[:max_shown].tolist()
-
-
-def rule_values(model, rows):
-    """f_r at rows in the box, shape (n_rows, n_rules, n_outputs)."""
-    constant, slopes = model.coefficients[:, 0], model.coefficients[:, 1:]
-    if not model.order:
-        return np.tile(constant, (len(rows), 1, 1))
-    return constant + np.einsum("nj,rjo->nro", rows - model.reference, slopes)
 
 
 def has_training_data(model):
@@ -91,18 +80,15 @@ def rename(model, feature_names, output_names):
         ("input_names", "feature_names", feature_names),
         ("output_names", "output_names", output_names),
     ):
-        if names is not None:
-            count = len(getattr(model, kind))
-            model = replace(model, **{kind: _checked_names(parameter, names, count)})
+        if names is None:
+            continue
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
+        count = len(getattr(model, kind))
+        if len(names) != count or len(set(names)) != count:
+            raise ValueError(f"{parameter}={list(names)!r} must be {count} names, all different.")
+        model = replace(model, **{kind: tuple(names)})
     return writable(model)
-
-
-def _checked_names(parameter, names, count):
-    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
-        raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
-    if len(names) != count or len(set(names)) != count:
-        raise ValueError(f"{parameter}={list(names)!r} must be {count} names, all different.")
-    return tuple(names)
 
 
 def rules_table(estimator: Any) -> Any:
@@ -155,39 +141,6 @@ def rules_table(estimator: Any) -> Any:
     return pd.DataFrame(columns, index=pd.RangeIndex(model.n_rules, name="rule"))
 
 
-def memberships_table(estimator: Any, *, trained: bool = True) -> Any:
-    """Tabulate the membership functions.
-
-    Parameters
-    ----------
-    estimator : fitted estimator or TSKModel
-        As :func:`skanfis.export.fold` takes it.
-    trained : bool, default=True
-        Whether to give the memberships after training, or as they were before it.
-
-    Returns
-    -------
-    table : DataFrame
-        One row per term, by its number: "input", "name", "function", and every parameter in the
-        units of the input, missing where a family has none such.
-
-    Examples
-    --------
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.inspection import memberships_table
-    >>> model = ANFISRegressor(n_mfs=[2, 1]).fit(*make_jang_sinc())
-    >>> memberships_table(model, trained=False)
-         input  name  function  center  width
-    term
-    0       x0   low  gaussian   -10.0   9.89
-    1       x0  high  gaussian    10.0   9.89
-    """
-    terms = fold(estimator).memberships(trained)
-    table = pd.DataFrame(terms, columns=None if terms else ["input", "name", "function"])
-    return table.rename_axis(index="term")
-
-
 def explain(estimator: Any, X: ArrayLike) -> Any:
     """Tabulate which rules made each prediction, and what each contributed.
 
@@ -232,7 +185,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
         raise ValueError(model.describe_out_of_bounds(rows))
     nearest = np.clip(rows, model.minimum, model.maximum)
     strengths = model.strengths(nearest)
-    values = rule_values(model, nearest)
+    values = np.einsum("bn,rbo->nro", model.basis(nearest.T), model.coefficients)
     if model.out_of_bounds == "nan":
         values[~inside] = np.nan
     n_rows, (n_rules, n_inputs) = len(rows), (model.n_rules, model.n_inputs)
@@ -242,30 +195,27 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     beyond = way[:, :, None] * gradient
     said = np.einsum("nr,nro->no", strengths, values) + beyond.sum(axis=1)
     held = np.nan_to_num(np.clip(said, *model.output_limits) - said)
-    order = np.argsort(-strengths, axis=1, kind="stable")
-    strengths = np.take_along_axis(strengths, order, axis=1)
-    values = np.take_along_axis(values, order[:, :, None], axis=1)
-    # By row, and for all that may have a line there: the rules, beyond each input, held.
+    # By row, all that may have a line there: the rules, the way beyond each input, what is held.
     strength = np.hstack([strengths, np.full((n_rows, n_inputs + 1), np.nan)])
     value = np.hstack([values, gradient, np.full((n_rows, 1, model.n_outputs), np.nan)])
     contribution = np.hstack([strengths[:, :, None] * values, beyond, held[:, None]])
     has_line = np.ones(contribution.shape, dtype=bool)
     has_line[:, n_rules:-1] = way[:, :, None] != 0.0
     has_line[:, -1] = held != 0.0
+    # The strongest first, and last what has no strength.
+    order = np.argsort(-strength, axis=1, kind="stable")
+    has_line = np.take_along_axis(has_line, order[:, :, None], axis=1)
     row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
-    # Numbers of rules first, then those of the other lines.
-    source = np.hstack([order, np.tile(np.arange(n_rules, strength.shape[1]), (n_rows, 1))])
-    source = source[row, place]
-    texts = premise_texts(model)
-    texts += [*(f"beyond {name}" for name in model.input_names), "held"]
+    source = order[row, place]
+    texts = [*premise_texts(model), *(f"beyond {name}" for name in model.input_names), "held"]
     return pd.DataFrame(
         {
             "row": row,
             "output": np.array(model.output_names, dtype=object)[output],
             "rule": pd.Series(source, dtype="Int64").where(source < n_rules),
             "if": np.array(texts, dtype=object)[source],
-            "strength": strength[row, place],
-            "value": value[row, place, output],
-            "contribution": contribution[row, place, output],
+            "strength": strength[row, source],
+            "value": value[row, source, output],
+            "contribution": contribution[row, source, output],
         }
     )

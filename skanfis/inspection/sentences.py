@@ -13,6 +13,7 @@ is that line's at the centre, so that f_r is also v_r less this part, plus the l
 rule's own slopes. Text, HTML, tables, and the model as it is printed are made of these numbers.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,6 +56,8 @@ class Sentences:
         The common line; zero where nothing is in common.
     two_valued : ndarray of bool of shape (n_inputs,)
         Inputs that are 0 or 1.
+    levels : dict of str to tuple of two str
+        Raw columns and levels of inputs that are indicators, by their names (``Reader.levels``).
     """
 
     model: TSKModel
@@ -67,9 +70,10 @@ class Sentences:
     common_place: np.ndarray
     common: np.ndarray
     two_valued: np.ndarray
+    levels: Mapping[str, tuple[str, str]]
 
     @classmethod
-    def of(cls, model: TSKModel, precision: int = PRECISION):
+    def of(cls, model: TSKModel, precision: int = PRECISION, levels=None):
         """What a model says; of 17 digits nothing is lost."""
         slopes = np.zeros((model.n_rules, model.n_inputs, model.n_outputs))
         slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
@@ -103,6 +107,7 @@ class Sentences:
             common_place,
             common,
             two_valued,
+            levels or {},
         )
 
     @property

@@ -73,13 +73,12 @@ class StructureDisplay:
                 "The estimator knows no structure with an error to be expected: nothing to draw. "
                 "Fit one with n_mfs='auto' and partition='auto'."
             )
-        simplicity, n_outputs = last.simplicity, last.model_.n_outputs
         least = min(one["expected_error"] for one in structures) ** 2
         taken = next(one["expected_error"] for one in structures if one["chosen"]) ** 2
         # The mean's squared error is one of each output, which are standardised.
-        most = max(tolerated(least, float(n_outputs), simplicity), taken)
+        most = max(tolerated(least, float(last.model_.n_outputs), last.simplicity), taken)
         tolerance = float(np.sqrt(most))
-        display = cls(structures=structures, tolerance=tolerance, simplicity=simplicity)
+        display = cls(structures=structures, tolerance=tolerance, simplicity=last.simplicity)
         return display.plot(ax=ax)
 
     def plot(self, *, ax: Any = None) -> Self:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from html import escape
-from math import floor, log10
+from itertools import compress
 from textwrap import fill
 from typing import Any
 
@@ -19,18 +19,19 @@ from .rules import (
     readability_in_training,
     rename,
     weightiest,
-    writable,
 )
-from .sentences import MOST_DIGITS, PRECISION, Sentences
+from .sentences import MOST_DIGITS, PRECISION, Sentences, rounded
 
 # Letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 3
+# How to compute a prediction; the parts in braces where there is such a thing.
 _HOW = (
-    "A prediction is the mean of what the rules say, weighted by how true their conditions are: "
-    "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; AND multiplies. A "
-    "rule says its value, less the common line's part in it, plus the common line, plus its own "
-    "slopes. What it errs is its RMSE alone, on the rows on which it is the strongest."
+    "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
+    "AND multiplies. {cuts}A rule says its value{line}, plus its own slopes. What it errs is its "
+    "RMSE alone, on the rows on which it is the strongest."
 )
+_CUTS = "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h. "
+_LINE = ", less the common line's part in it, plus the common line"
 _IN_PLACE = (
     "A part of every value is from this line; a slope that a rule states stands in its place."
 )
@@ -100,25 +101,21 @@ def export_text(
     6 numbers; the text as printed errs as much as the model.
     Rules go different ways, beyond chance: by hours up in rule 1 and down in rule 0.
     """
-    check_count("precision", precision, 1, MOST_DIGITS)
-    folded, reader = fold_with_reader(estimator)
-    model = rename(folded, feature_names, output_names)
-    said, found = Sentences.of(model, precision), readability_in_training(estimator, model)
-    levels = reader.levels
-    chosen = weightiest(model, max_shown)
-    parts = [f"{_count(model.n_rules, 'rule')}, {_count(model.n_inputs, 'input')}."]
-    common = _common_lines(said, levels)
+    said, found = _said(estimator, precision, feature_names, output_names)
+    model, chosen = said.model, weightiest(said.model, max_shown)
+    parts = [f"{counted(model.n_rules, 'rule')}, {counted(model.n_inputs, 'input')}."]
+    common = _common_lines(said)
     parts += [fill(f"Common to the rules, {line}.", _WIDTH) for line in common]
     if common:
         parts[-1] += f"\n{_IN_PLACE}"
-    premises = premise_texts(said.model, levels)
+    premises, words = premise_texts(model, said.levels), ["THEN", *[" AND"] * model.n_outputs]
     for r in chosen:
         heading = ", ".join([f"Rule {r}", *_on_rows(model, found, r)])
-        then = "\n".join(
-            fill(f"{word} {sentence}", _WIDTH, initial_indent="  ", subsequent_indent="       ")
-            for word, sentence in zip(_words(model), _conclusions(said, r, levels), strict=True)
-        )
-        parts.append(f"{heading}:\n  IF {premises[r]}\n{then}")
+        parts.append(f"{heading}:\n  IF {premises[r]}")
+        for k, (word, name) in enumerate(zip(words, model.output_names, strict=False)):
+            line = f"{word} {name} is {_conclusion(said, r, k)}"
+            then = fill(line, _WIDTH, initial_indent="  ", subsequent_indent="       ")
+            parts[-1] += f"\n{then}"
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
     if show_terms:
@@ -127,7 +124,7 @@ def export_text(
     return "\n\n".join(parts)
 
 
-def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = PRECISION) -> str:
+def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     """Write the rules as HTML, the weightiest first.
 
     Parameters
@@ -136,8 +133,6 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = PRECISIO
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     max_shown : int, default=10
         Most rules to show; a last line says what was left out.
-    precision : int, default=2
-        As of :func:`export_text`.
 
     Returns
     -------
@@ -158,28 +153,27 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = PRECISIO
     >>> rules_html(ANFISRegressor(n_mfs=3).fit(*make_jang_sinc())).count("</tr>")
     11
     """
-    check_count("precision", precision, 1, MOST_DIGITS)
-    folded, reader = fold_with_reader(estimator)
-    model, levels = writable(folded), reader.levels
-    said, found = Sentences.of(model, precision), readability_in_training(estimator, model)
-    chosen, premises = weightiest(model, max_shown), premise_texts(said.model, levels)
+    said, found = _said(estimator)
+    model, chosen = said.model, weightiest(said.model, max_shown)
+    premises = premise_texts(model, said.levels)
     cells: dict = {}
     if has_training_data(model):
         cells["data", "rows"] = [_share(model, r) for r in chosen]
         if found is not None:
-            cells["data", "error"] = [_errors(found, r) for r in chosen]
+            fires = model.rule_rows > 0
+            cells["data", "error"] = [_errors(found, r) if fires[r] else "" for r in chosen]
     cells["rule", "if"] = [premises[r] for r in chosen]
     for k, name in enumerate(model.output_names):
-        cells["then", name] = [_conclusion(said, r, k, levels) for r in chosen]
+        cells["then", name] = [_conclusion(said, r, k) for r in chosen]
     with pd.option_context("display.max_colwidth", None):
         table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
-    counts = f"<b>{_count(model.n_rules, 'rule')}</b> on {_count(model.n_inputs, 'input')}"
+    counts = f"<b>{counted(model.n_rules, 'rule')}</b> on {counted(model.n_inputs, 'input')}"
     parts = [f"<div>{counts}</div>", table]
-    lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said, levels)]
+    lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
     if len(chosen) < model.n_rules:
         lines.append(f"and {_left_out(model, chosen)}")
-    numbers, *findings = _last_lines(said, found, precision)
+    numbers, *findings = _last_lines(said, found)
     parts += [f"<div>{escape(line)}</div>" for line in [*lines, numbers]]
     if findings:
         told = "".join(f"<div>{escape(line)}</div>" for line in findings)
@@ -188,29 +182,25 @@ def rules_html(estimator: Any, *, max_shown: int = 10, precision: int = PRECISIO
     return f'<div style="{style}">{"".join(parts)}</div>'
 
 
-def _common_lines(said, levels):
+def _said(estimator, precision=PRECISION, feature_names=None, output_names=None):
+    """What the rules say in so many digits, and what the fit found of them, if it is known."""
+    check_count("precision", precision, 1, MOST_DIGITS)
+    folded, reader = fold_with_reader(estimator)
+    model = rename(folded, feature_names, output_names)
+    said = Sentences.of(model, precision, reader.levels)
+    return said, readability_in_training(estimator, model)
+
+
+def _common_lines(said):
     """Of every output that has one: "y: -0.12 per rate from 20, ..."."""
-    model = said.model
-    slopes = [
-        _slopes(said, said.common[:, k], said.common_place, said.common[:, k] != 0.0, levels)
-        for k in range(model.n_outputs)
-    ]
-    pairs = zip(model.output_names, slopes, strict=True)
+    slopes = [_slopes(said, own, said.common_place, own != 0.0) for own in said.common.T]
+    pairs = zip(said.model.output_names, slopes, strict=True)
     return [f"{name}: {', '.join(own)}" for name, own in pairs if own]
 
 
-def _words(model):
-    return ["THEN", *[" AND"] * (model.n_outputs - 1)]
-
-
-def _conclusions(said, r, levels):
-    """Of every output what rule r says: "y is about 33.6, of it +4.2 from the common line: ..."."""
-    names = said.model.output_names
-    return [f"{name} is {_conclusion(said, r, k, levels)}" for k, name in enumerate(names)]
-
-
-def _conclusion(said, r, k, levels):
-    own = _slopes(said, said.slopes[r, :, k], said.places[r], said.is_own[r, :, k], levels)
+def _conclusion(said, r, k):
+    """What rule r says of output k: "about 33.6, of it +4.2 from the common line: ..."."""
+    own = _slopes(said, said.slopes[r, :, k], said.places[r], said.is_own[r, :, k])
     has_common = (said.model.common_slopes[r] & (said.common[:, k] != 0.0)).any()
     text = f"{'about ' if own or has_common else ''}{plain(said.values[r, k])}"
     if said.of_common[r, k]:
@@ -218,14 +208,14 @@ def _conclusion(said, r, k, levels):
     return f"{text}: {', '.join(own)}" if own else text
 
 
-def _slopes(said, slopes, places, is_said, levels):
+def _slopes(said, slopes, places, is_said):
     """Say "+5.8 per rooms from 6.3", or "-2.1 if private is 1"; what does most comes first."""
     parts, does = [], np.abs(slopes) * said.model.spread
     for j in sorted(np.flatnonzero(is_said), key=lambda j: -does[j]):
         name, slope, place = said.model.input_names[j], slopes[j], places[j]
         if said.two_valued[j]:
             other = 1.0 - place
-            case = condition(name, plain(other), levels)
+            case = condition(name, plain(other), said.levels)
             parts.append(f"{_signed(slope * (other - place))} if {case}")
         else:
             parts.append(f"{_signed(slope)} per {name} from {plain(place)}")
@@ -236,6 +226,8 @@ def _on_rows(model, found, r):
     """On which part of the rows a rule is the strongest, and what it errs there alone."""
     if not has_training_data(model):
         return []
+    if not model.rule_rows[r]:
+        return ["strongest on no row"]
     share = [f"strongest on {_share(model, r)} of the rows"]
     return share if found is None else [*share, f"errs by {_errors(found, r)} there"]
 
@@ -252,45 +244,38 @@ def _errors(found, r):
     return ", ".join(f"{number(e, 2)} ({n})" for e, n in zip(errors, names, strict=True))
 
 
-def _last_lines(said, found, precision):
+def _last_lines(said, found, precision=PRECISION):
     """How many numbers there are to read, and, after a fit, what speaks against reading them."""
     if found is None or precision != PRECISION:
-        return [f"{_count(said.reading_cost, 'number')}."]
+        return [f"{counted(said.reading_cost, 'number')}."]
     return str(found).splitlines()
 
 
 def _legend(said, precision):
     model, lines = said.model, ["Inputs, as they were trained:"]
-    named = [
-        term
-        for term, is_said in zip(model.memberships(), said.says_where, strict=True)
-        if not is_said
-    ]
-    for j, name in enumerate(model.input_names):
-        lines.append(f"  {name}: {' to '.join(range_text(model, j))}")
+    named = list(compress(model.memberships(), ~said.says_where))
+    for name, low, high in zip(model.input_names, model.minimum, model.maximum, strict=True):
+        lines.append(f"  {name}: {_range(low, high, _DIGITS_OF_RANGE)}")
         terms = [term for term in named if term["input"] == name]
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term)}" for term in terms]
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     lines.append(fill(f"Outside these ranges {words}: {model.policy}.", _WIDTH))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
-        ends = [low, high]
-        if np.isfinite(ends).all():
-            written = [place(end, precision, (high - low) or abs(high) or 1.0) for end in ends]
-        else:
-            written = [number(end, precision) for end in ends]
-        if np.isfinite(ends).any():
-            limits = " to ".join(written)
+        if np.isfinite([low, high]).any():
+            limits = _range(low, high, precision)
             lines.append(f"Held within the limits of its training: {name}, {limits}.")
-    if model.posterior is not None:
-        noise = zip(model.output_names, model.posterior.noise, strict=True)
-        values = ", ".join(f"{name} {number(value, precision)}" for name, value in noise)
-        lines.append(f"Standard deviation of the noise about the rules: {values}.")
-    if model.target is not None:
-        spread = zip(model.output_names, model.target.spread, strict=True)
-        values = ", ".join(f"{name} {number(value, precision)}" for name, value in spread)
-        lines.append(f"Standard deviation of the target: {values}.")
-    return "\n".join([*lines, "", fill(_HOW, _WIDTH)])
+    for what, values in (
+        ("noise about the rules", model.posterior and model.posterior.noise),
+        ("target", model.target and model.target.spread),
+    ):
+        if values is not None:
+            pairs = zip(model.output_names, values, strict=True)
+            told = ", ".join(f"{name} {number(value, precision)}" for name, value in pairs)
+            lines.append(f"Standard deviation of the {what}: {told}.")
+    cuts = _CUTS if any("±" in name for name in model.term_names) else ""
+    how = _HOW.format(cuts=cuts, line=_LINE if said.common.any() else "")
+    return "\n".join([*lines, "", fill(how, _WIDTH)])
 
 
 def _term_text(term):
@@ -301,18 +286,19 @@ def _term_text(term):
 
 
 def _left_out(model, chosen):
-    text = _count(model.n_rules - len(chosen), "rule")
+    text = counted(model.n_rules - len(chosen), "rule")
     if not has_training_data(model):
         return text
     weight = max(1.0 - model.rule_weights[chosen].sum(), 0.0)
     return f"{text} with {100.0 * weight:.3g} % of the weight"
 
 
-def range_text(model, j):
-    """Lowest and highest value of input j in training."""
-    low, high = model.minimum[j], model.maximum[j]
-    resolution = (high - low) or model.spread[j]
-    return [place(edge, _DIGITS_OF_RANGE, resolution) for edge in (low, high)]
+def _range(low, high, precision):
+    """Write "0.1 to 63.5", to so many digits of the width and one more."""
+    if np.isfinite(high - low):
+        unit = (high - low) or abs(high) or 1.0
+        return " to ".join(map(plain, rounded(np.array([low, high]), unit, precision + 1)))
+    return " to ".join(number(end, precision) for end in (low, high))
 
 
 def plain(value):
@@ -330,11 +316,6 @@ def number(value, precision):
     return f"{rounded:.{max(precision, 15)}g}"
 
 
-def place(value, precision, resolution):
-    """Write a place on an axis, to so many digits of a length that matters there."""
-    rounded = round(float(value), precision - floor(log10(resolution)))
-    return repr(rounded + 0.0).removesuffix(".0")
-
-
-def _count(number_of, what):
+def counted(number_of, what):
+    """Say "1 rule", "12 rules"."""
     return f"{number_of} {what}" + ("" if str(number_of) == "1" else "s")

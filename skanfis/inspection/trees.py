@@ -1,7 +1,7 @@
 """Pictures of a tree: its cuts and what stands at the leaves, and the plane that they cut."""
 
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 
@@ -19,9 +19,8 @@ from .text import plain
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
 # Line widths, in points, of a branch that no row takes and more of one that all do.
 _THIN, _THICK = 0.6, 6.0
-# Points of the plane along each input; parts of the plane's sides that the place of a leaf must
-# have for its value to stand there.
-_N_POINTS, _ROOM = 200, np.array([0.13, 0.07])
+# Points of the plane along each input.
+_N_POINTS = 200
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -29,9 +28,8 @@ class TreeDisplay:
     """The rules of a tree: cuts, and at each leaf its typical value and its share of the rows.
 
     A branch is the thicker the more rows take it. With ``kind="plane"`` it is the prediction over
-    the two inputs that are cut: lines where they are, pale bands where a cut turns, between 0.1 and
-    0.9 true, values where there is room for them. ``ax_`` and ``figure_`` are matplotlib's, once
-    drawn.
+    the two inputs that are cut, with lines where another rule becomes the strongest, and the values
+    in the middle of each rule's rows. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
@@ -93,13 +91,13 @@ class TreeDisplay:
         return cls(model=model, output=place, kind=kind).plot(ax=ax)
 
     @property
-    def _tree(self) -> Any:
-        return self.model.antecedent
+    def _said(self):
+        return Sentences.of(self.model)
 
     @property
     def values(self) -> np.ndarray:
         """Of every leaf, the rule's value where its rows lie, (n_rules,)."""
-        return Sentences.of(self.model).values[:, self.output]
+        return self._said.values[:, self.output]
 
     @property
     def leaves(self) -> list[str]:
@@ -115,22 +113,20 @@ class TreeDisplay:
         self.figure_ = self.ax_.figure
         return self
 
-    def _conditions(self):
-        """Above and below each node in words."""
-        model = self.model
-        names = [as_label(model.input_names[j]) for j in model.antecedent.term_inputs]
-        said = [condition(*pair) for pair in zip(names, model.term_names, strict=True)]
-        return np.array(said, dtype=object).reshape(2, -1).T
-
     def _draw_tree(self, ax):
-        model, (order, ends) = self.model, self._tree.walk
-        n_rules, words = model.n_rules, self._conditions()[order]
+        model, tree = self.model, cast(TreeAntecedent, self.model.antecedent)
+        (order, ends), n_rules = tree.walk, model.n_rules
+        names = [as_label(model.input_names[j]) for j in tree.term_inputs]
+        # Above and below each node.
+        words = np.reshape(list(map(condition, names, model.term_names)), (2, -1)).T[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
         share = np.concatenate([model.rule_weights, np.zeros(n_rules - 1)])
         for k, pair in enumerate(ends):
             depth[pair] = depth[n_rules + k] + 1.0
-        height[self._from_above(ends)] = np.arange(n_rules)[::-1]
+        # What is above a cut stands above what is below it.
+        sides = [[is_above for _, is_above in path] for path in tree.paths]
+        height[sorted(range(n_rules), key=sides.__getitem__)] = np.arange(n_rules)
         for k, pair in reversed(list(enumerate(ends))):
             height[n_rules + k], share[n_rules + k] = height[pair].mean(), share[pair].sum()
         step = _LETTER * max(map(len, words.ravel())) + _MARGIN
@@ -155,17 +151,6 @@ class TreeDisplay:
         name = as_label(model.output_names[self.output])
         ax.set_title(f"{name}: typical value (share of the rows)", fontsize="small", loc="left")
 
-    def _from_above(self, ends):
-        """The leaves from the uppermost to the lowest."""
-        n_rules, found, pending = self.model.n_rules, [], [self.model.n_rules]
-        while pending:
-            place = pending.pop()
-            if place < n_rules:
-                found.append(place)
-            else:
-                pending.extend(ends[place - n_rules][::-1])
-        return found
-
     def _draw_plane(self, ax):
         model, plt = self.model, _pyplot()
         if ax is None:
@@ -180,29 +165,13 @@ class TreeDisplay:
         colours = ax.pcolormesh(*axes, response, shading="nearest", rasterized=True)
         name = as_label(model.output_names[self.output])
         ax.figure.colorbar(colours, ax=ax, label=name)
-        drawn: set[int] = set()
-        for value, path in zip(self.values, self._tree.paths, strict=True):
-            self._outline(ax, value, path, both, drawn)
+        strongest = model.strengths(rows).argmax(axis=1).reshape(response.shape)
+        borders = np.arange(model.n_rules - 1) + 0.5
+        ax.contour(*axes, strongest, levels=borders, colors="white", linewidths=1.5)
+        box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "boxstyle": "round"}
+        for value, center in zip(self.values, self._said.places[:, both], strict=True):
+            ax.text(*center, plain(value), fontsize="small", ha="center", va="center", bbox=box)
         first, second = (as_label(model.input_names[j]) for j in both)
         ax.set(xlabel=first, ylabel=second, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         notes = "; ".join(f"{as_label(name)} = {value:.4g}" for name, value in held.items())
         ax.set_title(notes, fontsize="small", loc="left")
-
-    def _outline(self, ax, value, path, both, drawn):
-        """The cuts on the way to a leaf, each as long as the place that it cuts, and its value."""
-        low, high = self.model.minimum[both].copy(), self.model.maximum[both].copy()
-        room = _ROOM * (high - low)
-        nodes = self._tree.groups[0]
-        for node, is_above in path:
-            (cut, width), k = nodes.theta[:, node], int(nodes.inputs[node] == both[1])
-            if node not in drawn:
-                drawn.add(node)
-                along, reach = [low[1 - k], high[1 - k]], np.exp(width) * np.log(9.0)
-                line, fill = (ax.hlines, ax.fill_between) if k else (ax.vlines, ax.fill_betweenx)
-                line(cut, *along, color="white", linewidth=1.5)
-                fill(along, cut - reach, cut + reach, color="white", alpha=0.25, linewidth=0)
-            (low if is_above else high)[k] = cut
-        if (high - low > room).all():
-            box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "boxstyle": "round"}
-            middle, text = 0.5 * (low + high), plain(value)
-            ax.text(*middle, text, fontsize="small", ha="center", va="center", bbox=box)

@@ -86,10 +86,12 @@ def tolerated(least: float, variance: float, simplicity: float) -> float:
     return least + excess * min(least, max(variance - least, 0.0))
 
 
-def chosen(judged, best: Judged, most):
-    """Of all of at most this error and no more rules than the best, what costs least to read."""
+def within(judged, best: Judged, most):
+    """All of at most this error and no more rules than the best."""
     n_rules = best.candidate.n_rules
-    within = [
-        one for one in judged if one.squared_error <= most and one.candidate.n_rules <= n_rules
-    ]
-    return min(within, key=lambda one: (one.cost, one.squared_error))
+    return [one for one in judged if one.squared_error <= most and one.candidate.n_rules <= n_rules]
+
+
+def chosen(judged, best: Judged, most):
+    """Of all within, what costs least to read."""
+    return min(within(judged, best, most), key=lambda one: (one.cost, one.squared_error))

@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..learning.data import StandardisedData
-from .candidates import KINDS
-from .choice import Judged, Judges, best_of, chosen, tolerated
+from .candidates import KINDS, Candidate
+from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, splits
 from .start import Start, started
 from .trials import Plan, Trials
@@ -44,18 +44,20 @@ class StructureSearch:
         self.trials = self.folds[0] if len(found) == 1 else Trials(sample, plan)
         self.judges = Judges.of(self.rest)
         self.judged: list[Judged] = []
+        self.in_folds: dict[Candidate, list[Candidate]] = {}
 
     def run(self, kinds: Sequence[str] = KINDS) -> Start:
         """A start from the structure that is chosen."""
         one_rule = self._judge(self.trials.one_rule, [self.trials.one_rule] * len(self.folds))
-        self.judged.append(one_rule)
         for kind in kinds:
             self._grow(kind, one_rule)
-        # With slopes in common there would be two looks at every size, and chance would have two.
-        whole = [one for one in self.judged if not one.candidate.has_common_slopes]
-        best = best_of(whole, self.judges)
+        best = best_of(self.judged, self.judges)
         variance = self._variance()
         most = tolerated(best.squared_error, variance, self.simplicity)
+        # Only there: with two looks at every size, chance would have two.
+        rules = [one for one in within(self.judged, best, most) if one.candidate.n_rules > 1]
+        for one in rules:
+            self._judge(*_with_common_slopes(one.candidate, self.in_folds[one.candidate]))
         found = chosen(self.judged, best, most)
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
@@ -77,13 +79,13 @@ class StructureSearch:
                 return
             candidate, in_folds = larger, grown
             now = self._judge(candidate, in_folds)
-            self.judged += [now, self._judge(*_with_common_slopes(candidate, in_folds))]
             n_further += 1
             if self.judges.prefer(now, best):
                 best, n_further = now, 0
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""
+        self.in_folds[candidate] = in_folds
         squares = np.concatenate(
             [
                 fold.squared_errors(fold.tuned(one), rest)
@@ -93,7 +95,9 @@ class StructureSearch:
         factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
         squares *= factor
         error = self.judges.mean(squares)
-        return Judged(candidate, squares, error, cost_of(self.trials.tuned(candidate)))
+        judged = Judged(candidate, squares, error, cost_of(self.trials.tuned(candidate)))
+        self.judged.append(judged)
+        return judged
 
     def _variance(self):
         """Squared error of the mean on the rows that judge."""

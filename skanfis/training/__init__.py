@@ -1,6 +1,6 @@
 """Training: one fit in a straight line (``fit``), and what it uses on the way."""
 
-from .data import Fitted, SolverRun, ValidatedData
+from .data import Fitted, SolverRun, ValidatedData, validated
 from .fit import fit_rules
 from .pruning import RuleStatistics, model_without_rules, redundant_rules
 from .watching import Callbacks
@@ -14,4 +14,5 @@ __all__ = [
     "fit_rules",
     "model_without_rules",
     "redundant_rules",
+    "validated",
 ]

@@ -3,13 +3,24 @@
 from dataclasses import dataclass
 
 import numpy as np
+from sklearn.utils.validation import check_consistent_length, validate_data
 
+from .._sklearn import check_sample_weight
+from .._validation import (
+    bearable_weights,
+    check_finite,
+    group_numbers,
+    named_refusals,
+    positive_weights,
+    refuse_lazy,
+)
 from ..bounds.constraints import Constraints
 from ..learning import SolverResult
 from ..learning.data import StandardisedData, check_scales
 from ..learning.objective import Evaluation, SeparableProblem
 from ..learning.premise import Premise
 from ..model import TSKModel
+from ..naming import default_output_names
 from ..search import Start
 
 
@@ -70,6 +81,59 @@ class ValidatedData:
         given = np.full(self.kept.size, np.nan)
         given[self.kept] = every
         return given
+
+
+def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
+    """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""
+    refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
+    numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
+    is_first = not (is_chunk and hasattr(estimator, "model_"))
+    output_names = _target_names(y)
+    with named_refusals(X=X, y=y):
+        X, y = validate_data(
+            estimator,
+            X,
+            y,
+            reset=is_first,
+            validate_separately=(
+                {**numeric, "ensure_min_samples": 1 if is_chunk else 2},
+                {**numeric, "ensure_2d": False},
+            ),
+        )
+    check_consistent_length(X, y)
+    if is_first:
+        estimator._single_output = y.ndim == 1
+    targets = y.reshape(-1, 1) if y.ndim == 1 else y
+    if output_names is None or len(output_names) != targets.shape[1]:
+        output_names = default_output_names(targets.shape[1])
+    numbered = [f"x{j}" for j in range(X.shape[1])]
+    names = tuple(map(str, getattr(estimator, "feature_names_in_", numbered)))
+    check_finite(X, "X", names)
+    check_finite(targets, "y", output_names)
+    groups = None if groups is None else group_numbers(groups, len(X))
+    keep = None
+    if sample_weight is not None:
+        # A chunk may be without any weight, which scikit-learn refuses from some version on;
+        # weights of chunks count against one another and stay as they are.
+        if not (is_chunk and np.array_equal(sample_weight, np.zeros(len(X)))):
+            sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+        sample_weight = np.asarray(sample_weight, dtype=float)
+        sample_weight = sample_weight if is_chunk else bearable_weights(sample_weight)
+        keep = positive_weights(sample_weight, len(X), 0 if is_chunk else 2)
+    if keep is not None:
+        X, targets, sample_weight = X[keep], targets[keep], sample_weight[keep]
+        groups = None if groups is None else groups[keep]
+    constraints = Constraints.read(
+        estimator.monotonic_cst, estimator.constraints, names, targets.shape[1]
+    )
+    return ValidatedData(X, targets, sample_weight, groups, names, output_names, keep, constraints)
+
+
+def _target_names(y):
+    """Names of a Series or of a frame's columns, if all are str."""
+    names = getattr(y, "columns", None)
+    names = [getattr(y, "name", None)] if names is None else list(names)
+    return tuple(names) if all(isinstance(name, str) and name for name in names) else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -210,7 +210,7 @@ class _Fit:
             weights = huber_weights(run.problem, run.evaluation, epsilon, rows.sample_weight)
             start = replace(run.start, displacement=run.displacement)
             run = self.run(reweighted(rows, weights), start)
-            change = float(np.mean(np.abs(weights - before)))
+            change = float(np.average(np.abs(weights - before), weights=rows.sample_weight))
             if change < _SETTLED:
                 return run, weights
         warn_user(

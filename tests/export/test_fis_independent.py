@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skanfis.export import read_fis, write_fis
+from skanfis.export import export_fis, read_fis
 from skanfis.membership import FAMILIES
 
 from .. import oracles
@@ -92,7 +92,7 @@ def test_fuzzylite_agrees_on_every_family(mf, fuzzylite, tmp_path, rng):
     # Where no rule of the file fires, fuzzylite gives NaN.
     fires = model.antecedent.log_memberships(rows.T).reshape(-1, N_ROWS) > np.log(1e-6)
     rows = rows[fires[:3].any(axis=0) & fires[3:].any(axis=0)]
-    write_fis(model, tmp_path / "model.fis")
+    export_fis(model, tmp_path / "model.fis")
     outputs = by_fuzzylite(fuzzylite, tmp_path / "model.fis", rows)
     assert difference(outputs, model, rows) < TOLERANCE[mf]
 
@@ -102,7 +102,7 @@ def test_fuzzylite_agrees_on_every_family(mf, fuzzylite, tmp_path, rng):
 def test_fuzzylite_agrees_on_every_rule_base(kind, fuzzylite, tmp_path):
     model = MODELS[kind]
     rows = rows_of(model, 1.0, N_ROWS)
-    write_fis(model, tmp_path / "model.fis")
+    export_fis(model, tmp_path / "model.fis")
     outputs = by_fuzzylite(fuzzylite, tmp_path / "model.fis", rows)
     assert difference(outputs, model, rows) < 1e-10
 
@@ -110,7 +110,7 @@ def test_fuzzylite_agrees_on_every_rule_base(kind, fuzzylite, tmp_path):
 def test_we_read_what_fuzzylite_writes(fuzzylite, tmp_path):
     model = MODELS["rule table, order 1, 2 outputs"]
     rows = rows_of(model, 1.0)
-    write_fis(model, tmp_path / "ours.fis")
+    export_fis(model, tmp_path / "ours.fis")
     files = ["-i", tmp_path / "ours.fis", "-o", tmp_path / "theirs.fis"]
     fuzzylite(*files, "-if", "fis", "-of", "fis")
     read = read_fis(tmp_path / "theirs.fis")

@@ -149,20 +149,6 @@ def test_reads_utf_8_with_and_without_mark_and_no_other_encoding(tmp_path):
             read_fis(path)
 
 
-def test_takes_names_of_columns(tmp_path):
-    path = tmp_path / "by_hand.fis"
-    path.write_text(BY_HAND, encoding="utf-8")
-    assert read_fis(path, input_names=["time", "rate"]).input_names == ("time", "rate")
-    for names in (["time"], ["time", "time"], ["a", "b", "c"]):
-        with pytest.raises(ValueError, match="must be 2 different names"):
-            read_fis(path, input_names=names)
-
-
-def test_text_in_place_of_a_path_is_named():
-    with pytest.raises(ValueError, match="path is the text of a model, not the path of a file"):
-        read_fis(BY_HAND)
-
-
 def test_refuses_many_rules_over_wide_consequents_before_memory_is_asked_for():
     # A short file: 20,000 rules share one linear consequent of 1,000 inputs.
     n_inputs, n_rules = 1000, 20_000

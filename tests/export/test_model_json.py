@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.export import export_json, read_json, write_json
+from skanfis.export import export_json, read_fis, read_json
 from skanfis.export.json_reader import parse_json
 
 from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
@@ -53,7 +53,7 @@ def test_comes_back_to_the_last_bit(model):
 def test_file_of_a_trained_model(tmp_path, rng):
     X = rng.normal(size=(100, 2)) * [1e-3, 1e5]
     estimator = ANFISRegressor(n_mfs=2, agreement=0.1, alpha=1e-5).fit(X, X[:, 0] * X[:, 1])
-    write_json(estimator, tmp_path / "model.json", posterior=True)
+    export_json(estimator, tmp_path / "model.json", posterior=True)
     read = read_json(tmp_path / "model.json")
     assert_same(read, estimator.model_)
     assert_array_equal(read.predict(X)[:, 0], estimator.predict(X))
@@ -214,8 +214,9 @@ def test_a_rule_table_that_a_tree_leaves_comes_back():
 
 @pytest.mark.parametrize("given", [export_json(A_GRID), '{"a": 1}', b"{}", Path('{"a": 1}')])
 def test_text_in_place_of_a_path_is_named(given):
-    with pytest.raises(ValueError, match="path is the text of a model, not the path of a file"):
-        read_json(given)
+    for read in (read_json, read_fis):
+        with pytest.raises(ValueError, match="path is the text of a model, not the path of a file"):
+            read(given)
 
 
 def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):

@@ -1,4 +1,6 @@
-"""A fitted pipeline for the displays."""
+"""A fitted pipeline, and figures that are closed after every test."""
+
+import sys
 
 import numpy as np
 import pandas as pd
@@ -7,6 +9,13 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from ..quick import quick
+
+
+@pytest.fixture(autouse=True)
+def _close_figures():
+    yield
+    if pyplot := sys.modules.get("matplotlib.pyplot"):
+        pyplot.close("all")
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,6 @@ from skanfis import ANFISRegressor
 from skanfis.inspection import (
     MembershipDisplay,
     ResponseSurfaceDisplay,
-    memberships_table,
 )
 from skanfis.inspection.labels import as_label, printable
 
@@ -25,12 +24,6 @@ A_GRID = MODELS["grid, order 1, 1 outputs"]
 EACH = pytest.mark.parametrize(
     "model", [one for i, one in enumerate(EVERY_PAIR.values()) if i % 2 == i // 4 % 2]
 )
-
-
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
 
 
 def drawn(display):
@@ -46,7 +39,7 @@ class TestMemberships:
             with pytest.raises(ValueError, match="no terms: nothing to draw"):
                 MembershipDisplay.from_estimator(model)
             return
-        table = memberships_table(model)
+        table = pd.DataFrame(model.memberships())
         for one in MembershipDisplay.from_estimator(model).inputs:
             own = table[table["input"] == one.input_name]
             # Of a cut the side above says all.

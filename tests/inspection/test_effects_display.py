@@ -25,12 +25,6 @@ KINDS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
-
-
 def mean_at(model, X, columns, values):
     """Mean output over all combinations of the rows' values, with some of them given."""
     rows = np.stack(np.meshgrid(*X.T, indexing="ij"), axis=-1).reshape(-1, 3)

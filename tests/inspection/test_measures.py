@@ -116,11 +116,6 @@ def test_units_do_not_matter(model, factor):
     assert_allclose(found.deviation / factor, expected.deviation, rtol=1e-9)
 
 
-def test_a_single_rule_is_the_model():
-    found = found_of(ONE, *data_of(ONE))
-    assert_array_equal(found.alone, 0.0)
-
-
 def of_two_rules(first, second):
     """Constants of two rules on the input in the middle, whose terms have a width of one."""
     theta = np.array([[-1.0, 1.0], [0.0, 0.0]])

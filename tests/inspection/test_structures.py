@@ -16,12 +16,6 @@ from ..quick import quick
 plt = pytest.importorskip("matplotlib.pyplot")
 
 
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    plt.close("all")
-
-
 @pytest.fixture(scope="module")
 def line():
     x = np.linspace(0.0, 1.0, 20).reshape(-1, 1)

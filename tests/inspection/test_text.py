@@ -8,7 +8,7 @@ from textwrap import dedent
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.compose import TransformedTargetRegressor, make_column_transformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder, StandardScaler
@@ -16,8 +16,8 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
 from skanfis.inspection import export_text, rules_html
-from skanfis.inspection.sentences import Sentences
-from skanfis.inspection.text import number, place
+from skanfis.inspection.sentences import Sentences, rounded
+from skanfis.inspection.text import number
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, rows_of
 from .reader import read_text
@@ -196,12 +196,16 @@ def test_rules_that_matter_and_a_line_for_the_rest():
 
 
 def test_a_grid_in_words():
-    lines = export_text(A_GRID).splitlines()
+    text = export_text(A_GRID)
+    lines = text.splitlines()
     assert lines[0] == "12 rules, 3 inputs."
     start = [line.partition(",")[0] for line in lines].index("Rule 0")
     assert lines[start + 1] == "  IF time is low AND chip temperature is low AND rate is low"
     assert "Outside these ranges the value at the edge is held: out_of_bounds='clip'." in lines
     assert lines[-1] == "84 numbers."
+    # Of no cut is told how it turns, of no common line what it is for.
+    assert "±" not in text
+    assert "common line" not in text
 
 
 def test_places_are_told_to_digits_of_their_widths():
@@ -210,9 +214,9 @@ def test_places_are_told_to_digits_of_their_widths():
     written = read_text(export_text(A_GRID), NAMES).terms["time", term["name"]][1]
     assert written["center"] == pytest.approx(term["center"], abs=0.05 * term["width"])
     assert number(1000423.4, 4) == "1000000"
-    assert place(1000423.4, 4, 600.0) == "1000423.4"
-    assert place(-1e-13, 4, 600.0) == "0"
-    assert place(0.1 + 0.2, 17, 1.0) == "0.30000000000000004"
+    found = rounded([1000423.41, -1e-13, 1.0 / 3.0], 600.0, 4)
+    assert_array_equal(found, [1000423.4, 0.0, 0.3])
+    assert rounded(0.1 + 0.2, 0.1, 17) == 0.1 + 0.2
 
 
 def test_two_outputs_and_other_names():
@@ -258,6 +262,14 @@ def test_a_model_without_data_has_no_weights_to_tell():
     text = export_text(model, max_shown=2)
     assert "\nRule 0:\n  IF" in text
     assert "\n10 rules left out.\n" in text
+
+
+def test_a_rule_that_is_the_strongest_on_no_row_errs_on_none():
+    rows = np.ones(12)
+    rows[3] = 0.0
+    text = export_text(replace(A_GRID, rule_weights=rows / 11, rule_rows=rows))
+    assert "\nRule 3, strongest on no row:\n" in text
+    assert text.count("strongest on 9.1 % of the rows") == 11
 
 
 class Page(HTMLParser):

@@ -97,6 +97,7 @@ def test_text_says_sides_with_the_length_over_which_they_turn():
     )
     text = export_text(A_TREE)
     assert path in text
+    assert "x > c ± h is 1 / (1 + 9^((c - x) / h)) true" in text
     # They say all: no list repeats them.
     assert "sigmoid" not in text
     renamed = replace(A_TREE, term_names=("late", *A_TREE.term_names[1:]))

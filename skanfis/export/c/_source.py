@@ -237,10 +237,11 @@ class Source:
     def _strengths(self, logarithms, rules, slope):
         """Terms, then strengths; or the derivatives of their logarithms along e."""
         if self.is_tree:
-            body = kept_lines(templates.TREE_SLOPE if slope else templates.TREE, self.facts)
+            body = kept_lines(templates.TREE, {"slope" if slope else "share"})
             words = {"$n_nodes": self.n_terms // 2, "$n_rules": self.model.n_rules}
-            for word, number in words.items():
-                body = body.replace(word, str(number))
+            words |= {"$rules": rules, "$first": "0.0R" if slope else "1.0R"}
+            for word, value in words.items():
+                body = body.replace(word, str(value))
             return _indented(body.splitlines())
         numbers, lines = self.numbers, []
         if numbers.counts == ():

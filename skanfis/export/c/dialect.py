@@ -1,6 +1,7 @@
 """The dialect of C that a file is written in: arguments, numbers and status word."""
 
 import re
+import textwrap
 from dataclasses import dataclass
 from numbers import Real
 from pathlib import Path
@@ -124,14 +125,10 @@ def literals(values, indent=""):
         inner = ",\n".join(literals(part, indent + "    ") for part in values)
         return f"{indent}{{\n{inner}\n{indent}}}"
     write = _literal if values.dtype.kind == "f" else str
-    lines, line = [], ""
-    for text in map(write, values):
-        if line and len(indent) + len(line) + len(text) > 90:
-            lines.append(line)
-            line = ""
-        line += f"{text}, " if line else f" {text}, "
-    lines.append(line)
-    return f"{indent}{{{f'{chr(10)}{indent} '.join(x.rstrip() for x in lines).rstrip(',')} }}"
+    text = f"{{ {', '.join(map(write, values))} }}"
+    return textwrap.fill(
+        text, 95, initial_indent=indent, subsequent_indent=f"{indent}  ", break_on_hyphens=False
+    )
 
 
 def comment(text):

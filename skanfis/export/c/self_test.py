@@ -110,8 +110,6 @@ def known_answers(numbers, min_coverage, limits=None):
 def size_of_sum(model, X, y):
     """The size of what is summed for each output: sum_r w_r (|a_r| + sum_j |b_rj (x_j - x0_j)|)."""
     inside = np.clip(X, model.minimum, model.maximum)
-    basis = np.ones((len(X), model.coefficients.shape[1]))
-    if model.order:
-        basis[:, 1:] = np.abs(inside - model.reference)
-    sizes = np.einsum("nr,nb,rbo->no", model.strengths(X), basis, np.abs(model.coefficients))
+    parts = [model.strengths(X), np.abs(model.basis(inside.T)), np.abs(model.coefficients)]
+    sizes = np.einsum("nr,bn,rbo->no", *parts)
     return np.maximum(sizes.max(axis=0), np.abs(y).max(axis=0))

@@ -211,34 +211,25 @@ linear        |
               |    return status;
               |}
 """
-# From the root on: of what comes to node i, w[$n_rules + i], a part goes to either of its two ends.
-# What a sigmoid has 80 widths off its cut, 2e-35, no sum of strengths can tell from
-# nothing: odds are held there, and no branch depends on the side on which a row lies.
+# From the root on: of what comes to node i, $rules[$n_rules + i], a part goes to either of its two
+# ends; or the derivatives of the logarithms. What a sigmoid has 80 widths off its cut, 2e-35, no
+# sum of strengths can tell from nothing: odds are held there, and no branch depends on the side on
+# which a row lies.
 TREE = """
- |w[$n_rules] = 1.0R;
- |for (i = 0; i < $n_nodes; ++i) {
- |    $real odds, above;
- |    $real u = (z[$name_node_input[i]] - $name_nodes[i][0]) * $name_nodes[i][1];
- |    u = u < -80.0R ? -80.0R : u;
- |    odds = $EXP(-u);
- |    above = 1.0R / (1.0R + odds);
- |    w[$name_node_ends[i][0]] = w[$n_rules + i] * above;
- |    w[$name_node_ends[i][1]] = w[$n_rules + i] * (odds * above);
- |}
-"""
-TREE_SLOPE = """
- |s[$n_rules] = 0.0R;
- |for (i = 0; i < $n_nodes; ++i) {
- |    const $int k = $name_node_input[i];
- |    const $real ahead = e[k] * $name_nodes[i][1];
- |    $real odds, above;
- |    $real u = (z[k] - $name_nodes[i][0]) * $name_nodes[i][1];
- |    u = u < -80.0R ? -80.0R : u;
- |    odds = $EXP(-u);
- |    above = 1.0R / (1.0R + odds);
- |    s[$name_node_ends[i][0]] = s[$n_rules + i] + odds * above * ahead;
- |    s[$name_node_ends[i][1]] = s[$n_rules + i] - above * ahead;
- |}
+      |$rules[$n_rules] = $first;
+      |for (i = 0; i < $n_nodes; ++i) {
+      |    const $int k = $name_node_input[i];
+slope |    const $real ahead = e[k] * $name_nodes[i][1];
+      |    $real odds, above;
+      |    $real u = (z[k] - $name_nodes[i][0]) * $name_nodes[i][1];
+      |    u = u < -80.0R ? -80.0R : u;
+      |    odds = $EXP(-u);
+      |    above = 1.0R / (1.0R + odds);
+share |    w[$name_node_ends[i][0]] = w[$n_rules + i] * above;
+share |    w[$name_node_ends[i][1]] = w[$n_rules + i] * (odds * above);
+slope |    s[$name_node_ends[i][0]] = s[$n_rules + i] + odds * above * ahead;
+slope |    s[$name_node_ends[i][1]] = s[$n_rules + i] - above * ahead;
+      |}
 """
 ADD_SUPPORT = """
  |if (covered < enough && $name_support[r][0] > 0.0R) {

@@ -13,7 +13,7 @@ from ..folding import fold
 from .functions import function_of
 from .reader import distinct, parse_fis, read_fis
 
-__all__ = ["export_fis", "read_fis", "write_fis"]
+__all__ = ["export_fis", "read_fis"]
 
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_]+")
 _MINUS = re.compile(r"(?<!\S)-(?=[0-9.])")
@@ -36,8 +36,8 @@ DefuzzMethod='wtaver'"""
 _N_POINTS = 1000
 
 
-def export_fis(estimator: Any) -> str:
-    """Give a trained model as the text of a .fis file, for MATLAB, Octave or fuzzylite.
+def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
+    """Write a trained model as a .fis file, for MATLAB, Octave or fuzzylite.
 
     The system is Sugeno's, with product as AND and weighted average; numbers have all their digits.
     Outside the Range of the inputs, the box of the training data, other programs do as they like:
@@ -47,6 +47,8 @@ def export_fis(estimator: Any) -> str:
     ----------
     estimator : fitted estimator or TSKModel
         As :func:`fold` takes it.
+    path : str or path-like, default=None
+        The file to write, which Octave wants to end in ".fis"; None writes nothing.
 
     Returns
     -------
@@ -98,29 +100,9 @@ def export_fis(estimator: Any) -> str:
             f"the model cannot be written such that it can be read: {error} Train on inputs and "
             "targets in other units."
         ) from None
+    if path is not None:
+        Path(path).write_text(text, encoding="ascii", newline="\n")
     return text
-
-
-def write_fis(estimator: Any, path: str | PathLike[str]) -> None:
-    """Write a trained model to a .fis file, as :func:`export_fis` gives it.
-
-    Parameters
-    ----------
-    estimator : fitted estimator or TSKModel
-    path : str or path-like
-        Octave wants it to end in ".fis".
-
-    Examples
-    --------
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from skanfis import ANFISRegressor
-    >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import write_fis
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_fis(ANFISRegressor(n_mfs=2).fit(*make_jang_sinc()), Path(folder) / "sinc.fis")
-    """
-    Path(path).write_text(export_fis(estimator), encoding="ascii", newline="\n")
 
 
 def _premises(model):

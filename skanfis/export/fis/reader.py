@@ -5,8 +5,6 @@ Every pattern is anchored and passes over its line once, whatever the line holds
 
 import re
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from math import prod
 from os import PathLike
@@ -41,7 +39,7 @@ _SYSTEM = {
 }
 
 
-def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = None) -> TSKModel:
+def read_fis(path: str | PathLike[str]) -> TSKModel:
     """Read a Sugeno system from a .fis file of MATLAB, Octave or fuzzylite.
 
     The file is data: it is parsed strictly, and no part of it is ever run. :doc:`/files` says what
@@ -50,8 +48,6 @@ def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = N
     Parameters
     ----------
     path : str or path-like
-    input_names : sequence of str, default=None
-        Names for the inputs in place of the file's: those of a table's columns.
 
     Returns
     -------
@@ -62,8 +58,7 @@ def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = N
     Raises
     ------
     ValueError
-        With the line, if the file is malformed or holds what is not supported; if ``input_names``
-        are not one per input, and different.
+        With the line, if the file is malformed or holds what is not supported.
 
     Examples
     --------
@@ -71,26 +66,18 @@ def read_fis(path: str | PathLike[str], *, input_names: Sequence[str] | None = N
     >>> from pathlib import Path
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.export import read_fis, write_fis
+    >>> from skanfis.export import export_fis, read_fis
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_fis(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()), Path(folder) / "sinc.fis")
-    ...     read_fis(Path(folder) / "sinc.fis").n_rules
+    ...     path = Path(folder) / "sinc.fis"
+    ...     text = export_fis(ANFISRegressor(n_mfs=4).fit(*make_jang_sinc()), path)
+    ...     read_fis(path).n_rules
     16
     """
     data = read_bytes(path, _MOST_BYTES)
     try:
-        model = parse_fis(data.decode("utf-8-sig"))
+        return parse_fis(data.decode("utf-8-sig"))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    if input_names is None:
-        return model
-    names = tuple(map(str, input_names))
-    if len(set(names)) != model.n_inputs or len(names) != model.n_inputs:
-        raise ValueError(
-            f"input_names={list(names)!r} must be {model.n_inputs} different names, one for each "
-            f"of {', '.join(model.input_names)}."
-        )
-    return replace(model, input_names=names)
 
 
 def parse_fis(text):
