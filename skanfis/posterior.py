@@ -52,8 +52,8 @@ class Posterior:
     cross : ndarray of shape (n_outputs, n_displacements, n_columns)
         B_k.
     pinned : ndarray of shape (n_outputs, n_pinned, n_columns + n_displacements)
-        Q_k, orthonormal rows: what is known of each output for certain, by constraints that are
-        met with equality. Rows of zeros where outputs have different numbers of them.
+        Q_k, orthonormal rows: what is known of each output for certain, at fixed points. Rows of
+        zeros where outputs have different numbers of them.
     """
 
     noise: np.ndarray
@@ -109,36 +109,24 @@ class Posterior:
             pinned=pinned,
         )
 
-    def given(self, model, known):
-        """The same posterior, given that what an output does at some points is known.
+    def given(self, model, points):
+        """The same posterior, given that what outputs are at some points is known.
 
-        Where a value, or a difference of two, is known for certain, what remains uncertain is
-        orthogonal to it: of the half h of every row the part along the halves of what is known is
-        taken off. Exact for a Gaussian posterior and equalities.
+        Where a value is known for certain, what remains uncertain is orthogonal to it: of the half
+        h of every row the part along the halves of what is known is taken off. Exact for a Gaussian
+        posterior and equalities.
 
         Parameters
         ----------
         model : TSKModel
             Whose posterior this is, in the user's units.
-        known : list of (ndarray, ndarray or None)
-            Of every output points (n_points, n_inputs) in the range; values are known there, or, if
-            others of as many are given, the changes from those. Or arrays alone: sums over
-            consequents (n_sums, n_rules, 1 + n_inputs) about the reference.
+        points : ndarray of shape (n_points, n_inputs)
+            In the range.
         """
-        spans = []
-        for k, parts in enumerate(known):
-            halves = [np.zeros((sum(self.cross.shape[1:]), 0))]
-            for part in parts:
-                if isinstance(part, np.ndarray):
-                    n_changes = self.noise.size * self.premises.shape[1]
-                    rows = np.vstack([part, np.zeros((n_changes, part.shape[1]))])
-                else:
-                    points, others = part
-                    rows = self._rows(model, np.array(points.T, order="C"))
-                    if others is not None:
-                        rows -= self._rows(model, np.array(others.T, order="C"))
-                halves.append(self._halves(rows)[k])
-            spans.append(_orthonormal_rows(np.hstack(halves)))
+        if not len(points):
+            return self
+        halves = self._halves(self._rows(model, np.array(points.T, order="C")))
+        spans = [_orthonormal_rows(half) for half in halves]
         pinned = np.zeros((self.noise.size, max(map(len, spans)), spans[0].shape[1]))
         for own, rows in zip(pinned, spans, strict=True):
             own[: len(rows)] = rows

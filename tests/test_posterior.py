@@ -41,8 +41,7 @@ def quick(tol=1e-3):
 def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt, n_known=0):
     """Noise and standard deviation of new rows of standardised inputs, of one output.
 
-    The first ``n_known`` of them are known for certain, and the change from the next to the one
-    after: observed a great many times.
+    The first ``n_known`` of them are known for certain: observed a great many times.
 
     The joint precision is J' J of every residual that the cost is made of, by complex steps, and
     inverted whole; the noise is what the residual leaves after the trace of the smoother.
@@ -84,7 +83,7 @@ def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt,
     squares = dense.weight @ (dense.y[:, 0] - dense.design(theta) @ beta) ** 2
     noise = np.sqrt(squares * n / (n - k))
     if n_known:
-        seen = np.vstack([row[:n_known], row[n_known] - row[n_known + 1]])
+        seen = row[:n_known]
         covariance = np.linalg.inv(precision + 1e9 * np.trace(precision) * seen.T @ seen)
     model = np.einsum("ip,pq,iq->i", row, covariance, row) / n
     return noise, noise * np.sqrt(1.0 + model)
@@ -122,8 +121,7 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt):
     model = replace(model, minimum=np.full(2, -1e3), maximum=np.full(2, 1e3))
     X = (rows.inputs.offset[:, None] + scale[:, None] * new).T
     found = model.standard_deviation(X)[:, 0]
-    known = [[(X[:3], None), (X[3:4], X[4:5])]]
-    sure = replace(model, posterior=posterior.given(model, known))
+    sure = replace(model, posterior=posterior.given(model, X[:3]))
     _, of_known = dense_deviation(
         problem, premise, rows, PENALTY, evaluation, new, is_learnt, n_known=3
     )

@@ -71,11 +71,6 @@ class Bounds:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(gap > 0.0, gap / (self.highest - self.lowest), 0.0)
 
-    @property
-    def magnitude(self) -> np.ndarray:
-        """What no absolute value in the box is above, (n_outputs,)."""
-        return np.maximum(np.abs(self.lower), np.abs(self.upper))
-
     def __repr__(self):
         parts = [
             f"{name} in [{low:.6g}, {high:.6g}]"

@@ -1,86 +1,140 @@
 r"""Rules in order: predictions that rise, or keep within limits, by how a model is made.
 
-Let no rule's slope by x_j be negative, and let certain rules ("above") be no less than others
-("below") at every corner of a box, and so all over it. Then predictions rise with x_j there:
+Let no rule's slope by x_j be negative. Where the part of one rule grows at the cost of another's,
+the prediction changes by the difference of their values, and by their own slopes. It rises where,
+for every such pair, with values f, slopes b by x_j and u = (x_j - middle) / width,
 
-*Tree.* At a cut of x_j every rule above it is at least every rule below it. With sigma the truth of
-"above", y = sigma A + (1 - sigma) B, where A and B are means over the rules above and below: A is
-at least B, sigma rises, and A and B rise themselves, by induction from the leaves.
+    f_above - f_below + width ((o + c e^u) b_above + (o + c e^-u) b_below) >= 0
 
-*Gaussian terms of one width on x_j.* Rules are ordered as their centres c in x_j are; on a grid,
-those that have all other terms alike. With w the strengths and f the values of rules, b their
-slopes, and a = (c - x_j) / width^2 the slopes of log w: dy / dx_j = E b + Cov(a, f), and the
-covariance of two things in the same order, the sum over pairs of w_r w_s (a_r - a_s) (f_r - f_s),
-is not negative.
+all over a box: linear in the consequents at every point, and least at a corner of all inputs but
+x_j, along which it is convex. Pairs are those
 
-*One line for all rules* rises where its slope does not fall.
+*Of a tree*: rules above and below a cut of x_j, in the middle, with its width. With t the truth of
+"above", y = t A + (1 - t) B, where A and B are means over the rules on either side, and
 
-To fall is the same with all orders reversed. A prediction is within limits where every rule is.
-All of it is linear in the consequents, and a linear function is least at a corner of the box.
+    dy / dx_j = t (1 - t) (A - B) / width + t dA / dx_j + (1 - t) dB / dx_j ,
+
+divided by t (1 - t), with e^u = t / (1 - t): o = c = 1. A rule's slope serves every cut of x_j on
+its path, in equal parts.
+
+*Of Gaussian terms of one width s on x_j*: rules with other centres in it; on a grid, those that
+have all other terms alike. With w the strengths, a = (center - x_j) / s^2 the slopes of log w,
+
+    dy / dx_j = E b + Cov(a, f) ,    Cov(a, f) = sum over pairs of w_r w_s (a_r - a_s) (f_r - f_s) ,
+
+divided by w_r w_s: the width is s^2 over the distance of their centres, and o = 1. On a grid
+w_r / w_s = e^u, and what is left of E b, w_r^2 b_r, serves the n - 1 pairs that r is in: c is
+1 / (n - 1).
+
+*Of one line for all rules* there are none.
+
+To fall is the same with all signs reversed. A prediction is within limits where every rule is.
 """
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, TreeAntecedent
 from ..membership import Gaussian
 from ..model import TSKModel
-from .quadratic_program import InfeasibleError, nearest
-from .terms import EPS
+from .quadratic_program import nearest_by_exchange
+from .terms import EPS, ROUNDINGS
 
-# In standard deviations of the target, what inequalities are kept by; slopes are by so much more.
-_MARGIN, _SLOPE = 1e-9, 1e3
-# Rounds in which corners are added.
-_MOST_ROUNDS = 60
+# In standard deviations of the target, what is kept by slopes, and between rules, there to within
+# its half.
+_SLOPE, _MARGIN = 1e-6, 1e-5
+# Slopes as good as none, and the u beyond which they help no more: exp(u) stays finite.
+_TINY, _FARTHEST = float(np.finfo(float).tiny), 300.0
 ONE_RULE = GridAntecedent.build([], [], [])
 
 
-@dataclass(frozen=True, eq=False)
-class RuleOrder:
-    """What the rules of one output must keep: f[above] - f[below] >= least, on all of a box.
+class _Pairs(NamedTuple):
+    """Pairs of rules, and what must hold of each; widths are negative where predictions fall.
 
-    Rule -1 is zero everywhere. ``signs`` are those of the slopes, by column.
+    Rule -1 is zero everywhere; ``column`` is the place of x_j in [1, x].
     """
 
     above: np.ndarray
     below: np.ndarray
-    least: np.ndarray
+    column: np.ndarray
+    middle: np.ndarray
+    width: np.ndarray
+    own: np.ndarray  # o
+    curved: np.ndarray  # c
+    least: np.ndarray  # in the place of zero
+
+
+@dataclass(frozen=True, eq=False)
+class RuleOrder:
+    """What the rules of one output must keep on all of a box; ``signs`` are those of slopes."""
+
+    pairs: _Pairs
     signs: np.ndarray
 
     @classmethod
     def of(cls, antecedent: Antecedent, signs, limits, slope_inputs):
         """None where no order is known that is enough; columns are those of ``slope_inputs``."""
-        pairs = [np.empty((0, 2), dtype=int)]
-        for j in np.flatnonzero(signs):
-            found = _pairs(antecedent, j)
-            if found is None:
-                return None
-            pairs.append(found[:, :: signs[j]])
-        n_ordered = sum(map(len, pairs))
-        least = [np.zeros(n_ordered)]
         every = np.arange(antecedent.n_rules)
         nothing = np.full(every.size, -1)
-        for limit, both in ((limits[0], (every, nothing)), (-limits[1], (nothing, every))):
-            if np.isfinite(limit):
-                pairs.append(np.column_stack(both))
-                least.append(np.full(every.size, limit))
-        above, below = np.vstack(pairs).T
-        return cls(above, below, np.concatenate(least), signs[slope_inputs])
+        found = [_pairs(every[:0], every[:0])]
+        for j in np.flatnonzero(signs):
+            pairs = _pairs_along(antecedent, j)
+            if pairs is None:
+                return None
+            if signs[j] < 0:
+                pairs = pairs._replace(above=pairs.below, below=pairs.above, width=-pairs.width)
+            column = 1 + np.flatnonzero(slope_inputs == j)
+            # Without slopes by it there is the plain order.
+            slopes = {"column": column[0]} if column.size else {"own": 0.0, "curved": 0.0}
+            found.append(_pairs(**pairs._asdict() | slopes))
+        if np.isfinite(limits[0]):
+            found.append(_pairs(every, nothing, least=limits[0]))
+        if np.isfinite(limits[1]):
+            found.append(_pairs(nothing, every, least=-limits[1]))
+        return cls(_joined(found), signs[slope_inputs])
+
+    def about(self, reference):
+        """The same for inputs [1, x] less a reference."""
+        middle = self.pairs.middle - reference[self.pairs.column]
+        return replace(self, pairs=self.pairs._replace(middle=middle))
 
     def left(self, rules, low, high):
-        """By how much each holds for rules a + b x on a box, its worst corner, and its rounding."""
+        """By how much each holds for rules a + b x on a box, and its rounding.
+
+        Beside these, where least is left, the sums over [1, x] of either rule.
+        """
+        pairs, columns = self.pairs, self.pairs.column
         rules = np.vstack([rules, np.zeros((1, rules.shape[1]))])
-        apart = rules[self.above] - rules[self.below]
-        corner = np.where(apart[:, 1:] > 0.0, low, high)
-        parts = np.column_stack([-self.least, apart[:, 0], apart[:, 1:] * corner])
-        return parts.sum(axis=1), corner, (8 + parts.shape[1]) * EPS * np.abs(parts).sum(axis=1)
+        low, high, every = np.append(1.0, low), np.append(1.0, high), np.arange(columns.size)
+        above, below = rules[pairs.above], rules[pairs.below]
+        at = np.where(above > below, low, high)
+        # Where the slope along x_j is zero, b_above (1 + c e^u) = b_below (1 + c e^-u).
+        rise, fall = (np.maximum(np.abs(one[every, columns]), _TINY) for one in (above, below))
+        root, curved = np.sqrt(rise) * np.sqrt(fall), np.maximum(pairs.curved, _TINY)
+        with np.errstate(over="ignore"):
+            u = np.arcsinh((fall - rise) / root / (2.0 * curved))
+        u += 0.5 * (np.log(fall) - np.log(rise))
+        place = np.clip(pairs.middle + pairs.width * u, low[columns], high[columns])
+        at[every, columns] = place
+        u = np.clip((place - pairs.middle) / pairs.width, -_FARTHEST, _FARTHEST)
+        by_above, by_below = at.copy(), at.copy()
+        by_above[every, columns] += pairs.width * (pairs.own + pairs.curved * np.exp(u))
+        by_below[every, columns] -= pairs.width * (pairs.own + pairs.curved * np.exp(-u))
+        left = (by_above * above - by_below * below).sum(axis=1) - pairs.least
+        size = (np.abs(by_above * above) + np.abs(by_below * below)).sum(axis=1)
+        # Rounding of u counts as often as it is long.
+        far = 1.0 + (np.abs(place) + np.abs(pairs.middle)) / np.abs(pairs.width)
+        rounding = EPS * (ROUNDINGS + at.shape[1]) * (size + np.abs(pairs.least)) * far
+        return left, rounding, by_above, by_below
 
     def holds(self, rules, low, high):
         """Whether all hold for certain, whatever rounding has done."""
-        left, _, rounding = self.left(rules, low, high)
-        return bool((left >= rounding).all() and (self.signs * rules[:, 1:] >= 0.0).all())
+        if not (self.signs * rules[:, 1:] >= 0.0).all():
+            return False
+        left, rounding, *_ = self.left(rules, low, high)
+        return bool((left >= rounding).all())
 
 
 def is_in_order(model: TSKModel, output, signs, limits=(-np.inf, np.inf)):
@@ -94,17 +148,27 @@ def is_in_order(model: TSKModel, output, signs, limits=(-np.inf, np.inf)):
     inputs = np.arange(rules.shape[1] - 1)
     order = RuleOrder.of(antecedent, signs, limits, inputs)
     ends = ((end - model.reference)[inputs] for end in (model.minimum, model.maximum))
-    return order is not None and order.holds(rules, *ends)
+    return order is not None and order.about(np.append(0.0, model.reference)).holds(rules, *ends)
 
 
-def _pairs(antecedent, j):
-    """Rules (above, below) that must be in order for predictions to rise with x_j, (n, 2)."""
+def _pairs(above, below, column=0, middle=0.0, width=1.0, own=0.0, curved=0.0, least=0.0):
+    """Pairs of rules; numbers that are the same of all are given once."""
+    numbers = (column, middle, width, own, curved, least)
+    return _Pairs(above, below, *(np.broadcast_to(one, len(above)) for one in numbers))
+
+
+def _joined(parts):
+    return _Pairs(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _pairs_along(antecedent, j):
+    """What must be in order for predictions to rise with x_j; None where no order is enough."""
     if isinstance(antecedent, TreeAntecedent):
         return _pairs_of_tree(antecedent, j)
-    is_own = np.append(antecedent.term_inputs == j, False)
-    has_own = is_own[antecedent.rule_terms]
+    has_own = np.append(antecedent.term_inputs == j, False)[antecedent.rule_terms]
+    lines, shared = np.arange(antecedent.n_rules)[None], 0.0
     if not has_own.any():
-        return np.empty((0, 2), dtype=int)
+        return _pairs(lines[0, :0], lines[0, :0])
     # One term each, of one width: else no order of the rules is known to be enough.
     groups = [group for group in antecedent.groups if (group.inputs == j).any()]
     is_gaussian = all(group.family is Gaussian for group in groups)
@@ -113,35 +177,36 @@ def _pairs(antecedent, j):
     widths = np.concatenate([group.theta[1, group.inputs == j] for group in groups])
     if np.ptp(widths) > 0.0:
         return None
-    centers = np.append(antecedent.term_places, 0.0)[antecedent.rule_terms[has_own]]
-    lines = np.arange(antecedent.n_rules)[None]
     if antecedent.grid_counts is not None:
         axis = antecedent.share_inputs.index(j)
         lines = np.moveaxis(lines.reshape(antecedent.grid_counts), axis, -1)
         lines = lines.reshape(-1, antecedent.grid_counts[axis])
-    return np.vstack([_neighbours(line, centers[line]) for line in lines])
-
-
-def _neighbours(rules, places):
-    """Rules (above, below) that are next to each other; of the same place all, in no order."""
-    levels = [rules[places == place] for place in np.unique(places)]
-    pairs = [_all_pairs(above, below) for below, above in pairwise(levels)]
-    return np.vstack([np.empty((0, 2), dtype=int), *pairs])
+        shared = 1.0 / max(lines.shape[1] - 1, 1)
+    centers = np.append(antecedent.term_places, 0.0)[antecedent.rule_terms[has_own]]
+    above, below = np.hstack([_all_pairs(line, line) for line in lines])
+    is_above = centers[above] > centers[below]
+    above, below = above[is_above], below[is_above]
+    width = np.exp(2.0 * widths[0]) / (centers[above] - centers[below])
+    middle = 0.5 * (centers[above] + centers[below])
+    return _pairs(above, below, middle=middle, width=width, own=1.0, curved=shared)
 
 
 def _pairs_of_tree(antecedent, j):
-    paths = [dict(path) for path in antecedent.paths]
-    pairs = [np.empty((0, 2), dtype=int)]
-    for node in np.flatnonzero(antecedent.groups[0].inputs == j):
-        above, below = (
-            [r for r, path in enumerate(paths) if path.get(node) is side] for side in (True, False)
-        )
-        pairs.append(_all_pairs(above, below))
-    return np.vstack(pairs)
+    paths, cuts = [dict(path) for path in antecedent.paths], antecedent.groups[0]
+    nodes = np.flatnonzero(cuts.inputs == j)
+    n_cuts = np.array([sum(node in path for node in nodes) for path in paths])
+    found = [_pairs(nodes[:0], nodes[:0])]
+    for node in nodes:
+        is_above = np.array([path.get(node, np.nan) for path in paths])
+        above, below = _all_pairs(*(np.flatnonzero(is_above == side) for side in (1.0, 0.0)))
+        part = 1.0 / np.maximum(n_cuts[above], n_cuts[below])
+        cut, width = cuts.theta[0, node], np.exp(cuts.theta[1, node])
+        found.append(_pairs(above, below, middle=cut, width=width, own=part, curved=part))
+    return _joined(found)
 
 
 def _all_pairs(above, below):
-    return np.stack(np.meshgrid(above, below), axis=-1).reshape(-1, 2)
+    return np.stack(np.meshgrid(above, below), axis=-1).reshape(-1, 2).T
 
 
 def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
@@ -157,33 +222,25 @@ def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
 
 
 def nearest_in_order(order: RuleOrder, factor, start, to_rules, box, equal, equal_to):
-    """The u nearest to ``start`` that keep an order on a box; and what is met with equality.
+    """The u nearest to ``start`` that keep an order on a box.
 
-    Rules on [1, z] are ``to_rules @ u``. ``equal`` are rows of sums over them, (n, n_columns), and
-    ``equal_to`` what these are; so is what is met. InfeasibleError where nothing keeps all.
+    Rules on [1, z] are ``to_rules @ u``, and E u = e. InfeasibleError where nothing keeps all.
     """
     n_basis = 1 + order.signs.size
-    n_columns = len(to_rules)
-    n_rules = n_columns // n_basis
-    # First the signs of the slopes.
-    signs = np.flatnonzero(order.signs)
-    rules, columns = (one.ravel() for one in np.meshgrid(range(n_rules), signs, indexing="ij"))
-    held = np.zeros((rules.size, n_rules, n_basis))
-    held[np.arange(rules.size), rules, 1 + columns] = order.signs[columns]
-    at_least, least = np.full(len(held), _SLOPE * _MARGIN), order.least + _MARGIN
-    order = replace(order, least=least)
-    for _ in range(_MOST_ROUNDS):
-        rows = held.reshape(len(held), n_columns) @ to_rules
-        solved, active = nearest(factor, start, equal @ to_rules, equal_to, rows, at_least)
-        left, corner, _ = order.left((to_rules @ solved).reshape(n_rules, n_basis), *box)
-        short = np.flatnonzero(left < -0.5 * _MARGIN)
-        if not short.size:
-            return solved, held[active]
-        # Then every pair that is not in order, at the corner where it is worst.
-        at = np.column_stack([np.ones(short.size), corner[short]])
-        more, place = np.zeros((short.size, n_rules + 1, n_basis)), np.arange(short.size)
-        more[place, order.above[short]] += at
-        more[place, order.below[short]] -= at
-        held = np.concatenate([held, more[:, :-1]])
-        at_least = np.append(at_least, order.least[short])
-    raise InfeasibleError(False)
+    n_rules = len(to_rules) // n_basis
+    # First the signs of the slopes; then every pair that is not in order, where it is worst.
+    slopes = to_rules.reshape(n_rules, n_basis, -1)[:, 1:][:, order.signs != 0]
+    signs = order.signs[order.signs != 0, None]
+    slopes = (signs * slopes).reshape(-1, to_rules.shape[1])
+
+    def violated(u):
+        left, _, by_above, by_below = order.left((to_rules @ u).reshape(n_rules, n_basis), *box)
+        short = np.flatnonzero(left < 0.5 * _MARGIN)
+        rows, place = np.zeros((short.size, n_rules + 1, n_basis)), np.arange(short.size)
+        rows[place, order.pairs.above[short]] += by_above[short]
+        rows[place, order.pairs.below[short]] -= by_below[short]
+        rows = rows[:, :-1].reshape(short.size, len(to_rules)) @ to_rules
+        return rows, order.pairs.least[short] + _MARGIN
+
+    least = np.full(len(slopes), _SLOPE)
+    return nearest_by_exchange(factor, start, equal, equal_to, slopes, least, violated)

@@ -44,13 +44,12 @@ def contradicted(free, held, inequalities, rows, raised):
 
 def _speaks_against(one, free, X):
     """Whether the free fit is certain of what an inequality forbids."""
+    excess = one.excess(free, X)
     if one.input is None:
-        beyond = one.sign * (one.limit - free.predict(X)[:, one.output])
         of_rows, of_noise = free.posterior.inside(free, X.T), free.posterior.noise[:, None]
         deviation = np.sqrt(np.maximum(of_rows**2 - of_noise**2, 0.0))[one.output]
-        return bool((beyond > _CERTAIN * deviation).any())
-    slopes = one.sign * free.gradient(X)[:, one.input, one.output]
-    if -slopes[slopes < 0.0].sum() <= _MUCH * np.abs(slopes).sum():
+        return bool((excess > _CERTAIN * deviation).any())
+    if excess[excess > 0.0].sum() <= _MUCH * np.abs(excess).sum():
         return False
     column = X[:, one.input]
     edges = np.quantile(column, np.linspace(0.0, 1.0, _PARTS + 1))

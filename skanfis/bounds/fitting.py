@@ -6,6 +6,7 @@ to it as branch and bound can prove. Where no order is known, or none holds, the
 best line for all rules.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -13,8 +14,9 @@ import numpy as np
 
 from .._validation import warn_user
 from ..antecedent import TreeAntecedent
-from ..consequent import NormalFactor
+from ..consequent import NormalFactor, in_user_units
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
+from ..learning.data import Scale
 from ..learning.objective import Evaluation
 from ..model import TSKModel
 from ..policies import SILENT
@@ -23,7 +25,7 @@ from .constraints import Constraints
 from .construction import ONE_RULE, RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from .contradictions import contradicted
 from .enclosure import Enclosure
-from .quadratic_program import InfeasibleError, nearest
+from .quadratic_program import InfeasibleError, nearest_by_exchange
 from .search import largest
 from .terms import is_known
 
@@ -33,24 +35,9 @@ _DEAR, _FAR = 1.02**2, 1.1**2
 # Halvings of the way; boxes of each proof, and of all on the way to the nearest (fewer where there
 # are more terms than so many).
 _HALVINGS, _MOST_BOXES, _ALL_BOXES, _TERMS = 6, 3000, 10_000, 20
-# Rounds in which points are added, so many of a sample in each; all corners of so few inputs are in
-# it. In standard deviations of the target, and of the input, what is kept at them: first and last.
-_ROUNDS, _POINTS_A_ROUND, _SAMPLE, _CORNERS = 20, 20, 1024, 8
-_FIRST_MARGIN, _LAST_MARGIN, _RAISE = 1e-3, 0.1, 1.5
-
-
-@dataclass(frozen=True)
-class Inequality:
-    """An inequality on one output: on its slope by ``input``, or, where that is None, its value.
-
-    sign times it must be at least sign times ``limit``.
-    """
-
-    output: int
-    sign: float
-    input: int | None
-    limit: float
-    name: str
+# Points that are added at once, the worst of a sample; all corners of so few inputs are in it. In
+# standard deviations of the target, and of the input, what is kept at them.
+_POINTS_A_ROUND, _SAMPLE, _CORNERS, _MARGIN = 20, 1024, 8, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,36 +46,34 @@ class Ordered:
 
     free: Evaluation  # the best at these premises
     local: np.ndarray  # (n_columns, n_outputs)
-    met: list[np.ndarray]  # by output, sums over consequents on [1, z] that are met with equality
     is_line: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """Consequents that keep all constraints, for certain."""
+    """Consequents that keep all constraints, for certain, and the best at the same premises."""
 
     free: Evaluation
     evaluation: Evaluation
     coefficients: np.ndarray  # in the user's units
-    known: tuple  # what is met with equality, as ``Posterior.given`` takes it
+    points: np.ndarray  # in the range, at which values are known
 
 
-def constrained(
-    model: TSKModel, evaluation, problem, constraints: Constraints, in_user_units, rows
-):
+def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, rows):
     """The consequents next to those of an evaluation that keep all constraints; and a report.
 
-    ``model`` is in the user's units, ``in_user_units`` brings coefficients on [1, z] to them;
-    ``rows`` are X, y and their numbers, to say which contradict what is known, or None.
+    ``model`` is in the user's units; ``rows`` are X, y and their numbers, to say which contradict
+    what is known, or None.
     """
-    fit = _ConstrainedFit(model, problem, constraints, in_user_units)
-    ordered = fit.certified_order(evaluation)
-    kept, drawn = fit.kept(ordered, ordered.local), 1.0 if ordered.is_line else 0.0
+    fit = _ConstrainedFit(model, problem, constraints)
+    ordered = fit.in_order(evaluation)
+    local, drawn = ordered.local, 1.0 if ordered.is_line else 0.0
     before = evaluation.mean_squared_error
-    if kept.evaluation.mean_squared_error > _DEAR * before:
-        other, way = fit.drawn(kept, ordered)
-        if other.evaluation.mean_squared_error < kept.evaluation.mean_squared_error:
-            kept, drawn = other, way
+    if fit.error(ordered, local) > _DEAR * before:
+        other, way = fit.drawn(ordered)
+        if fit.error(ordered, other) < fit.error(ordered, local):
+            local, drawn = other, way
+    kept = fit.kept(ordered, local)
     after = kept.evaluation.mean_squared_error
     report = {
         "certified": True,
@@ -99,8 +84,7 @@ def constrained(
     if rows is not None:
         held = replace(fit.model, coefficients=kept.coefficients)
         free = replace(model, target=None)
-        names = contradicted(free, held, fit.inequalities, rows, after / before)
-        for message in names:
+        for message in contradicted(free, held, fit.inequalities, rows, after / before):
             warn_user(message, ConstraintWarning)
     if drawn and after > _FAR * before:
         names = ", ".join(one.name for one in fit.inequalities)
@@ -125,15 +109,18 @@ def at_equal_widths(problem, evaluation, constraints: Constraints):
     return problem.evaluate(antecedent.parameters)
 
 
-def in_order(problem, evaluation, constraints: Constraints, equal, equal_to) -> Ordered:
-    """The nearest rules in order, or the nearest line; InfeasibleError where there is neither.
+def ways_in_order(problem, evaluation, constraints: Constraints, equal, equal_to):
+    """The nearest rules in order, and then the nearest line, as far as they are; InfeasibleError.
 
-    ``equal`` are sums over the consequents on [1, z], and ``equal_to`` what each output has there.
+    ``equal`` are sums over the local consequents, and ``equal_to`` what each output has there.
     """
-    try:
-        return _nearest(problem, evaluation, constraints, equal, equal_to, is_line=False)
-    except InfeasibleError:
-        return _nearest(problem, evaluation, constraints, equal, equal_to, is_line=True)
+    failure = InfeasibleError(False)
+    for is_line in (False, True):
+        try:
+            yield _nearest(problem, evaluation, constraints, equal, equal_to, is_line)
+        except InfeasibleError as error:
+            failure = error
+    raise failure
 
 
 def held_in_search(constraints: Constraints | None):
@@ -149,7 +136,7 @@ def held_in_search(constraints: Constraints | None):
     def held(problem, evaluation):
         no_points = np.empty((0, problem.n_columns)), np.empty((0, problem.n_outputs))
         evaluation = at_equal_widths(problem, evaluation, signs)
-        ordered = in_order(problem, evaluation, signs, *no_points)
+        ordered = next(ways_in_order(problem, evaluation, signs, *no_points))
         return ordered.free.antecedent, problem.local.to_global(ordered.local)
 
     return held
@@ -160,6 +147,7 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
     box = [end[slopes] for end in problem.rows.inputs.box]
     antecedent, factor, start = evaluation.antecedent, normal.factor, normal.coefficients
     to_local = np.eye(problem.n_columns)
+    to_rules = problem.local.to_global(to_local)
     if is_line:
         lines = np.tile(np.eye(problem.n_basis), (antecedent.n_rules, 1))
         to_local = problem.local.to_local(lines)
@@ -167,10 +155,8 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
         factor = NormalFactor(to_local.T @ matrix @ to_local)
         start = factor.solve(to_local.T @ (matrix @ start))
         antecedent, to_rules = ONE_RULE, np.eye(problem.n_basis)
-        equal = equal @ lines
-    else:
-        to_rules = problem.local.to_global(to_local)
-    local, met = np.empty_like(normal.coefficients), []
+        equal = equal @ to_local
+    local = np.empty_like(normal.coefficients)
     for k, signs in enumerate(constraints.signs):
         limits = [
             (limit[k] - targets.offset[k]) / targets.scale[k]
@@ -179,26 +165,22 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
         order = RuleOrder.of(antecedent, signs, limits, slopes)
         if order is None:
             raise InfeasibleError(False)
-        solved, rows = nearest_in_order(
+        local[:, k] = to_local @ nearest_in_order(
             order, factor, start[:, k], to_rules, box, equal, equal_to[:, k]
         )
-        local[:, k] = to_local @ solved
-        # What one rule of a line meets, the first does: the others are the same.
-        every = np.zeros((len(rows), evaluation.antecedent.n_rules, problem.n_basis))
-        every[:, : rows.shape[1]] = rows
-        met.append(every)
-    return Ordered(evaluation, local, met, is_line)
+    return Ordered(evaluation, local, is_line)
 
 
 class _ConstrainedFit:
-    def __init__(self, model, problem, constraints, in_user_units):
-        self.problem, self.constraints, self.in_user_units = problem, constraints, in_user_units
+    def __init__(self, model, problem, constraints):
+        self.problem, self.constraints = problem, constraints
         # That outputs are held on top is monotone: what rules keep, predictions do.
         self.model = replace(model.with_out_of_bounds("clip"), target=None)
         self.policy = model.out_of_bounds, model.max_extrapolation
-        self.inequalities = _inequalities_of(constraints, model)
+        self.inequalities = constraints.inequalities(model)
         self.n_boxes, self.part = 0, min(1.0, _TERMS / max(model.antecedent.n_terms, 1))
-        beyond = constraints.points[~model.in_bounds(constraints.points)]
+        self.is_inside = model.in_bounds(constraints.points)
+        beyond = constraints.points[~self.is_inside]
         if len(beyond) and model.out_of_bounds in SILENT:
             raise ValueError(
                 f"constraints has a FixedPoint at {beyond[0]}, where a model with "
@@ -206,22 +188,16 @@ class _ConstrainedFit:
                 f"{model.describe_out_of_bounds(beyond)} Use out_of_bounds='linear' or 'clip'."
             )
 
-    def certified_order(self, evaluation) -> Ordered:
+    def in_order(self, evaluation) -> Ordered:
         """Rules in order, or a line; an error that says which constraints cannot be kept."""
         evaluation = at_equal_widths(self.problem, evaluation, self.constraints)
-        equal, equal_to = self._fixed(self._columns(evaluation.antecedent))
+        fixed = self._fixed(self._columns(evaluation.antecedent))
         try:
-            ordered = in_order(self.problem, evaluation, self.constraints, equal, equal_to)
-            if not self._is_certified(ordered):
-                # Rounding is larger than the margin: of a line there is next to none.
-                ordered = _nearest(
-                    self.problem, evaluation, self.constraints, equal, equal_to, is_line=True
-                )
-                if not self._is_certified(ordered):
-                    raise InfeasibleError(False)
+            ways = ways_in_order(self.problem, evaluation, self.constraints, *fixed)
+            # Of rules rounding may be larger than the margin, of a line there is next to none.
+            return next(way for way in ways if self._is_certified(way))
         except InfeasibleError as failure:
             raise self._refused(failure.by_equalities) from None
-        return ordered
 
     def _is_certified(self, ordered):
         model, constraints = self._model(ordered, ordered.local), self.constraints
@@ -247,97 +223,99 @@ class _ConstrainedFit:
             "one of them, or use order=1 or more rules."
         )
 
-    def kept(self, ordered, local, is_end=True) -> Kept:
-        """Consequents with what is known of them: at the end of the way, what holds them there."""
-        problem, model, points = self.problem, self.model, self.constraints.points
+    def error(self, ordered, local):
+        """Mean squared error of training."""
+        return self._ended(ordered.free, local).mean_squared_error
+
+    def kept(self, ordered, local) -> Kept:
+        """These consequents at the end of the fit."""
+        model, points = self.model, self.constraints.points
         if self.policy[0] == "linear":
             # Beyond, a tangent is known, which is more than a value: it is not counted.
-            points = points[model.in_bounds(points)]
-        fixed = [(np.clip(points, model.minimum, model.maximum), None)] if len(points) else []
-        scale = np.append(1.0, problem.rows.inputs.scale[problem.consequent_inputs])
-        known = tuple(
-            fixed + [(rows * scale).reshape(len(rows), problem.n_columns).T] * is_end
-            for rows in ordered.met
-        )
+            points = points[self.is_inside]
+        points = np.clip(points, model.minimum, model.maximum)
         coefficients = self._model(ordered, local).coefficients
-        return Kept(ordered.free, self._ended(ordered.free, local), coefficients, known)
+        return Kept(ordered.free, self._ended(ordered.free, local), coefficients, points)
 
-    def drawn(self, kept, ordered):
-        """The nearest that is proven on the way from there; and how far that is drawn."""
+    def drawn(self, ordered):
+        """The nearest that is proven on the way from there, and how far that is drawn."""
+        local, drawn = ordered.local, 1.0
         if not all(is_known(group.family) for group in ordered.free.antecedent.groups):
-            return kept, float(ordered.is_line)
-        near, drawn = self._nearest_at_points(ordered), 1.0
-        for drawn_to in (0.0, *(0.5 ** np.arange(1, 1 + _HALVINGS))):
-            # First all of the way, then halves of what is left.
-            now = drawn - drawn_to if drawn_to else 0.0
-            local = near + now * (ordered.local - near)
-            if next(self._not_proven(self._model(ordered, local)), None) is None:
-                kept, drawn = self.kept(ordered, local, is_end=False), float(now)
-                if now == 0.0:
-                    break
-        return kept, drawn if drawn < 1.0 or ordered.is_line else 0.0
+            return local, drawn
+        near = self._nearest_at_points(ordered)
+        # First all of the way, then halves of what is left.
+        for step in (1.0, *(0.5 ** np.arange(1, 1 + _HALVINGS))):
+            now = near + (drawn - step) * (ordered.local - near)
+            if self._is_proven(self._model(ordered, now)):
+                local, drawn = now, float(drawn - step)
+            if drawn == 0.0:
+                break
+        return local, drawn
 
     def _nearest_at_points(self, ordered):
         """The local consequents nearest to the free fit that keep all where they did not.
 
         Points are the worst of a sample, then those at which branch and bound finds a violation.
         """
-        normal, problem, model = ordered.free.normal, self.problem, self.model
-        columns = self._columns(ordered.free.antecedent)
-        to_global = problem.local.to_global(np.eye(problem.n_columns))
+        normal, model, columns = (
+            ordered.free.normal,
+            self.model,
+            self._columns(ordered.free.antecedent),
+        )
         equal, equal_to = self._fixed(columns)
         sample = spread_points(model.minimum, model.maximum, _SAMPLE, _CORNERS)
-        rows = [np.empty((0, problem.n_columns))] * problem.n_outputs
-        least = [np.empty((0, 2))] * problem.n_outputs
-        local, margin = normal.coefficients.copy(), np.array([1.0, _FIRST_MARGIN])
-        for _ in range(_ROUNDS):
-            for k, values in enumerate(equal_to.T):
-                start, fixed = normal.coefficients[:, k], equal @ to_global
-                try:
-                    found = nearest(normal.factor, start, fixed, values, rows[k], least[k] @ margin)
-                except InfeasibleError:
-                    return local
-                local[:, k] = found[0]
+        local = normal.coefficients.copy()
+        nothing = np.empty((0, self.problem.n_columns)), np.empty(0)
+
+        def violated(u, k):
+            local[:, k] = u
             now = self._model(ordered, local)
-            worst = [(one, _worst(one, now, sample)) for one in self.inequalities]
-            if not any(len(points) for _, points in worst):
-                worst = list(self._not_proven(now))
-                if not worst or margin[1] > _LAST_MARGIN or self.n_boxes > _ALL_BOXES * self.part:
-                    break
-                # With more of a margin there is less to find, and boxes are decided sooner.
-                margin[1] *= _RAISE
-            for one, points in worst:
-                of_points, to_keep = self._rows(one, columns, points)
-                rows[one.output] = np.vstack([rows[one.output], of_points @ to_global])
-                least[one.output] = np.vstack([least[one.output], to_keep])
+            own = [one for one in self.inequalities if one.output == k]
+            worst = [_worst(one.excess(now, sample), sample) for one in own]
+            if not any(map(len, worst)) and self.n_boxes <= _ALL_BOXES * self.part:
+                worst = [self._failure(one, now) for one in own]
+            pairs = zip(own, worst, strict=True)
+            found = [nothing, *(self._rows(one, columns, points) for one, points in pairs)]
+            return tuple(map(np.concatenate, zip(*found, strict=True)))
+
+        for k, values in enumerate(equal_to.T):
+            given = normal.factor, normal.coefficients[:, k], equal, values, *nothing
+            # Where there is no end to it, the last is as good a way to be drawn back from.
+            with suppress(InfeasibleError):
+                local[:, k] = nearest_by_exchange(*given, partial(violated, k=k))
         return local
 
     def _rows(self, one, columns, points):
-        """Sums over the consequents that an inequality is about; their least, and its margin."""
-        inputs, targets = self.problem.rows.inputs, self.problem.rows.targets
-        at, least = (points - inputs.offset) / inputs.scale, np.ones((len(points), 2))
+        """Sums over the local consequents that an inequality is about at points; their least."""
+        rows, found = self.problem.rows, one.of(columns, points)
         if one.input is None:
-            least[:, 0] = one.sign * (one.limit - targets.offset[one.output])
-            least[:, 0] /= targets.scale[one.output]
-            return one.sign * columns.predict(at), least
-        found, least[:, 0] = one.sign * columns.gradient(at)[:, one.input], 0.0
+            targets = rows.targets
+            least = one.sign * (one.limit - targets.offset[one.output]) / targets.scale[one.output]
+            return found, np.full(len(points), least + _MARGIN)
+        found = found * rows.inputs.scale[one.input]
         # Where no consequents have much of a slope, none is asked for.
-        least[:, 1] = np.minimum(np.abs(found).sum(axis=1), 1.0)
-        return found, least
+        return found, _MARGIN * np.minimum(np.abs(found).sum(axis=1), 1.0)
 
-    def _not_proven(self, model):
-        """Every inequality that branch and bound does not prove, and where it fails, if it does."""
-        for one in self.inequalities:
-            enclosure = Enclosure(model, one.output, -one.sign)
-            bound_of = enclosure.values
-            if one.input is not None:
-                bound_of = partial(enclosure.slope, j=one.input)
-            until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
-            most = int(_MOST_BOXES * self.part)
-            found = largest(bound_of, *ends, 0.0, most, cuts_of(model), until=until)
-            self.n_boxes += found.n_boxes
-            if found.bound > until:
-                yield one, found.point[None][: int(found.attained > until)]
+    def _proof(self, one, model):
+        """What branch and bound finds of an inequality, and what its bound must not be above."""
+        enclosure = Enclosure(model, one.output, -one.sign)
+        bound_of = enclosure.values
+        if one.input is not None:
+            bound_of = partial(enclosure.slope, j=one.input)
+        until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
+        most = int(_MOST_BOXES * self.part)
+        found = largest(bound_of, *ends, 0.0, most, cuts_of(model), until=until)
+        self.n_boxes += found.n_boxes
+        return found, until
+
+    def _is_proven(self, model):
+        proofs = (self._proof(one, model) for one in self.inequalities)
+        return all(found.bound <= until for found, until in proofs)
+
+    def _failure(self, one, model):
+        """The point where branch and bound finds that an inequality fails, if it does."""
+        found, until = self._proof(one, model)
+        return found.point[None][: int(found.attained > until)]
 
     def _ended(self, evaluation, local):
         """The evaluation with other local consequents."""
@@ -354,70 +332,45 @@ class _ConstrainedFit:
         )
 
     def _model(self, ordered, local):
-        inputs = self.problem.rows.inputs
-        coefficients = self.in_user_units(self.problem.local.to_global(local))
+        antecedent, targets = ordered.free.antecedent, self.problem.rows.targets
+        model = self._with(antecedent, local, targets)
         if ordered.is_line and local is ordered.local:
             # To the last bit.
-            coefficients = np.broadcast_to(coefficients[:1], coefficients.shape)
-        antecedent = ordered.free.antecedent.change_units(inputs.offset, inputs.scale)
-        return replace(self.model, antecedent=antecedent, coefficients=coefficients)
-
-    def _fixed(self, columns):
-        """Of the fixed points, sums over the consequents on [1, z], and what they are to be."""
-        inputs, targets, constraints = (
-            self.problem.rows.inputs,
-            self.problem.rows.targets,
-            self.constraints,
-        )
-        points = (constraints.points - inputs.offset) / inputs.scale
-        values = (constraints.values - targets.offset) / targets.scale
-        nothing = np.empty((0, self.problem.n_columns))
-        columns = columns.with_out_of_bounds(*self.policy)
-        return columns.predict(points) if len(points) else nothing, values
+            line = np.broadcast_to(model.coefficients[:1], model.coefficients.shape)
+            return replace(model, coefficients=line)
+        return model
 
     def _columns(self, antecedent):
-        """A model whose outputs are the columns of the design, in standardised inputs."""
-        model, problem, inputs = self.model, self.problem, self.problem.rows.inputs
-        n_rules, n_columns = antecedent.n_rules, problem.n_columns
-        unit = np.eye(n_columns).reshape(n_rules, problem.n_basis, n_columns)
-        coefficients = np.zeros((n_rules, 1 + model.n_inputs, n_columns))
-        coefficients[:, 0] = unit[:, 0]
-        coefficients[:, 1 + problem.consequent_inputs] = unit[:, 1:]
-        at = model.tangent_at
+        """A model whose outputs are what each local consequent adds to the standardised target."""
+        n_columns = self.problem.n_columns
+        as_it_is = Scale(*np.array([[0.0], [1.0], [0.0], [1.0]]).repeat(n_columns, axis=1))
+        return self._with(antecedent, np.eye(n_columns), as_it_is)
+
+    def _with(self, antecedent, local, targets):
+        """The model of premises of standardised inputs and local consequents of some targets."""
+        problem, inputs = self.problem, self.problem.rows.inputs
+        coefficients = in_user_units(
+            problem.local.to_global(local),
+            inputs,
+            targets,
+            problem.consequent_inputs,
+            problem.order,
+        )
         return replace(
-            model,
-            antecedent=antecedent,
-            initial_antecedent=antecedent,
+            self.model,
+            antecedent=antecedent.change_units(inputs.offset, inputs.scale),
             coefficients=coefficients,
-            reference=np.zeros(model.n_inputs),
-            spread=np.ones(model.n_inputs),
-            minimum=inputs.box[0],
-            maximum=inputs.box[1],
-            support=None,
-            tangent_at=None if at is None else (at - inputs.offset) / inputs.scale,
-            output_names=tuple(map(str, range(n_columns))),
+            output_names=tuple(map(str, range(targets.scale.size))),
         )
 
-
-def _inequalities_of(constraints: Constraints, model: TSKModel):
-    """The inequalities among the constraints, output by output."""
-    found = []
-    for k, name in enumerate(model.output_names):
-        for j, sign in enumerate(constraints.signs[k]):
-            if sign and model.minimum[j] < model.maximum[j]:
-                what = f"monotonic_cst={sign} of {name!r} by {model.input_names[j]!r}"
-                found.append(Inequality(k, float(sign), j, 0.0, what))
-        for sign, limit in ((1.0, constraints.lower[k]), (-1.0, constraints.upper[k])):
-            if np.isfinite(limit):
-                found.append(Inequality(k, sign, None, limit, f"the limit {limit:g} of {name!r}"))
-    return found
+    def _fixed(self, columns):
+        """Of the fixed points, sums over the local consequents, and what they are to be."""
+        targets, points = self.problem.rows.targets, self.constraints.points
+        values = (self.constraints.values - targets.offset) / targets.scale
+        return columns.with_out_of_bounds(*self.policy).predict(points), values
 
 
-def _worst(one, model, points):
-    """The points at which an inequality does not hold, the worst of them first, and not all."""
-    if one.input is None:
-        excess = one.sign * (one.limit - model.predict(points)[:, one.output])
-    else:
-        excess = -one.sign * model.gradient(points)[:, one.input, one.output]
+def _worst(excess, points):
+    """The points at which something is in excess, the worst of them first, and not all."""
     order = np.argsort(-excess)[:_POINTS_A_ROUND]
     return points[order[excess[order] > 0.0]]

@@ -15,6 +15,8 @@ from ..consequent import NormalFactor
 _ZERO = 1e-10
 # Equalities of which one follows from others.
 _DEPENDENT = 1e-10
+# Rounds in which inequalities are found.
+_MOST_ROUNDS = 100
 
 
 class InfeasibleError(Exception):
@@ -49,6 +51,24 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
         multipliers[kept] = found / length[kept]
     step = base @ toward + free @ multipliers
     return start + factor.back_solve(step), multipliers > 0.0
+
+
+def nearest_by_exchange(factor, start, equal, equal_to, at_least, least, violated):
+    """The same for inequalities that are found as they are needed, beside those given.
+
+    ``violated`` gives rows and least of some that u does not keep, none where it keeps all.
+    """
+    n_given = len(least)
+    for _ in range(_MOST_ROUNDS):
+        solved, holds_back = nearest(factor, start, equal, equal_to, at_least, least)
+        more, least_of_more = violated(solved)
+        if not len(more):
+            return solved
+        # Others are found again if they are needed again: the distance grows in every round.
+        kept = holds_back | (np.arange(len(least)) < n_given)
+        at_least = np.vstack([at_least[kept], more])
+        least = np.append(least[kept], least_of_more)
+    raise InfeasibleError(False)
 
 
 def _least_distance(columns, short):

@@ -269,13 +269,10 @@ class _Fit:
         if evaluation.normal is None:
             # Found by descent: the consequents are solved for first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
-        in_user_units = self.builder.in_user_units
         # Rows on a cluster have no numbers.
         is_here = isinstance(self.data, ValidatedData)
         rows = self.data.numbered(self.trained_on) if is_here else None
-        kept, report = constrained(
-            fitted.model, evaluation, run.problem, constraints, in_user_units, rows
-        )
+        kept, report = constrained(fitted.model, evaluation, run.problem, constraints, rows)
         if kept.free is not evaluation:
             moved = replace(run.result, evaluation=kept.free)
             fitted = self._free(replace(run, result=moved), weights)
@@ -286,7 +283,7 @@ class _Fit:
             model=replace(
                 model,
                 target=target.within(constraints.lower, constraints.upper, constraints.values),
-                posterior=posterior and posterior.given(model, kept.known),
+                posterior=posterior and posterior.given(model, kept.points),
             ),
             result=replace(run.result, evaluation=kept.evaluation),
             constraints=report,

@@ -1,7 +1,7 @@
 """Rules in order: what rises by construction, against branch and bound, rows and a programme."""
 
 from functools import partial
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 import pytest
@@ -75,7 +75,7 @@ def kept(problem, evaluation, order):
     box = [end[problem.consequent_inputs] for end in problem.rows.inputs.box]
     normal, to_rules = evaluation.normal, problem.local.to_global(np.eye(problem.n_columns))
     start = normal.coefficients[:, 0]
-    local, _ = nearest_in_order(order, normal.factor, start, to_rules, box, *nothing)
+    local = nearest_in_order(order, normal.factor, start, to_rules, box, *nothing)
     inputs, targets = problem.rows.inputs, problem.rows.targets
     coefficients = in_user_units(
         problem.local.to_global(local[:, None]), inputs, targets, np.arange(2), problem.order
@@ -131,7 +131,7 @@ def test_what_is_in_order_rises(kind):
 
 
 def test_the_least_change_that_is_in_order(rng):
-    """Against a general solver, which has every pair at every corner from the start."""
+    """Against a general solver, which has what every pair adds to the slope at many points."""
     antecedent = with_equal_widths(grid(rng, 2), [0])
     problem = problem_of(antecedent, rng)
     evaluation = problem.evaluate(antecedent.parameters)
@@ -139,14 +139,23 @@ def test_the_least_change_that_is_in_order(rng):
     box, normal = problem.rows.inputs.box, evaluation.normal
     to_rules, start = problem.local.to_global(np.eye(problem.n_columns)), normal.coefficients[:, 0]
     nothing = np.empty((0, problem.n_columns)), np.empty(0)
-    found, met = nearest_in_order(held, normal.factor, start, to_rules, box, *nothing)
-    corners = [np.array([1.0, *corner]) for corner in product(*np.transpose(box))]
+    found = nearest_in_order(held, normal.factor, start, to_rules, box, *nothing)
     weighed, rows = normal.gram + normal.penalty, []
-    for above, below in zip(held.above, held.below, strict=True):
-        for corner in corners:
-            row = np.zeros((antecedent.n_rules, 3))
-            row[above], row[below] = corner, -corner
-            rows.append(row.ravel() @ to_rules)
+    n_terms = antecedent.counts[0]
+    for x, z in product(np.linspace(*np.transpose(box)[0], 51), np.transpose(box)[1]):
+        strengths = antecedent.strengths(np.array([[x], [z]]))[:, 0]
+        _, slopes = Gaussian.log_value_and_gradient(x, antecedent.groups[0].theta[:, :n_terms])
+        for line in np.arange(antecedent.n_rules).reshape(n_terms, -1).T:
+            for one, other in combinations(range(n_terms), 2):
+                above, below = line[[other, one]]
+                row = np.zeros((antecedent.n_rules, 3))
+                row[[above, below], 1] = 1.0 + strengths[[above, below]] / (
+                    strengths[[below, above]] * (n_terms - 1)
+                )
+                steeper = slopes[0, one] - slopes[0, other]
+                row[above] += steeper * np.array([1.0, x, z])
+                row[below] -= steeper * np.array([1.0, x, z])
+                rows.append(row.ravel() @ to_rules / np.abs(row).max())
     for rule in np.eye(antecedent.n_rules):
         rows.append(np.outer(rule, [0.0, 1.0, 0.0]).ravel() @ to_rules)
     solved = minimize(
@@ -157,9 +166,8 @@ def test_the_least_change_that_is_in_order(rng):
         method="SLSQP",
         options={"maxiter": 500, "ftol": 1e-14},
     )
-    assert len(met)
     change = found - start
-    assert change @ weighed @ change == pytest.approx(solved.fun, rel=1e-4)
+    assert change @ weighed @ change == pytest.approx(solved.fun, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -174,4 +182,4 @@ def test_the_least_change_that_is_in_order(rng):
 def test_where_no_order_is_known_there_is_none(antecedent):
     slopes = np.array([0])
     assert RuleOrder.of(antecedent, np.array([1]), FREE, slopes) is None
-    assert RuleOrder.of(antecedent, np.array([0]), FREE, slopes).above.size == 0
+    assert RuleOrder.of(antecedent, np.array([0]), FREE, slopes).pairs.above.size == 0

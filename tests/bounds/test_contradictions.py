@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from skanfis import ANFISRegressor
+from skanfis.bounds.constraints import Inequality
 from skanfis.bounds.contradictions import contradicted
-from skanfis.bounds.fitting import Inequality
 
 RISES = Inequality(0, 1.0, 0, 0.0, "rises")
 BELOW = Inequality(0, -1.0, None, 1.0, "limit")
