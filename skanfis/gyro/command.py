@@ -42,7 +42,7 @@ INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 _FILES = ("compensator.json", "compensator.joblib", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
-_MOST_ROWS = 200_000  # that are held
+_MOST_ROWS = 100_000  # that are held
 _PICKLES = (".joblib", ".pkl", ".pickle")
 _STAGED = f".skanfis-{platform.node()}-"  # of folders that hold files until all are written
 

@@ -397,6 +397,8 @@ def _fit_law(log):
     lower, upper = np.full((2, start.size), [[-np.inf], [np.inf]])
     first_of_sagnac = log.degrees[0] + 1
     lower[first_of_sagnac], upper[first_of_sagnac] = _SMALLEST_PHASE, _LARGEST_PHASE
+    # On a large log the noise is far above the eighth digit, and every pass has its price.
+    is_long = n_rows > _FEW_ROWS
     # Of a long log some rows show the way; few steps on all are left then.
     for step in sorted({max(1, n_rows // _FEW_ROWS), 1}, reverse=True):
         fitted = least_squares(
@@ -407,16 +409,13 @@ def _fit_law(log):
             x_scale="jac",
             # Tight, and not by the cost: where the law fits badly, that is flat before the end.
             ftol=None,
-            xtol=1e-12,
+            xtol=1e-7 if is_long else 1e-12,
             gtol=1e-13,
             max_nfev=_MAX_EVALUATIONS,
             args=(log.columns[:, ::step], log),
         )
         start = fitted.x
-    # On a large log the noise is far above the eighth digit, and every pass has its price.
-    if n_rows <= _FEW_ROWS:
-        start = _polished(start, log)
-    return start, fitted.nfev, fitted.status != 0
+    return start if is_long else _polished(start, log), fitted.nfev, fitted.status != 0
 
 
 def _polished(parameters, log):

@@ -11,7 +11,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
 from skanfis.gyro._models import make_law
-from skanfis.gyro._simpler import kinds
+from skanfis.gyro._simpler import kinds, zero_rule
 from skanfis.gyro.compose import Polynomial
 
 INPUTS = ("time", "temperature", "output")
@@ -28,7 +28,8 @@ def fitted(kind, log, policy="linear"):
     X, rate = log[list(INPUTS)], log["rate"].to_numpy()
     every = {name: (predicts, fit) for name, predicts, fit in kinds(INPUTS, policy)}
     predicts, fit = every[kind]
-    return fit(X, rate if predicts == "rate" else log["output"].to_numpy() - rate), predicts
+    target = rate if predicts == "rate" else log["output"].to_numpy() - rate
+    return fit(X, target, zero_rule(X, policy)), predicts
 
 
 @pytest.fixture(scope="module", params=[name for name, *_ in kinds(INPUTS)])
