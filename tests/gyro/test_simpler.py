@@ -51,7 +51,7 @@ def test_it_gives_what_the_model_gives_and_knows_the_rows(case, log):
         ),
         "cubic polynomial": lambda: CUBIC.fit(X, error).predict(X),
     }[kind]()
-    np.testing.assert_allclose(estimator.predict(X), expected, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(estimator.predict(X), expected, rtol=0, atol=1e-12)
     assert estimator.in_bounds(X).all()
     assert estimator.coverage(X).min() == 1.0
     hot = X.assign(temperature=X["temperature"].max() + 60.0)
