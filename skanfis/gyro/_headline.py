@@ -11,6 +11,7 @@ from ._simpler import NAMES, NOTHING
 from .compose import FrozenRules, Polynomial
 from .displays import figures
 from .metrics import rms
+from .targets.error_model import ErrorModel
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
@@ -135,32 +136,29 @@ def readability_of(calibration):
 class Proven(NamedTuple):
     """What is proven in the range of the calibration, of what the rules, or a cubic, give [deg/s].
 
-    No compensation is larger in size than ``largest``; ``met`` is the largest that was met.
-    ``rate_rises`` is whether the compensated rate is proven to go with the output, in the sense of
-    the scale factor; None where the output is no input, or what is beside the rules is not bounded.
+    No compensation is larger in size than ``largest``. ``rate_rises`` is whether the compensated
+    rate is proven to go with the output, in the sense of the scale factor; None where the output is
+    no input, or what is beside the rules is not bounded.
     """
 
     largest: float
-    met: float
-    rate_rises: bool | None
+    rate_rises: bool | None = None
 
 
 def proven_bounds(calibration):
     """Bounds in the range of the calibration."""
     compensator, X = calibration.compensator, calibration.X
-    own, rules, rises = 1.0 / compensator.scale_factor, compensator.estimator, None
-    if isinstance(cubic := getattr(rules, "base_", None), Polynomial):
-        limits = cubic.bounds(X.agg(["min", "max"]).to_numpy().T)
-        return Proven(float(np.abs(limits).max()), float(np.abs(cubic.predict(X)).max()), rises)
+    own, rules = 1.0 / compensator.scale_factor, compensator.estimator
+    if isinstance(getattr(rules, "base_", None), Polynomial):
+        error = ErrorModel(compensator, rules, X)
+        return Proven(float(np.abs(error.ranges(*error.ends.T[:, :, None])[0]).max()))
     rules = getattr(rules, "residual_", rules)
     rules = rules.model if isinstance(rules, FrozenRules) else rules
     found = bounds(rules, max_boxes=_MOST_BOXES)
-    if compensator.predicts == "error" and "output" in X:
-        # rate = output / factor - error: its slope has the factor's sign where the error's is less.
-        slope = gradient_bounds(rules, "output", max_boxes=_MOST_BOXES)
-        rises = bool(np.all(slope.upper[0] < own if own > 0.0 else slope.lower[0] > own))
-    largest, met = (
-        max(abs(float(ends[0])) for ends in sides)
-        for sides in ((found.lower, found.upper), (found.lowest, found.highest))
-    )
-    return Proven(largest, met, rises)
+    largest = float(np.abs([found.lower, found.upper]).max())
+    if compensator.predicts == "rate" or "output" not in X:
+        return Proven(largest)
+    # rate = output / factor - error: its slope has the factor's sign where the error's is less.
+    slope = gradient_bounds(rules, "output", max_boxes=_MOST_BOXES)
+    rises = slope.upper[0] < own if own > 0.0 else slope.lower[0] > own
+    return Proven(largest, bool(np.all(rises)))

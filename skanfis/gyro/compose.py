@@ -261,14 +261,6 @@ class Polynomial:
             terms *= np.vander(column, 4, increasing=True)[:, powers]
         return terms.sum(axis=1)
 
-    def bounds(self, box):
-        """Limits of what it gives in a box (n_inputs, 2): no term exceeds |c| max |z|^powers."""
-        near = np.clip(box.T, self.minimum_, self.maximum_)
-        sizes = np.abs(near - self.center).max(axis=0) / self.scale
-        varies = self.powers.any(axis=1)
-        most = np.prod(sizes**self.powers, axis=1) @ np.abs(self.coefficients * varies)
-        return self.coefficients @ ~varies + np.array([-1.0, 1.0]) * (1.0 + 1e-12) * most
-
 
 @cache
 def cubic_powers(n_inputs):

@@ -36,8 +36,6 @@ def test_largest_compensation_of_a_line_is_that_of_its_corner():
     heat, output = np.meshgrid(*calibration.X.agg(["min", "max"]).to_numpy().T)
     corner = np.abs(output - (output - 0.005 - 2e-4 * heat) / 1.001).max()
     assert certain.largest == pytest.approx(corner, rel=1e-3)
-    assert certain.met <= certain.largest
-    assert certain.met == pytest.approx(corner, rel=1e-3)
     assert certain.rate_rises is True
 
 
