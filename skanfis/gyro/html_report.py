@@ -14,7 +14,7 @@ from .. import __version__
 from ..inspection.labels import printable
 from ..policies import policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
-from ._formulas import formula_of, law_text, rules_text
+from ._formulas import formula_of, rules_text
 from ._headline import (
     ARTICLES,
     flagged_text,
@@ -87,7 +87,7 @@ def report_page(calibration, title, options=None):
     cautions = [f"Warning: {sentence}" for sentence in cautions]
     if recipe.assumed:
         cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
-    sections = [_check, _merit, _pictures, _sure, _instead, _rules, _use, _log]
+    sections = [_check, _merit, _pictures, _sure, _written, _use, _log]
     kept = calibration.verdict.recommended != NOTHING
     kept = kept and all(check.result == "pass" for check in results.checks)
     return _template().render(
@@ -98,7 +98,7 @@ def report_page(calibration, title, options=None):
         reasons=map(signs, _reasons(results)),
         cautions=cautions,
         first=[_summary(results), _identity(results)],
-        sections=[section for make in sections if (section := make(results))],
+        sections=[make(results) for make in sections],
         footer=f"Made by skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
         f"{np.__version__}, SciPy {scipy.__version__} and Python {platform.python_version()}. "
         "Figures of merit in the terms of IEEE Std 528-2019, 952 and 1780-2022; see their table.",
@@ -176,11 +176,10 @@ def _summary(results):
         if pd.notna(after):
             lines.append((_words(name), figures(before), figures(after), signs(unit)))
     error = next((each for each in results.pictures(_ON_FIRST_PAGE)), None)
-    ends = calibration.X.agg(["min", "max"]).T
     blocks = [
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
-        _box(calibration, ends.index, ends.to_numpy(), "It may be used from"),
+        _box(calibration, "It may be used from"),
         *([Block("pictures", [error])] if error else []),
     ]
     return "Summary", blocks
@@ -244,20 +243,6 @@ def _check(results):
     return "How it was checked", [*blocks, _table(head, lines), *notes]
 
 
-def _instead(results):
-    """What is written, where that is something simpler than rules: what to compute."""
-    calibration, name = results.calibration, results.calibration.written
-    if calibration.writes_model:
-        return None
-    text = (
-        f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
-        "deg/s, inputs in the units of the range of the calibration. The command writes another "
-        "compensation, with its own report, with --write: rules, " + ", ".join(NAMES) + "."
-    )
-    formula = Block("open", formula_of(calibration, name), "What to compute")
-    return "What is written", [Block("text", text), formula, _on_board(calibration)]
-
-
 def _merit(results):
     """The figures of merit of all rows in range, and the limits."""
     table, lines = results.merit, []
@@ -305,10 +290,8 @@ def _use(results):
         f"(coverage below {compensator.min_coverage:g}) are flagged too (status 4). The C code "
         "that --c writes flags the same rows with the same numbers."
     )
-    ends = calibration.X.agg(["min", "max"]).T
     pictures = Block("pictures", list(results.coverage()))
-    blocks = [Block("text", text), _box(calibration, ends.index, ends.to_numpy()), pictures]
-    return "Where it may be used", blocks
+    return "Where it may be used", [Block("text", text), _box(calibration), pictures]
 
 
 def _sure(results):
@@ -325,23 +308,23 @@ def _sure(results):
     return "What is proven", [table, Block("soft", _PROOF)]
 
 
-def _rules(results):
-    """The rules in pictures and as text, and whether they can be read one by one."""
-    calibration, blocks = results.calibration, []
+def _written(results):
+    """What is written: a formula, or rules in pictures and as text, and whether they can be read."""
+    calibration, name = results.calibration, results.calibration.written
     if not calibration.writes_model:
-        return None
-    if calibration.recipe.physics:
-        law = law_text(calibration.compensator.estimator.base_, calibration.recipe)
-        text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
-        blocks += [Block("text", text), Block("details", law, "The arcsine law")]
-    blocks.append(Block("pictures", list(results.memberships())))
+        text = (
+            f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
+            "deg/s, inputs in the units of the range of the calibration. The command writes another "
+            "compensation, with its own report, with --write: rules, " + ", ".join(NAMES) + "."
+        )
+        formula = Block("open", formula_of(calibration, name), "What to compute")
+        return "What is written", [Block("text", text), formula, _on_board(calibration)]
     found = readability_of(calibration)
-    text = rules_text(calibration, found)
     n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.terms)
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
-        *blocks,
-        Block("details", text, f"All rules as text ({n_rules}, {terms})"),
+        Block("pictures", list(results.memberships())),
+        Block("details", rules_text(calibration, found), f"All rules as text ({n_rules}, {terms})"),
         _on_board(calibration),
         Block("heading", "Can the rules be read?"),
         *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
@@ -372,10 +355,11 @@ def _log(results):
     return "The log", [_table(["quantity", "value", "unit"], lines)]
 
 
-def _box(calibration, names, ends, caption=""):
+def _box(calibration, caption=""):
+    """The range of every input."""
     lines = [
         (_words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name))
-        for name, (low, high) in zip(names, ends, strict=True)
+        for name, low, high in calibration.X.agg(["min", "max"]).T.itertuples()
     ]
     return _table(["input", "from", "to", "unit"], lines, caption)
 
