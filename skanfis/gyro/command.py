@@ -23,8 +23,7 @@ from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._formulas import rules_text
-from ._headline import errors_and_verdict
+from ._headline import errors_and_verdict, rules_text
 from ._on_board import export_c_compensator
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._source import open_source

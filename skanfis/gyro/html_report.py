@@ -14,14 +14,15 @@ from .. import __version__
 from ..inspection.labels import printable
 from ..policies import policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
-from ._formulas import formula_of, rules_text
 from ._headline import (
     ARTICLES,
     flagged_text,
+    formula_of,
     headline,
     held_out_groups,
     proven_bounds,
     readability_of,
+    rules_text,
 )
 from ._on_board import notes_on, units_of
 from ._options import ReportOptions

@@ -16,8 +16,7 @@ pytest.importorskip("jinja2")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._formulas import formula_of, rules_text
-from skanfis.gyro._headline import proven_bounds
+from skanfis.gyro._headline import formula_of, proven_bounds, rules_text
 from skanfis.gyro._options import ReportOptions, parse_limit
 from skanfis.gyro._results import Picture, Results
 from skanfis.gyro._split import choose_split
