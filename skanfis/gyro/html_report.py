@@ -310,13 +310,13 @@ def _sure(results):
 
 
 def _written(results):
-    """What is written: a formula, or rules in pictures and as text, and whether they can be read."""
+    """What is written: a formula, or rules in pictures and as text, and whether to read them."""
     calibration, name = results.calibration, results.calibration.written
     if not calibration.writes_model:
         text = (
             f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
-            "deg/s, inputs in the units of the range of the calibration. The command writes another "
-            "compensation, with its own report, with --write: rules, " + ", ".join(NAMES) + "."
+            "deg/s, inputs in the units of the range of the calibration. The command writes "
+            f"another compensation, with its own report, with --write: rules, {', '.join(NAMES)}."
         )
         formula = Block("open", formula_of(calibration, name), "What to compute")
         return "What is written", [Block("text", text), formula, _on_board(calibration)]
