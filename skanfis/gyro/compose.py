@@ -19,7 +19,7 @@ from sklearn.utils.validation import (
 
 from .. import ANFISRegressor
 from ..export import fold_with_rows
-from ..export.folding import found_by_search
+from ..export.folding import final_step, found_by_search
 from ._columns import ask
 from .physics import OpenLoopArcsineRegressor, check_parameters
 
@@ -172,13 +172,9 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         """What the parts that have ``method`` answer."""
         check_is_fitted(self)
         parts = [self.base_, self.residual_]
-        able = [part for part in parts if hasattr(_last_step(part), method)]
+        able = [part for part in parts if hasattr(final_step(part)[0], method)]
         # Of parts of which none is able, the residual model says so.
         return [ask(part, method, X) for part in able or parts[1:]]
-
-
-def _last_step(estimator):
-    return estimator.steps[-1][1] if isinstance(estimator, Pipeline) else estimator
 
 
 @dataclass(frozen=True, eq=False)
