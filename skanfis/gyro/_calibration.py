@@ -101,7 +101,7 @@ class Calibration:
     ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
     the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
     rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
-    of the model that had not seen it. ``terms`` are the model's, None of rules that are no grid.
+    of the model that had not seen it. ``terms`` are the model's numbers of them.
     ``simpler`` are compensations without rules, judged with the model by ``verdict`` on the rows in
     range. ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
     ``n_rows`` is how many rows there were, of which ``log`` has some.
@@ -117,7 +117,7 @@ class Calibration:
     before: np.ndarray
     after: np.ndarray
     inside: np.ndarray
-    terms: tuple[int, ...] | None
+    terms: tuple[int, ...]
     simpler: list[Simpler]
     verdict: Verdict
     n_fit_rows: int
@@ -266,7 +266,7 @@ def _fit(X, target, groups, recipe, tell):
         # Of rows that trial fits have not seen; the final one is asked of none.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
         estimator, terms = fit_model(X, target, groups, recipe)
-    tell(f"terms {','.join(map(str, terms or ['of another kind']))}")
+    tell(f"terms {','.join(map(str, terms))}")
     return estimator, terms, sorted({str(warning.message) for warning in caught})
 
 

@@ -321,11 +321,15 @@ def _written(results):
         formula = Block("open", formula_of(calibration, name), "What to compute")
         return "What is written", [Block("text", text), formula, _on_board(calibration)]
     found = readability_of(calibration)
-    n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.terms)
+    n_rules, terms = calibration.rules[-1].n_rules_, " × ".join(map(str, calibration.terms))
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         Block("pictures", list(results.memberships())),
-        Block("details", rules_text(calibration, found), f"All rules as text ({n_rules}, {terms})"),
+        Block(
+            "details",
+            rules_text(calibration, found),
+            f"All rules as text ({n_rules}, terms {terms})",
+        ),
         _on_board(calibration),
         Block("heading", "Can the rules be read?"),
         *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
@@ -379,8 +383,3 @@ def _words(name):
 
 def _unit_of(calibration, name):
     return signs(units_of(calibration.compensator).get(name, "deg/s"))
-
-
-def _terms_text(terms):
-    """Numbers of fuzzy terms in words."""
-    return f"terms {' × '.join(map(str, terms))}" if terms else "structure left to ANFISRegressor"
