@@ -156,8 +156,8 @@ def _cells(answered, side, figures, units, kind, draws):
     with np.errstate(divide="ignore", invalid="ignore"):
         for draw in draws:
             places = np.concatenate([thinned[i] for i in draw])
-            sample = {name: values[places] for name, values in answered.items()}
-            spreads.append([_or_nan(figure.of, _of_side(sample, side))[0] for figure in own])
+            sample = _of_side({name: each[places] for name, each in answered.items()}, side)
+            spreads.append([_or_nan(figure.of, sample)[0] for figure in own])
         of_own = dict(zip((figure.name for figure in own), np.transpose(spreads), strict=False))
         cells = []
         for figure in figures:
