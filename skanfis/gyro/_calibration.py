@@ -1,12 +1,7 @@
 """From a checked log to a compensator, to predictions of every row by models new to it, a verdict.
 
-Recommended is the simplest compensation that no more elaborate one beats decisively, all of them
-judged on the same held-out rows. How many times smaller the elaborate one's error is, is the
-geometric mean over the groups held out of the ratio of RMS errors, with the interval of Student's t
-at 95 %: a mean of squares alone would be decided by a group ten times larger than the others.
-"Decisively" means that the interval lies above 1.02, and that the RMS over all rows falls by more
-than this, where one bad group shows. The models of different folds share training rows: the
-interval is a little too narrow.
+docs/gyro_command.rst says what is recommended. Gains are geometric means over groups: a mean of
+squares would be decided by a group ten times larger than the others.
 """
 
 import warnings

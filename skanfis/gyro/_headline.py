@@ -114,13 +114,17 @@ def errors_and_verdict(calibration):
     lines.append(f"flagged        {flagged_text(calibration)}")
     title, reason = headline(calibration, "deg/s")
     lines.append(f"VERDICT        {title}. {reason}")
-    what = ARTICLES.get(calibration.written, "the fuzzy rules")
-    asked = calibration.recipe.write != "recommended"
-    others = "as --write asks" if asked else "as recommended; --write names another"
-    lines.append(f"written is     {what}, {others}")
+    lines.append(f"written is     {written_text(calibration)}")
     if calibration.writes_model and (findings := readability_of(calibration).findings):
         lines.append(f"rules          against reading them one by one: {findings[0]}")
     return lines
+
+
+def written_text(calibration):
+    """What is written, and whether that is what is recommended."""
+    asked = calibration.recipe.write != "recommended"
+    others = "as --write asks" if asked else "as recommended; --write names another"
+    return f"{ARTICLES.get(calibration.written, 'the fuzzy rules')}, {others}"
 
 
 def readability_of(calibration):

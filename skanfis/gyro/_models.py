@@ -12,7 +12,7 @@ from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
 # Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
-ROUNDS = 3
+ROUNDS = 2
 # Of the law beside rules, in temperature: of degree 1 rules would have to bend for it.
 _DEGREE = 2
 # Terms are looked for among so many rows, and fitted to all. More rules than three terms of three

@@ -325,8 +325,13 @@ def _header(whole, dialect, price, units, notes):
     if model.n_rules == 1:
         rules = ", and a line" if model.order else ", and a constant"
     what, output = "The rate of an open-loop gyro: arcsine law", "rate"
+    where, policies = "Of the rules alone: outside their range", []
     if whole.is_cubic:
         what, output = f"A polynomial of the third degree with {len(law.powers)} terms", "error"
+        where = "Outside this range"
+    else:
+        past = past_phase(law.out_of_bounds, "output")
+        policies = [f"Beyond a phase of {law.max_phase:g} rad {past}."]
     what += rules if model.coefficients.any() else ""
     lines = [
         *map(remark, notes),
@@ -337,7 +342,8 @@ def _header(whole, dialect, price, units, notes):
         "Outputs y:",
         f"  [0] {output}, in {units.get('rate', 'the unit of the training data')}",
         "",
-        *_policy_lines(whole),
+        *policies,
+        policy_line(model, where),
         "A row that is not finite gets no output either way, nor does one whose rate is not.",
     ]
     if part.min_coverage is not None:
@@ -345,18 +351,6 @@ def _header(whole, dialect, price, units, notes):
     title = "A cubic" if whole.is_cubic else "An arcsine law"
     title += " and Takagi-Sugeno-Kang fuzzy rules" if model.n_rules > 1 else ""
     return header_of(title, lines, dialect, len(whole.names), 1)
-
-
-def _policy_lines(whole):
-    """What is answered out of range."""
-    model, law = whole.rules.model, whole.law
-    if whole.is_cubic:
-        return [policy_line(model, "Outside this range")]
-    past = past_phase(law.out_of_bounds, "output")
-    return [
-        f"Beyond a phase of {law.max_phase:g} rad {past}.",
-        policy_line(model, "Of the rules alone: outside their range"),
-    ]
 
 
 def _cost(whole):

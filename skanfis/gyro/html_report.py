@@ -23,6 +23,7 @@ from ._headline import (
     proven_bounds,
     readability_of,
     rules_text,
+    written_text,
 )
 from ._on_board import notes_on, units_of
 from ._options import ReportOptions
@@ -38,13 +39,8 @@ _FIRST = (
     "hysteresis", "scale_factor_error", "scale_factor_nonlinearity",
 )  # fmt: skip
 _ON_FIRST_PAGE = ("error-by-temperature",)
-_OWN = "none: of indicated less true rate"
 # What the standards call the figures; docs/gyro_metrics.rst says how each is computed.
 _TERMS = {
-    "residual_rms": _OWN,
-    "residual_peak": _OWN,
-    "residual_peak_to_peak": _OWN,
-    "reduction_factor": "none: RMS before over RMS after",
     "scale_factor_error": "scale factor error (528, 1780)",
     "scale_factor_nonlinearity": "linearity error, largest (528, 952)",
     "scale_factor_nonlinearity_rms": "linearity error, RMS (528, 952)",
@@ -56,11 +52,8 @@ _TERMS = {
     "bias_temperature_sensitivity": "bias temperature sensitivity, D_T (952)",
     "bias_ramp_sensitivity": "bias temperature ramp sensitivity, D_Tdot (952)",
     "hysteresis": "hysteresis error (528)",
-    "bias_stability_10s": "none: standard deviation of means over 10 s",
-    "bias_stability_100s": "none: standard deviation of means over 100 s",
     "angle_random_walk": "angle random walk, N (528, 952)",
     "bias_instability": "bias instability, B (528, 952)",
-    "allan_minimum": "none: least Allan deviation, 0.664 B",
     "rate_random_walk": "rate random walk, K (528, 952)",
 }
 _PROOF = (
@@ -157,15 +150,7 @@ def _reasons(results):
             names = [_words(c.limit.figure) for c in results.checks if c.result == result]
             parts += [f"{words}: {', '.join(names)}"] if names else []
         yield f"Specification: {'; '.join(parts)}."
-    calibration = results.calibration
-    what = ARTICLES.get(calibration.written, "the fuzzy rules")
-    if calibration.written == calibration.verdict.recommended:
-        yield f"The files, and the figures below, are of {what}."
-    else:
-        yield (
-            f"The files, and the figures below, are of {what} all the same: --write "
-            f"{calibration.recipe.write} asked for it."
-        )
+    yield f"The files, and the figures below, are of {written_text(results.calibration)}."
 
 
 def _summary(results):
@@ -252,7 +237,14 @@ def _merit(results):
         for side in ("before", "after"):
             value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
             cells += [figures(value), _interval(low, high)]
-        lines.append((_words(line["figure"]), *cells, signs(line["unit"]), _TERMS[line["figure"]]))
+        lines.append(
+            (
+                _words(line["figure"]),
+                *cells,
+                signs(line["unit"]),
+                _TERMS.get(line["figure"], "none"),
+            )
+        )
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit", "IEEE term"]
     resampled = results.merit.attrs["resampled"]
     blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
