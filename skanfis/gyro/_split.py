@@ -258,15 +258,11 @@ def _labels(log, part, groups):
         levels = log["rate"].abs().groupby(groups).median()
         names = [f"|{level:.4g}| °/s" for level in levels]
     else:
-        legs = groups
         if part == "piece":
-            groups = np.unique(legs * _N_FOLDS + _pieces(legs), return_inverse=True)[1]
-        ends = log["temperature"].groupby(groups).agg(["first", "last"]).to_numpy()
-        number = [f"{leg}" for leg in np.unique(legs) + 1]
-        if part == "piece":
-            pairs = np.unique(np.column_stack([legs, _pieces(legs)]), axis=0) + 1
-            number = [f"{leg}.{piece}" for leg, piece in pairs]
-        names = [f"{no}: {a:.0f} to {b:.0f} °C" for no, (a, b) in zip(number, ends, strict=True)]
+            numbers = groups * _N_FOLDS + _pieces(groups)
+            groups = np.unique(numbers, return_inverse=True)[1]
+        ends = log["temperature"].groupby(groups).agg(["first", "last"]).itertuples()
+        names = [f"{number + 1}: {first:.0f} to {last:.0f} °C" for number, first, last in ends]
     return np.array(names, dtype=object)[groups]
 
 

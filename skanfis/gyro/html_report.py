@@ -38,7 +38,7 @@ _FIRST = (
     "residual_rms", "residual_peak", "reduction_factor", "bias", "bias_temperature_sensitivity",
     "hysteresis", "scale_factor_error", "scale_factor_nonlinearity",
 )  # fmt: skip
-_ON_FIRST_PAGE = ("error-by-temperature",)
+_ON_FIRST_PAGE = "error-by-temperature"
 # What the standards call the figures; docs/gyro_metrics.rst says how each is computed.
 _TERMS = {
     "scale_factor_error": "scale factor error (528, 1780)",
@@ -161,12 +161,11 @@ def _summary(results):
         unit, before, after = table.loc[name, ["unit", "before", "after"]]
         if pd.notna(after):
             lines.append((_words(name), figures(before), figures(after), signs(unit)))
-    error = next((each for each in results.pictures(_ON_FIRST_PAGE)), None)
     blocks = [
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
         _box(calibration, "It may be used from"),
-        *([Block("pictures", [error])] if error else []),
+        Block("pictures", [results.pictures[_ON_FIRST_PAGE]]),
     ]
     return "Summary", blocks
 
@@ -263,7 +262,8 @@ def _merit(results):
 
 
 def _pictures(results):
-    blocks = [Block("pictures", list(results.pictures(besides=_ON_FIRST_PAGE)))]
+    others = [each for name, each in results.pictures.items() if name != _ON_FIRST_PAGE]
+    blocks = [Block("pictures", others)]
     if isinstance(results.of_allan, str):
         blocks.append(Block("soft", f"Allan deviation: {results.of_allan}."))
     return "Pictures", blocks

@@ -185,7 +185,7 @@ def test_pieces_leave_each_temperature_to_the_other_direction():
     # Five pieces of each leg, all of them groups.
     labels = list(dict.fromkeys(split.labels))
     assert len(labels) == 10
-    assert labels[0].startswith("1.1: -30 to ")
+    assert labels[0].startswith("1: -30 to ")
     assert labels[-1].endswith(" to -30 °C")
     every_row_once(split, temperature.size)
 
