@@ -24,10 +24,10 @@ from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._headline import errors_and_verdict, rules_text
-from ._on_board import export_c_compensator
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._source import open_source
 from ._split import choose_split
+from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, write_pdf

@@ -25,10 +25,10 @@ from ._headline import (
     rules_text,
     written_text,
 )
-from ._on_board import notes_on, units_of
 from ._options import ReportOptions
 from ._results import Results
 from ._simpler import NAMES, NOTHING
+from .c_code import notes_on, units_of
 from .compose import FrozenRules
 from .displays import figures, signs
 from .metrics import rms
