@@ -156,7 +156,7 @@ def _reasons(results):
 def _summary(results):
     """For whoever reads one page: the figures that count, and where they hold."""
     table, calibration = results.merit.set_index("figure"), results.calibration
-    lines = []
+    pictures, lines = results.pictures, []
     for name in (name for name in _FIRST if name in table.index):
         unit, before, after = table.loc[name, ["unit", "before", "after"]]
         if pd.notna(after):
@@ -165,7 +165,7 @@ def _summary(results):
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
         _box(calibration, "It may be used from"),
-        Block("pictures", [results.pictures[_ON_FIRST_PAGE]]),
+        Block("pictures", [each for name, each in pictures.items() if name == _ON_FIRST_PAGE]),
     ]
     return "Summary", blocks
 
