@@ -17,6 +17,7 @@ import numpy as np
 import pandas as pd
 from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
 from sklearn.feature_selection import SelectorMixin
+from sklearn.frozen import FrozenEstimator
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import (
     FunctionTransformer,
@@ -136,6 +137,19 @@ def last_step(estimator: Any) -> Any:
     label, last = _steps_of("", estimator)[0][-1]
     _model_of(label, last)
     return last
+
+
+def final_step(estimator: Any, X: Any = None) -> tuple[Any, Any]:
+    """What predicts, behind what freezes or found it, and X, if given, as it takes it."""
+    if isinstance(estimator, FrozenEstimator):
+        return final_step(estimator.estimator, X)
+    if hasattr(estimator, "best_estimator_"):
+        return final_step(estimator.best_estimator_, X)
+    if not isinstance(estimator, Pipeline):
+        return estimator, X
+    for _, step in estimator.steps[:-1] if X is not None else ():
+        X = X if _is_passthrough(step) else step.transform(X)
+    return final_step(estimator.steps[-1][1], X)
 
 
 def found_by_search(estimator: Any) -> Any:

@@ -1,12 +1,7 @@
 """From a checked log to a compensator, to predictions of every row by models new to it, a verdict.
 
-Recommended is the simplest compensation that no more elaborate one beats decisively, all of them
-judged on the same held-out rows. How many times smaller the elaborate one's error is, is the
-geometric mean over the groups held out of the ratio of RMS errors, with the interval of Student's t
-at 95 %: a mean of squares alone would be decided by a group ten times larger than the others.
-"Decisively" means that the interval lies above 1.02, and that the RMS over all rows falls by more
-than this, where one bad group shows. The models of different folds share training rows: the
-interval is a little too narrow.
+docs/gyro_command.rst says what is recommended. Gains are geometric means over groups: a mean of
+squares would be decided by a group ten times larger than the others.
 """
 
 import warnings
@@ -101,7 +96,7 @@ class Calibration:
     ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
     the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
     rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
-    of the model that had not seen it. ``terms`` are the model's, None of rules that are no grid.
+    of the model that had not seen it. ``terms`` are the model's numbers of them.
     ``simpler`` are compensations without rules, judged with the model by ``verdict`` on the rows in
     range. ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
     ``n_rows`` is how many rows there were, of which ``log`` has some.
@@ -117,7 +112,7 @@ class Calibration:
     before: np.ndarray
     after: np.ndarray
     inside: np.ndarray
-    terms: tuple[int, ...] | None
+    terms: tuple[int, ...]
     simpler: list[Simpler]
     verdict: Verdict
     n_fit_rows: int
@@ -266,7 +261,7 @@ def _fit(X, target, groups, recipe, tell):
         # Of rows that trial fits have not seen; the final one is asked of none.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
         estimator, terms = fit_model(X, target, groups, recipe)
-    tell(f"terms {','.join(map(str, terms or ['of another kind']))}")
+    tell(f"terms {','.join(map(str, terms))}")
     return estimator, terms, sorted({str(warning.message) for warning in caught})
 
 

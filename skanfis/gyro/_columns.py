@@ -7,7 +7,8 @@ import math
 from numbers import Real
 
 import numpy as np
-from sklearn.pipeline import Pipeline
+
+from ..export.folding import final_step
 
 # Of each unit: its factor to the canonical one, and spellings in lower case, without blanks.
 _TABLE = {
@@ -172,9 +173,7 @@ def label_texts(labels) -> np.ndarray:
 
 def ask(estimator, method, X):
     """``estimator.method(X)``, or for a Pipeline that of its last step for what it is given."""
-    if isinstance(estimator, Pipeline):
-        X = estimator[:-1].transform(X) if len(estimator) > 1 else X
-        return ask(estimator[-1], method, X)
-    if not hasattr(estimator, method):
-        raise ValueError(f"{type(estimator).__name__} has no method {method!r}.")
-    return getattr(estimator, method)(X)
+    final, X = final_step(estimator, X)
+    if not hasattr(final, method):
+        raise ValueError(f"{type(final).__name__} has no method {method!r}.")
+    return getattr(final, method)(X)

@@ -1,16 +1,19 @@
-"""What report and command tell of a calibration: which compensation to use, and what is proven."""
+"""What is told of a calibration: which compensation to use, what is proven, and formulas."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from ..bounds import bounds, gradient_bounds
-from ..inspection import readability
+from ..export import fold
+from ..inspection import export_text, readability
 from ._columns import RATE_UNITS, evenly_chosen
-from ._simpler import NAMES, NOTHING
+from ._simpler import LAW_AND_LINE, NAMES, NOTHING
 from .compose import FrozenRules, Polynomial
 from .displays import figures
 from .metrics import rms
+from .physics import past_phase
+from .targets.error_model import ErrorModel
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
@@ -111,13 +114,17 @@ def errors_and_verdict(calibration):
     lines.append(f"flagged        {flagged_text(calibration)}")
     title, reason = headline(calibration, "deg/s")
     lines.append(f"VERDICT        {title}. {reason}")
-    what = ARTICLES.get(calibration.written, "the fuzzy rules")
-    asked = calibration.recipe.write != "recommended"
-    others = "as --write asks" if asked else "as recommended; --write names another"
-    lines.append(f"written is     {what}, {others}")
+    lines.append(f"written is     {written_text(calibration)}")
     if calibration.writes_model and (findings := readability_of(calibration).findings):
         lines.append(f"rules          against reading them one by one: {findings[0]}")
     return lines
+
+
+def written_text(calibration):
+    """What is written, and whether that is what is recommended."""
+    asked = calibration.recipe.write != "recommended"
+    others = "as --write asks" if asked else "as recommended; --write names another"
+    return f"{ARTICLES.get(calibration.written, 'the fuzzy rules')}, {others}"
 
 
 def readability_of(calibration):
@@ -135,32 +142,119 @@ def readability_of(calibration):
 class Proven(NamedTuple):
     """What is proven in the range of the calibration, of what the rules, or a cubic, give [deg/s].
 
-    No compensation is larger in size than ``largest``; ``met`` is the largest that was met.
-    ``rate_rises`` is whether the compensated rate is proven to go with the output, in the sense of
-    the scale factor; None where the output is no input, or what is beside the rules is not bounded.
+    No compensation is larger in size than ``largest``. ``rate_rises`` is whether the compensated
+    rate is proven to go with the output, in the sense of the scale factor; None where the output is
+    no input, or what is beside the rules is not bounded.
     """
 
     largest: float
-    met: float
-    rate_rises: bool | None
+    rate_rises: bool | None = None
 
 
 def proven_bounds(calibration):
     """Bounds in the range of the calibration."""
     compensator, X = calibration.compensator, calibration.X
-    own, rules, rises = 1.0 / compensator.scale_factor, compensator.estimator, None
-    if isinstance(cubic := getattr(rules, "base_", None), Polynomial):
-        limits = cubic.bounds(X.agg(["min", "max"]).to_numpy().T)
-        return Proven(float(np.abs(limits).max()), float(np.abs(cubic.predict(X)).max()), rises)
+    own, rules = 1.0 / compensator.scale_factor, compensator.estimator
+    if isinstance(getattr(rules, "base_", None), Polynomial):
+        error = ErrorModel(compensator, rules, X)
+        return Proven(float(np.abs(error.ranges(*error.ends.T[:, :, None])[0]).max()))
     rules = getattr(rules, "residual_", rules)
     rules = rules.model if isinstance(rules, FrozenRules) else rules
     found = bounds(rules, max_boxes=_MOST_BOXES)
-    if compensator.predicts == "error" and "output" in X:
-        # rate = output / factor - error: its slope has the factor's sign where the error's is less.
-        slope = gradient_bounds(rules, "output", max_boxes=_MOST_BOXES)
-        rises = bool(np.all(slope.upper[0] < own if own > 0.0 else slope.lower[0] > own))
-    largest, met = (
-        max(abs(float(ends[0])) for ends in sides)
-        for sides in ((found.lower, found.upper), (found.lowest, found.highest))
+    largest = float(np.abs([found.lower, found.upper]).max())
+    if compensator.predicts == "rate" or "output" not in X:
+        return Proven(largest)
+    # rate = output / factor - error: its slope has the factor's sign where the error's is less.
+    slope = gradient_bounds(rules, "output", max_boxes=_MOST_BOXES)
+    rises = slope.upper[0] < own if own > 0.0 else slope.lower[0] > own
+    return Proven(largest, bool(np.all(rises)))
+
+
+def formula_of(calibration, name):
+    """The formula of a simpler compensation, as lines of text."""
+    simple = next(each for each in calibration.simpler if each.name == name)
+    recipe, estimator = calibration.recipe, simple.estimator
+    law = getattr(estimator, "base_", None)
+    if name == LAW_AND_LINE:
+        line = _line("line", estimator.residual_, recipe.inputs)
+        return f"{law_text(law, recipe)}\n\nTo this rate is added the line:\n{line}"
+    if simple.predicts == "rate":
+        return law_text(law, recipe)
+    text = _line("error", estimator, recipe.inputs) if law is None else _cubic(law, recipe.inputs)
+    return f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n{text}"
+
+
+def rules_text(calibration, found=None):
+    """What is written, as text: a formula, or the rules as sentences.
+
+    Before these stand what speaks against reading them, and the law's formula.
+    """
+    if not calibration.writes_model:
+        return f"{formula_of(calibration, calibration.written)}\n"
+    found = readability_of(calibration) if found is None else found
+    caution = ""
+    if found.findings:
+        head = "What speaks against reading the rules one by one:"
+        caution = "\n".join([head, *found.findings, "", ""])
+    estimator = calibration.model
+    # Folded, a model knows of no readability in training, and the text has the caution once.
+    if calibration.recipe.physics:
+        rules = export_text(fold(estimator.residual_), output_names=["rate beyond the law"])
+        law = law_text(estimator.base_, calibration.recipe)
+        return f"{law}\nTo this rate is added what the rules give.\n\n{caution}{rules}\n"
+    return f"{caution}{export_text(fold(estimator), output_names=['error'])}\n"
+
+
+def law_text(law, recipe):
+    """The fitted law as a formula with its units, and what happens past the arcsine."""
+    names = [recipe.inputs[j] for j in law.columns_]
+    amplitude, sagnac, bias = map(_in_powers, (law.amplitude_, law.sagnac_factor_, law.bias_))
+    formula = (
+        f"rate [deg/s] = arcsin({names[0]} [{recipe.output_unit}] "
+        f"/ ({amplitude})) / ({sagnac}) - ({bias})"
     )
-    return Proven(largest, met, rises)
+    if len(names) > 1:
+        lag = _term(law.thermometer_lag_, f" s * {names[2]} [degC/s]") if len(names) > 2 else ""
+        formula += f", t = {names[1]} [degC]{lag}{_term(-law.reference_temperature_)}"
+    policy = past_phase(law.out_of_bounds, "rate")
+    return f"{formula}\nBeyond a phase (the arcsin) of {law.max_phase:g} rad {policy}."
+
+
+def _in_powers(coefficients):
+    """Of t, the lowest first."""
+    text = f"{coefficients[0]:.8g}"
+    for power, value in enumerate(coefficients[1:], start=1):
+        text += _term(value, " t" if power == 1 else f" t^{power}")
+    return text
+
+
+def _term(value, factor=""):
+    """What is to be added, with its sign; nothing for zero."""
+    return f" {'-' if value < 0 else '+'} {abs(value):.8g}{factor}" if value else ""
+
+
+def _line(what, estimator, inputs):
+    """What a single rule gives: a constant or a line."""
+    model = FrozenRules.of(estimator, len(inputs)).model
+    constant, *slopes = model.coefficients.ravel()
+    lines = [f"{what} = {constant:.9g}"]
+    for name, slope, reference in zip(inputs, slopes, model.reference, strict=False):
+        lines.append(f"    {slope:+.9g} * ({name} - ({reference:.9g}))")
+    return "\n".join(lines)
+
+
+def _cubic(cubic, inputs):
+    """In standardised inputs, which keep the digits that count."""
+    names = [f"z{j + 1}" for j in range(len(inputs))]
+    lines = [
+        f"{name} = ({column} - ({center:.9g})) / {scale:.9g}"
+        for name, column, center, scale in zip(
+            names, inputs, cubic.center, cubic.scale, strict=True
+        )
+    ]
+    for value, row in zip(cubic.coefficients, cubic.powers, strict=True):
+        powers = zip(names, row, strict=True)
+        factors = [f"{name}^{k}" if k > 1 else name for name, k in powers if k]
+        term = "    {:+.9g} * {}" if factors else "error = {:.9g}"
+        lines.append(term.format(value, " * ".join(factors)))
+    return "\n".join(lines)

@@ -1,7 +1,6 @@
 """The models of a calibration: the law, and rules with terms chosen by groups held out."""
 
 from collections import Counter
-from math import prod
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from .compose import ResidualRegressor
 from .physics import OpenLoopArcsineRegressor
 
 # Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
-ROUNDS = 3
+ROUNDS = 2
 # Of the law beside rules, in temperature: of degree 1 rules would have to bend for it.
 _DEGREE = 2
 # Terms are looked for among so many rows, and fitted to all. More rules than three terms of three
@@ -23,10 +22,7 @@ _FEWEST_GROUPS = 4  # whose range is that of the others when one is left out
 
 
 def fit_model(X, target, groups, recipe):
-    """The estimator of a recipe, fitted, and its numbers of terms; groups tell what is not given.
-
-    The terms are None for rules of other kinds than a grid.
-    """
+    """The fitted estimator of a recipe, and its numbers of terms; groups tell what is not given."""
     terms, rules, rows = recipe.terms, None, np.arange(len(X))
     if isinstance(terms, str):
         rows = some_rows(_shared_rows(X, groups), _ROWS_FOR_SEARCH, X, np.random.default_rng(0))
@@ -70,10 +66,9 @@ def _make_rules(recipe, terms):
 
 
 def _terms_of(anfis):
-    """Numbers of terms of a grid of rules; None of other rules."""
+    """Numbers of terms of a grid of rules."""
     counts = Counter(term["input"] for term in anfis.memberships_)
-    terms = tuple(max(counts[name], 1) for name in anfis.model_.input_names)
-    return terms if prod(terms) == anfis.n_rules_ else None
+    return tuple(max(counts[name], 1) for name in anfis.model_.input_names)
 
 
 def some_rows(rows, n_rows, X, rng):

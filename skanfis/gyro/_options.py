@@ -32,11 +32,11 @@ _TARGET = re.compile(
     r"(rate-)?table(:(float|double|q31|q15))?|cubic(:(float|double))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
 )
 
-_OF_TARGETS = (
-    "also a simple target, where it is good enough: in C table[:TYPE] over temperature, "
-    "rate-table[:TYPE] over output too (float, double, q31, q15), cubic[:TYPE] piecewise over "
-    "temperature (float, double); parameters of one AXIS of a "
-    "gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] or ardupilot:AXIS[:INSTANCE]"
+_TARGETS = (
+    "in C table[:TYPE] over temperature, rate-table[:TYPE] over output too (TYPE float, double, "
+    "q31, q15), cubic[:TYPE] piecewise over temperature (float, double); parameters of one AXIS "
+    "(x, y, z) of a gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] (INSTANCE 0 to 3) or "
+    "ardupilot:AXIS[:INSTANCE] (1 to 3)"
 )
 _OF_OUTSIDE = (
     "beyond the range of the calibration, where rows are flagged: hold the edge (clip), go on "
@@ -115,7 +115,8 @@ def make_parser():
     told = "what is recommended (default), or another: the rules of the model, or what is simpler"
     add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
     add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
-    add("--target", _OF_TARGETS, type=_target, **several)
+    told = f"also a simple target, where it is good enough: {_TARGETS}"
+    add("--target", told, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
     return parser
@@ -152,12 +153,7 @@ def check_once(option, names):
 
 def _target(text):
     if not _TARGET.fullmatch(text):
-        raise ArgumentTypeError(
-            f"{shortened(text)} must be table:TYPE or rate-table:TYPE (float, double, q31, q15), "
-            "cubic:TYPE (float, double), "
-            "px4:AXIS:INSTANCE:DEVICE_ID (x, y or z; 0 to 3) or ardupilot:AXIS:INSTANCE (1 to 3); "
-            "all but the axis may be left out"
-        )
+        raise ArgumentTypeError(f"{shortened(text)} must be one of: {_TARGETS}")
     return text
 
 

@@ -167,8 +167,9 @@ class Results:
         lines = self.merit.set_index("figure")
         return [check_limit(limit, lines) for limit in self.options.limits]
 
-    def pictures(self, only=tuple(_PICTURES), besides=()):
-        """The pictures of the held-out rows that have a sense on this log, of those asked for."""
+    @cached_property
+    def pictures(self):
+        """The pictures of the held-out rows that have a sense on this log, by name."""
         heat, change = {"temperature": self.temperature}, self.temperature_rate
         label = "temperature [degC]"
         found = {
@@ -185,8 +186,9 @@ class Results:
             found["hysteresis"] = heat | {"temperature_rate": change}
         if isinstance(self.of_allan, dict):
             found["allan-deviation"] = self.of_allan
+        pictures = {}
         for subject, (kind, caption) in _PICTURES.items():
-            if subject not in found or subject not in only or subject in besides:
+            if subject not in found:
                 continue
             options = dict(found[subject])
             rows = options.pop("rows", slice(None))
@@ -194,7 +196,8 @@ class Results:
             unit = None if kind is ScaleFactorErrorDisplay else self.unit
             figure = _figure()
             display = kind.from_predictions(*rates, unit=unit, ax=figure, **options)
-            yield Picture.of(subject, figure, display.tables(), caption)
+            pictures[subject] = Picture.of(subject, figure, display.tables(), caption)
+        return pictures
 
     def coverage(self):
         """The picture of the coverage; none where temperature or output is no input."""

@@ -6,7 +6,7 @@ beside the arcsine law, or a cubic, it gives that line or zero.
 """
 
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -54,21 +54,25 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
 
     ``folds`` are pairs of rows fitted to and rows predicted, ``rows`` those of the final fit.
     """
+    parts = [train for train, _ in folds] + [rows]
     with warnings.catch_warnings():
         # What it is worth is measured.
         for category in (ConvergenceWarning, ConstantInputWarning, OutOfBoundsWarning):
             warnings.simplefilter("ignore", category)
+        zeros = [zero_rule(X.iloc[part], policy) for part in parts]
         for name, predicts, fit in kinds(list(X), policy):
             target, predicted = rate if predicts == "rate" else before - rate, np.full(len(X), 0.0)
             try:
-                made = [fit(X.iloc[train], target[train]) for train, _ in folds]
+                *made, whole = (
+                    fit(X.iloc[part], target[part], zero)
+                    for part, zero in zip(parts, zeros, strict=True)
+                )
                 for estimator, (_, test) in zip(made, folds, strict=True):
                     predicted[test] = estimator.predict(X.iloc[test])
                     is_lost = estimator.in_bounds(X.iloc[test]) & ~np.isfinite(predicted[test])
                     if is_lost.any():
                         n_lost = np.count_nonzero(is_lost)
                         raise ValueError(f"it has no finite prediction for {n_lost} rows")
-                whole = fit(X.iloc[rows], target[rows])
             except ValueError as error:
                 # Of the law alone: no rate changes, or too few rows tell its coefficients.
                 yield Simpler(name, predicts, missing=str(error))
@@ -78,30 +82,34 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
 
 
 def kinds(inputs, policy="linear"):
-    """Name, what it predicts, and what fits it to rows: of X a table, of y one number per row."""
+    """Name, what it predicts, and what fits it to rows: to X, y, and their :func:`zero_rule`."""
 
-    def zero(X, policy=policy):
-        return _rule(X, np.zeros(len(X)), 0, policy)
+    def law(X, y, zero):
+        return joined(make_law(inputs, 1, policy).fit(X, y), zero)
 
-    def law(X, y):
-        return joined(make_law(inputs, 1, policy).fit(X, y), zero(X))
-
-    def law_and_line(X, y):
+    def law_and_line(X, y, zero):
         both = make_law(inputs, 1, policy), _make_rule(1, policy)
         return joined(*law_and_rules(ResidualRegressor(*both, n_rounds=ROUNDS).fit(X, y)))
 
-    def cubic(X, y):
+    def cubic(X, y, zero):
         # Beyond the box it is held: there the tangent of a cubic leads far away soon.
-        rule = zero(X, "clip" if policy == "linear" else policy)
-        return joined(Polynomial.fitted(X, y, (rule.model.minimum, rule.model.maximum)), rule)
+        model = zero.model.with_out_of_bounds("clip" if policy == "linear" else policy)
+        return joined(
+            Polynomial.fitted(X, y, (model.minimum, model.maximum)), replace(zero, model=model)
+        )
 
-    yield NOTHING, "error", lambda X, y: zero(X)
-    yield "constant", "error", lambda X, y: _rule(X, y, 0, policy)
-    yield "straight line", "error", lambda X, y: _rule(X, y, 1, policy)
+    yield NOTHING, "error", lambda X, y, zero: zero
+    yield "constant", "error", lambda X, y, zero: _rule(X, y, 0, policy)
+    yield "straight line", "error", lambda X, y, zero: _rule(X, y, 1, policy)
     if "output" in inputs:
         yield "arcsine law", "rate", law
         yield LAW_AND_LINE, "rate", law_and_line
     yield "cubic polynomial", "error", cubic
+
+
+def zero_rule(X, policy):
+    """Zero, with the box, coverage and policy of the rows."""
+    return _rule(X, np.zeros(len(X)), 0, policy)
 
 
 def _make_rule(order, policy):

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from ._columns import check_column, check_number, label_texts
+from ._columns import check_column, label_texts
 from .errors import LogError
 
 # Relative to the largest rate: rates closer than that are one to any table.
@@ -57,15 +57,11 @@ _WORDS = {
 }
 
 
-def group_by_rate_level(
-    rate: ArrayLike,
-    *,
-    signed: bool = False,
-    tolerance: float | None = None,
-) -> np.ndarray:
+def group_by_rate_level(rate: ArrayLike, *, signed: bool = False) -> np.ndarray:
     """Groups that hold a level of the rate table together, found from the rates themselves.
 
-    Rows of a table on its way count to the nearest level.
+    Rates are of one level where the gap between neighbours is smaller than the clearest jump of the
+    gaps, sorted. Rows of a table on its way count to the nearest level.
 
     Parameters
     ----------
@@ -73,9 +69,6 @@ def group_by_rate_level(
         True rate, in any unit.
     signed : bool, default=False
         Whether a rate and its opposite are two levels.
-    tolerance : float, default=None
-        Largest gap between neighbouring rates of one level, in the unit of ``rate``. Default: where
-        the gaps, sorted, make their clearest jump; at least 1e-4 of the largest rate.
 
     Returns
     -------
@@ -99,25 +92,22 @@ def group_by_rate_level(
     5
     """
     rate = check_column(rate, "rate")
-    labels = _level_numbers(rate if signed else np.abs(rate), tolerance)
+    labels = _level_numbers(rate if signed else np.abs(rate))
     if labels is None:
         raise ValueError(
             f"rate has no levels: it changes continuously between {rate.min():g} and "
             f"{rate.max():g}. If a table went from level to level, leave out the rows in between, "
-            "or give tolerance. If not, no level can be memorised: hold out runs or devices."
+            "or round the rates. If not, no level can be memorised: hold out runs or devices."
         )
     return labels
 
 
-def _level_numbers(rate, tolerance):
+def _level_numbers(rate):
     """Number of each row's level, lowest first; None where the rate changes continuously."""
     values, inverse, n_rows = np.unique(rate, return_inverse=True, return_counts=True)
     gaps = np.diff(values)
     smallest = _SMALLEST_TOLERANCE * np.abs(values).max()
-    if tolerance is None:
-        tolerance = _clearest_tolerance(gaps, smallest)
-    else:
-        tolerance = check_number(tolerance, "tolerance")
+    tolerance = _clearest_tolerance(gaps, smallest)
     first = np.flatnonzero(np.concatenate([[True], gaps > tolerance]))
     clusters = np.searchsorted(first, inverse, side="right") - 1
     n_rows = np.add.reduceat(n_rows, first)
@@ -268,15 +258,11 @@ def _labels(log, part, groups):
         levels = log["rate"].abs().groupby(groups).median()
         names = [f"|{level:.4g}| °/s" for level in levels]
     else:
-        legs = groups
         if part == "piece":
-            groups = np.unique(legs * _N_FOLDS + _pieces(legs), return_inverse=True)[1]
-        ends = log["temperature"].groupby(groups).agg(["first", "last"]).to_numpy()
-        number = [f"{leg}" for leg in np.unique(legs) + 1]
-        if part == "piece":
-            pairs = np.unique(np.column_stack([legs, _pieces(legs)]), axis=0) + 1
-            number = [f"{leg}.{piece}" for leg, piece in pairs]
-        names = [f"{no}: {a:.0f} to {b:.0f} °C" for no, (a, b) in zip(number, ends, strict=True)]
+            numbers = groups * _N_FOLDS + _pieces(groups)
+            groups = np.unique(numbers, return_inverse=True)[1]
+        ends = log["temperature"].groupby(groups).agg(["first", "last"]).itertuples()
+        names = [f"{number + 1}: {first:.0f} to {last:.0f} °C" for number, first, last in ends]
     return np.array(names, dtype=object)[groups]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..exceptions import OutOfBoundsWarning
-from ..export.c import CCode
+from ..export.c import CCode, export_c
 from ..export.c.builder import RulesPart, cost_lines, header_of, input_lines, policy_line
 from ..export.c.dialect import (
     LONGEST_NAME,
@@ -29,11 +29,25 @@ from ..export.c.dialect import (
 )
 from ..export.c.self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ..export.c.templates import FINITE_INPUT, rejection
+from ..export.folding import found_by_search
 from ..policies import SILENT
-from .compose import Polynomial, law_and_rules
+from .compose import FrozenRules, Polynomial, ResidualRegressor, law_and_rules
 from .physics import past_phase
 
 _SUFFIX = "_r"
+SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
+_TAKE = "y[0] is the compensated rate: take it in the place of the raw rate."
+
+# Of inputs of a compensator: units, and how they are made.
+_UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
+_NOTES = {
+    "time": "time is that since power-on: zero at the first sample.",
+    "temperature": "temperature is that of the thermometer that was logged in the calibration.",
+    "temperature_rate": "temperature_rate is low-passed, with a time constant of $lag s. At "
+    "power-on: temperature_rate = 0, previous = temperature. At every sample after that, h [s] "
+    "after the one before: temperature_rate += (1 - exp(-h / $lag)) * ((temperature - previous) / "
+    "h - temperature_rate); then previous = temperature.",
+}
 
 _POLYNOMIAL = """
 static $real $name_polynomial(const $real *c, int n, $real t)
@@ -325,8 +339,13 @@ def _header(whole, dialect, price, units, notes):
     if model.n_rules == 1:
         rules = ", and a line" if model.order else ", and a constant"
     what, output = "The rate of an open-loop gyro: arcsine law", "rate"
+    where, policies = "Of the rules alone: outside their range", []
     if whole.is_cubic:
         what, output = f"A polynomial of the third degree with {len(law.powers)} terms", "error"
+        where = "Outside this range"
+    else:
+        past = past_phase(law.out_of_bounds, "output")
+        policies = [f"Beyond a phase of {law.max_phase:g} rad {past}."]
     what += rules if model.coefficients.any() else ""
     lines = [
         *map(remark, notes),
@@ -337,7 +356,8 @@ def _header(whole, dialect, price, units, notes):
         "Outputs y:",
         f"  [0] {output}, in {units.get('rate', 'the unit of the training data')}",
         "",
-        *_policy_lines(whole),
+        *policies,
+        policy_line(model, where),
         "A row that is not finite gets no output either way, nor does one whose rate is not.",
     ]
     if part.min_coverage is not None:
@@ -345,18 +365,6 @@ def _header(whole, dialect, price, units, notes):
     title = "A cubic" if whole.is_cubic else "An arcsine law"
     title += " and Takagi-Sugeno-Kang fuzzy rules" if model.n_rules > 1 else ""
     return header_of(title, lines, dialect, len(whole.names), 1)
-
-
-def _policy_lines(whole):
-    """What is answered out of range."""
-    model, law = whole.rules.model, whole.law
-    if whole.is_cubic:
-        return [policy_line(model, "Outside this range")]
-    past = past_phase(law.out_of_bounds, "output")
-    return [
-        f"Beyond a phase of {law.max_phase:g} rad {past}.",
-        policy_line(model, "Of the rules alone: outside their range"),
-    ]
 
 
 def _cost(whole):
@@ -436,3 +444,41 @@ def _steepest(whole, y):
 def _answering(part):
     """The policy by which a part answers everywhere: its own, or the nearest where it is silent."""
     return "linear" if part.out_of_bounds == "linear" else "clip"
+
+
+def export_c_compensator(compensator, path, *, std) -> CCode:
+    """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
+    found, units = found_by_search(compensator.estimator), units_of(compensator)
+    export: Any = export_c_physics
+    if not isinstance(found, ResidualRegressor):
+        export, found = export_c, FrozenRules.of(found, len(compensator.inputs)).model
+        units[found.output_names[0]] = "deg/s"
+    assumed = [f"Unit assumed: {text}" for text in compensator.assumed.values()]
+    return export(
+        found,
+        path,
+        std=std,
+        min_coverage=compensator.min_coverage,
+        units=units,
+        notes=notes_on(compensator) + assumed,
+    )
+
+
+def notes_on(compensator):
+    """What to do with the output, and how inputs are made, as sentences."""
+    use = SUBTRACT if compensator.predicts == "error" else _TAKE
+    notes = [f"{use} {raw_rate_of(compensator)}"]
+    notes += [note for name, note in _NOTES.items() if name in compensator.inputs]
+    return [note.replace("$lag", f"{compensator.time_constant:g}") for note in notes]
+
+
+def units_of(compensator):
+    """Units of the inputs of a compensator, and of the rate."""
+    return _UNITS | {"output": compensator.output_unit, "rate": "deg/s"}
+
+
+def raw_rate_of(compensator):
+    """What the raw rate is, as a sentence."""
+    factor = compensator.scale_factor
+    divided = "" if factor == 1.0 else f" divided by {factor:.9g}"
+    return f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."

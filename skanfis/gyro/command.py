@@ -23,12 +23,11 @@ from ..inspection.labels import printable
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._formulas import rules_text
-from ._headline import errors_and_verdict
-from ._on_board import export_c_compensator
+from ._headline import errors_and_verdict, rules_text
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
 from ._source import open_source
 from ._split import choose_split
+from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, write_pdf
@@ -42,7 +41,7 @@ INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 _FILES = ("compensator.json", "compensator.joblib", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
-_MOST_ROWS = 200_000  # that are held
+_MOST_ROWS = 100_000  # that are held
 _PICKLES = (".joblib", ".pkl", ".pickle")
 _STAGED = f".skanfis-{platform.node()}-"  # of folders that hold files until all are written
 

@@ -19,7 +19,7 @@ from sklearn.utils.validation import (
 
 from .. import ANFISRegressor
 from ..export import fold_with_rows
-from ..export.folding import found_by_search
+from ..export.folding import final_step, found_by_search
 from ._columns import ask
 from .physics import OpenLoopArcsineRegressor, check_parameters
 
@@ -172,13 +172,9 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         """What the parts that have ``method`` answer."""
         check_is_fitted(self)
         parts = [self.base_, self.residual_]
-        able = [part for part in parts if hasattr(_last_step(part), method)]
+        able = [part for part in parts if hasattr(final_step(part)[0], method)]
         # Of parts of which none is able, the residual model says so.
         return [ask(part, method, X) for part in able or parts[1:]]
-
-
-def _last_step(estimator):
-    return estimator.steps[-1][1] if isinstance(estimator, Pipeline) else estimator
 
 
 @dataclass(frozen=True, eq=False)
@@ -260,14 +256,6 @@ class Polynomial:
         for column, powers in zip((z / self.scale).T, self.powers.T, strict=True):
             terms *= np.vander(column, 4, increasing=True)[:, powers]
         return terms.sum(axis=1)
-
-    def bounds(self, box):
-        """Limits of what it gives in a box (n_inputs, 2): no term exceeds |c| max |z|^powers."""
-        near = np.clip(box.T, self.minimum_, self.maximum_)
-        sizes = np.abs(near - self.center).max(axis=0) / self.scale
-        varies = self.powers.any(axis=1)
-        most = np.prod(sizes**self.powers, axis=1) @ np.abs(self.coefficients * varies)
-        return self.coefficients @ ~varies + np.array([-1.0, 1.0]) * (1.0 + 1e-12) * most
 
 
 @cache

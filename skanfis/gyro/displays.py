@@ -26,13 +26,7 @@ long averaging times."""
 
 
 class GyroDisplay:
-    """A picture drawn from tables; ``figure_``, ``axes_`` and ``ax_``, the first, once drawn.
-
-    Parameters
-    ----------
-    tables : dict of str to DataFrame
-        As :meth:`tables` gives them.
-    """
+    """A picture drawn from tables; ``figure_``, ``axes_`` and ``ax_``, the first, once drawn."""
 
     # Options with a value per row; those of _PER_ROW must be given.
     _PER_ROW: ClassVar[tuple[str, ...]] = ()
@@ -44,10 +38,8 @@ class GyroDisplay:
 
     # Tables of what is drawn, from the errors of all rows in the unit, and options.
     _computed: ClassVar[Callable[..., dict[str, pd.DataFrame]]]
+    _tables: dict[str, pd.DataFrame]
     _draw: Callable[..., None]
-
-    def __init__(self, tables: dict[str, pd.DataFrame]) -> None:
-        self._tables = tables
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """What is drawn.
@@ -129,7 +121,9 @@ class GyroDisplay:
             if rows[side].isna().all():
                 raise ValueError(f"{side} is NaN in all rows: there is nothing to draw.")
             rows[side] = RATE_UNITS.get(unit, 1.0) * (rows[side] - rows["rate"])
-        return cls(cls._computed(rows, unit, **options)).plot(ax)
+        display = cls()
+        display._tables = cls._computed(rows, unit, **options)
+        return display.plot(ax)
 
     @property
     def _unit(self):
@@ -147,11 +141,6 @@ class ErrorDisplay(GyroDisplay):
     A band reaches from the smallest to the largest error of all rows; points are some of the rows.
 
     ``from_predictions`` takes ``position``, a time or temperature per row, and ``position_label``.
-
-    Parameters
-    ----------
-    tables : dict of str to DataFrame
-        As :meth:`tables` gives them.
 
     Examples
     --------
@@ -208,11 +197,6 @@ class GroupResidualDisplay(GyroDisplay):
 
     ``from_predictions`` takes ``groups``, the label of each row's held-out group.
 
-    Parameters
-    ----------
-    tables : dict of str to DataFrame
-        As :meth:`tables` gives them.
-
     Examples
     --------
     >>> from skanfis.gyro import GroupResidualDisplay
@@ -257,11 +241,6 @@ class AllanDisplay(GyroDisplay):
 
     The legend has N and B where the curve has them, the title a caution against smoothing.
     ``from_predictions`` takes ``sampling_interval`` [s] and ``run``, labels of the runs or None.
-
-    Parameters
-    ----------
-    tables : dict of str to DataFrame
-        As :meth:`tables` gives them.
 
     Examples
     --------

@@ -14,19 +14,21 @@ from .. import __version__
 from ..inspection.labels import printable
 from ..policies import policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
-from ._formulas import formula_of, law_text, rules_text
 from ._headline import (
     ARTICLES,
     flagged_text,
+    formula_of,
     headline,
     held_out_groups,
     proven_bounds,
     readability_of,
+    rules_text,
+    written_text,
 )
-from ._on_board import notes_on, units_of
 from ._options import ReportOptions
 from ._results import Results
 from ._simpler import NAMES, NOTHING
+from .c_code import notes_on, units_of
 from .compose import FrozenRules
 from .displays import figures, signs
 from .metrics import rms
@@ -36,14 +38,9 @@ _FIRST = (
     "residual_rms", "residual_peak", "reduction_factor", "bias", "bias_temperature_sensitivity",
     "hysteresis", "scale_factor_error", "scale_factor_nonlinearity",
 )  # fmt: skip
-_ON_FIRST_PAGE = ("error-by-temperature",)
-_OWN = "none: of indicated less true rate"
+_ON_FIRST_PAGE = "error-by-temperature"
 # What the standards call the figures; docs/gyro_metrics.rst says how each is computed.
 _TERMS = {
-    "residual_rms": _OWN,
-    "residual_peak": _OWN,
-    "residual_peak_to_peak": _OWN,
-    "reduction_factor": "none: RMS before over RMS after",
     "scale_factor_error": "scale factor error (528, 1780)",
     "scale_factor_nonlinearity": "linearity error, largest (528, 952)",
     "scale_factor_nonlinearity_rms": "linearity error, RMS (528, 952)",
@@ -55,11 +52,8 @@ _TERMS = {
     "bias_temperature_sensitivity": "bias temperature sensitivity, D_T (952)",
     "bias_ramp_sensitivity": "bias temperature ramp sensitivity, D_Tdot (952)",
     "hysteresis": "hysteresis error (528)",
-    "bias_stability_10s": "none: standard deviation of means over 10 s",
-    "bias_stability_100s": "none: standard deviation of means over 100 s",
     "angle_random_walk": "angle random walk, N (528, 952)",
     "bias_instability": "bias instability, B (528, 952)",
-    "allan_minimum": "none: least Allan deviation, 0.664 B",
     "rate_random_walk": "rate random walk, K (528, 952)",
 }
 _PROOF = (
@@ -87,7 +81,7 @@ def report_page(calibration, title, options=None):
     cautions = [f"Warning: {sentence}" for sentence in cautions]
     if recipe.assumed:
         cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
-    sections = [_check, _merit, _pictures, _sure, _instead, _rules, _use, _log]
+    sections = [_check, _merit, _pictures, _sure, _written, _use, _log]
     kept = calibration.verdict.recommended != NOTHING
     kept = kept and all(check.result == "pass" for check in results.checks)
     return _template().render(
@@ -98,7 +92,7 @@ def report_page(calibration, title, options=None):
         reasons=map(signs, _reasons(results)),
         cautions=cautions,
         first=[_summary(results), _identity(results)],
-        sections=[section for make in sections if (section := make(results))],
+        sections=[make(results) for make in sections],
         footer=f"Made by skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
         f"{np.__version__}, SciPy {scipy.__version__} and Python {platform.python_version()}. "
         "Figures of merit in the terms of IEEE Std 528-2019, 952 and 1780-2022; see their table.",
@@ -156,32 +150,22 @@ def _reasons(results):
             names = [_words(c.limit.figure) for c in results.checks if c.result == result]
             parts += [f"{words}: {', '.join(names)}"] if names else []
         yield f"Specification: {'; '.join(parts)}."
-    calibration = results.calibration
-    what = ARTICLES.get(calibration.written, "the fuzzy rules")
-    if calibration.written == calibration.verdict.recommended:
-        yield f"The files, and the figures below, are of {what}."
-    else:
-        yield (
-            f"The files, and the figures below, are of {what} all the same: --write "
-            f"{calibration.recipe.write} asked for it."
-        )
+    yield f"The files, and the figures below, are of {written_text(results.calibration)}."
 
 
 def _summary(results):
     """For whoever reads one page: the figures that count, and where they hold."""
     table, calibration = results.merit.set_index("figure"), results.calibration
-    lines = []
+    pictures, lines = results.pictures, []
     for name in (name for name in _FIRST if name in table.index):
         unit, before, after = table.loc[name, ["unit", "before", "after"]]
         if pd.notna(after):
             lines.append((_words(name), figures(before), figures(after), signs(unit)))
-    error = next((each for each in results.pictures(_ON_FIRST_PAGE)), None)
-    ends = calibration.X.agg(["min", "max"]).T
     blocks = [
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
-        _box(calibration, ends.index, ends.to_numpy(), "It may be used from"),
-        *([Block("pictures", [error])] if error else []),
+        _box(calibration, "It may be used from"),
+        Block("pictures", [each for name, each in pictures.items() if name == _ON_FIRST_PAGE]),
     ]
     return "Summary", blocks
 
@@ -244,20 +228,6 @@ def _check(results):
     return "How it was checked", [*blocks, _table(head, lines), *notes]
 
 
-def _instead(results):
-    """What is written, where that is something simpler than rules: what to compute."""
-    calibration, name = results.calibration, results.calibration.written
-    if calibration.writes_model:
-        return None
-    text = (
-        f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
-        "deg/s, inputs in the units of the range of the calibration. The command writes another "
-        "compensation, with its own report, with --write: rules, " + ", ".join(NAMES) + "."
-    )
-    formula = Block("open", formula_of(calibration, name), "What to compute")
-    return "What is written", [Block("text", text), formula, _on_board(calibration)]
-
-
 def _merit(results):
     """The figures of merit of all rows in range, and the limits."""
     table, lines = results.merit, []
@@ -266,7 +236,14 @@ def _merit(results):
         for side in ("before", "after"):
             value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
             cells += [figures(value), _interval(low, high)]
-        lines.append((_words(line["figure"]), *cells, signs(line["unit"]), _TERMS[line["figure"]]))
+        lines.append(
+            (
+                _words(line["figure"]),
+                *cells,
+                signs(line["unit"]),
+                _TERMS.get(line["figure"], "none"),
+            )
+        )
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit", "IEEE term"]
     resampled = results.merit.attrs["resampled"]
     blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
@@ -285,7 +262,8 @@ def _merit(results):
 
 
 def _pictures(results):
-    blocks = [Block("pictures", list(results.pictures(besides=_ON_FIRST_PAGE)))]
+    others = [each for name, each in results.pictures.items() if name != _ON_FIRST_PAGE]
+    blocks = [Block("pictures", others)]
     if isinstance(results.of_allan, str):
         blocks.append(Block("soft", f"Allan deviation: {results.of_allan}."))
     return "Pictures", blocks
@@ -305,10 +283,8 @@ def _use(results):
         f"(coverage below {compensator.min_coverage:g}) are flagged too (status 4). The C code "
         "that --c writes flags the same rows with the same numbers."
     )
-    ends = calibration.X.agg(["min", "max"]).T
     pictures = Block("pictures", list(results.coverage()))
-    blocks = [Block("text", text), _box(calibration, ends.index, ends.to_numpy()), pictures]
-    return "Where it may be used", blocks
+    return "Where it may be used", [Block("text", text), _box(calibration), pictures]
 
 
 def _sure(results):
@@ -317,10 +293,7 @@ def _sure(results):
     certain = proven_bounds(calibration)
     added = calibration.compensator.predicts == "rate"
     what = "addition to the arcsine law" if added else "compensation"
-    proven = [
-        (f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}"),
-        ("largest that was met", f"{results.shown(certain.met)} {results.symbol}"),
-    ]
+    proven = [(f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}")]
     if certain.rate_rises is not None:
         told = "proven" if certain.rate_rises else "not proven"
         proven.append(("the compensated rate follows the output, never against it", told))
@@ -328,23 +301,27 @@ def _sure(results):
     return "What is proven", [table, Block("soft", _PROOF)]
 
 
-def _rules(results):
-    """The rules in pictures and as text, and whether they can be read one by one."""
-    calibration, blocks = results.calibration, []
+def _written(results):
+    """What is written: a formula, or rules in pictures and as text, and whether to read them."""
+    calibration, name = results.calibration, results.calibration.written
     if not calibration.writes_model:
-        return None
-    if calibration.recipe.physics:
-        law = law_text(calibration.compensator.estimator.base_, calibration.recipe)
-        text = "The rules give what the arcsine law leaves of the rate; its prediction is added."
-        blocks += [Block("text", text), Block("details", law, "The arcsine law")]
-    blocks.append(Block("pictures", list(results.memberships())))
+        text = (
+            f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
+            "deg/s, inputs in the units of the range of the calibration. The command writes "
+            f"another compensation, with its own report, with --write: rules, {', '.join(NAMES)}."
+        )
+        formula = Block("open", formula_of(calibration, name), "What to compute")
+        return "What is written", [Block("text", text), formula, _on_board(calibration)]
     found = readability_of(calibration)
-    text = rules_text(calibration, found)
-    n_rules, terms = calibration.rules[-1].n_rules_, _terms_text(calibration.terms)
+    n_rules, terms = calibration.rules[-1].n_rules_, " × ".join(map(str, calibration.terms))
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
-        *blocks,
-        Block("details", text, f"All rules as text ({n_rules}, {terms})"),
+        Block("pictures", list(results.memberships())),
+        Block(
+            "details",
+            rules_text(calibration, found),
+            f"All rules as text ({n_rules}, terms {terms})",
+        ),
         _on_board(calibration),
         Block("heading", "Can the rules be read?"),
         *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
@@ -375,10 +352,11 @@ def _log(results):
     return "The log", [_table(["quantity", "value", "unit"], lines)]
 
 
-def _box(calibration, names, ends, caption=""):
+def _box(calibration, caption=""):
+    """The range of every input."""
     lines = [
         (_words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name))
-        for name, (low, high) in zip(names, ends, strict=True)
+        for name, low, high in calibration.X.agg(["min", "max"]).T.itertuples()
     ]
     return _table(["input", "from", "to", "unit"], lines, caption)
 
@@ -397,8 +375,3 @@ def _words(name):
 
 def _unit_of(calibration, name):
     return signs(units_of(calibration.compensator).get(name, "deg/s"))
-
-
-def _terms_text(terms):
-    """Numbers of fuzzy terms in words."""
-    return f"terms {' × '.join(map(str, terms))}" if terms else "structure left to ANFISRegressor"

@@ -12,14 +12,14 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.polynomial.polynomial import polyval, polyvander
 from numpy.typing import ArrayLike
-from scipy.optimize import least_squares, root
+from scipy.optimize import least_squares
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
 
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from ..policies import OUT_OF_BOUNDS, SILENT
-from ._columns import check_column, column_position
+from ._columns import column_position
 
 HIGHEST_DEGREE = 5
 DEGREES = ("amplitude_degree", "sagnac_degree", "bias_degree")
@@ -32,7 +32,6 @@ _STARTING_PHASES = np.linspace(0.1, 1.5, 15)
 # A dozen coefficients at most: the start needs few rows, and the fit to all begins with some.
 _FEW_ROWS = 2_000
 _MAX_EVALUATIONS = 200
-_NEARBY = 1e-5  # how far a finished fit may still move, in standardised units
 
 
 class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
@@ -126,7 +125,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         tags.regressor_tags.poor_score = True
         return tags
 
-    def fit(self, X: ArrayLike, y: ArrayLike, sample_weight: ArrayLike | None = None) -> Self:
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit the law.
 
         Parameters
@@ -135,8 +134,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
             Output and temperature, among other columns.
         y : array-like of shape (n_samples,)
             True rate.
-        sample_weight : array-like of shape (n_samples,), default=None
-            Weights, zero or positive; a whole number counts as so many copies of the row.
 
         Returns
         -------
@@ -150,15 +147,9 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         """
         check_parameters(self)
         inputs, rate = validate_data(self, X, y, dtype=float, y_numeric=True)
-        given = np.ones(len(rate)) if sample_weight is None else sample_weight
-        weights = check_column(given, "sample_weight", len(rate))
-        if weights.min() < 0 or weights.max() == 0:
-            raise ValueError("sample_weight must be zero or positive, and positive somewhere.")
-        weights = weights / weights.mean()
         columns = self._find_columns()
-        counts = weights > 0
-        used = inputs[counts][:, columns]
-        log = _standardised(used, rate[counts].astype(float), weights[counts])
+        used = inputs[:, columns]
+        log = _standardised(used, rate.astype(float))
         log.degrees = self._degrees(used)
         _check_log(log)
         parameters, self.n_iter_, has_settled = _fit_law(log)
@@ -324,14 +315,13 @@ def past_phase(policy, what):
     return "the phase is held there" if policy == "clip" else "the law goes on along its tangent"
 
 
-def _standardised(used, rate, weights):
+def _standardised(used, rate):
     """The log with outputs of RMS 1, rates up to 1, and temperature about 0 with spread 1."""
     output, temperature, thermal_rate = np.pad(used, ((0, 0), (0, len(ROLES) - used.shape[1]))).T
-    mean = np.average(temperature, weights=weights)
-    std = np.sqrt(np.average((temperature - mean) ** 2, weights=weights))
+    mean, std = temperature.mean(), temperature.std()
     if np.ptp(temperature) == 0:
         mean, std = temperature[0], 1.0
-    output_unit = np.sqrt(np.average(output**2, weights=weights)) or 1.0
+    output_unit = np.sqrt(np.mean(output**2)) or 1.0
     rate_unit = np.abs(rate).max() or 1.0
     thermal_unit = np.abs(thermal_rate).max() or 1.0
     columns = (
@@ -339,7 +329,6 @@ def _standardised(used, rate, weights):
         rate / rate_unit,
         (temperature - mean) / std,
         thermal_rate / thermal_unit,
-        np.sqrt(weights),
     )
     return SimpleNamespace(
         columns=np.stack(columns),
@@ -376,18 +365,12 @@ def _law_of(parameters, log):
 
 
 def _misfit(parameters, columns, log):
-    """Modelled minus measured output, by the root of the weight."""
-    output, rate, tau, rho, root_weights = columns
+    """Modelled minus measured output."""
+    output, rate, tau, rho = columns
     law = _law_of(parameters, log)
     tau = tau + law.lag * rho
     phase = polyval(tau, law.k) * (rate + polyval(tau, law.b))
-    return root_weights * (polyval(tau, law.a) * np.sin(phase) - output)
-
-
-def _jacobian(parameters, columns, log):
-    """By complex steps: no difference is taken, and the derivative is exact to rounding."""
-    steps = parameters + 1e-30j * np.eye(parameters.size)
-    return np.stack([_misfit(step, columns, log).imag for step in steps], axis=1) * 1e30
+    return polyval(tau, law.a) * np.sin(phase) - output
 
 
 def _fit_law(log):
@@ -397,36 +380,25 @@ def _fit_law(log):
     lower, upper = np.full((2, start.size), [[-np.inf], [np.inf]])
     first_of_sagnac = log.degrees[0] + 1
     lower[first_of_sagnac], upper[first_of_sagnac] = _SMALLEST_PHASE, _LARGEST_PHASE
+    # On a large log the noise is far above the eighth digit, and every pass has its price.
+    is_long = n_rows > _FEW_ROWS
     # Of a long log some rows show the way; few steps on all are left then.
     for step in sorted({max(1, n_rows // _FEW_ROWS), 1}, reverse=True):
         fitted = least_squares(
             _misfit,
             start,
-            jac=_jacobian,
+            jac="cs",  # by complex steps: exact to rounding
             bounds=(lower, upper),
             x_scale="jac",
             # Tight, and not by the cost: where the law fits badly, that is flat before the end.
             ftol=None,
-            xtol=1e-12,
+            xtol=1e-7 if is_long else 1e-12,
             gtol=1e-13,
             max_nfev=_MAX_EVALUATIONS,
             args=(log.columns[:, ::step], log),
         )
         start = fitted.x
-    # On a large log the noise is far above the eighth digit, and every pass has its price.
-    if n_rows <= _FEW_ROWS:
-        start = _polished(start, log)
     return start, fitted.nfev, fitted.status != 0
-
-
-def _polished(parameters, log):
-    """The nearby zero of the gradient: costs tell a minimum to eight digits only."""
-
-    def gradient(trial):
-        return _jacobian(trial, log.columns, log).T @ _misfit(trial, log.columns, log)
-
-    found = root(gradient, parameters, method="hybr", options={"xtol": 1e-14, "maxfev": 60}).x
-    return found if np.abs(found - parameters).max() < _NEARBY else parameters
 
 
 def _start(columns, log):
@@ -434,14 +406,13 @@ def _start(columns, log):
 
     For given K the law is linear in A cos(K b) and A sin(K b).
     """
-    output, rate, tau, _, weights = columns
-    powers, target = polyvander(tau, log.degrees[0]), weights * output
+    output, rate, tau, _ = columns
+    powers = polyvander(tau, log.degrees[0])
     trials = []
     for phase in _STARTING_PHASES:
         basis = np.column_stack([powers * np.sin(phase * rate)[:, None], np.cos(phase * rate)])
-        design = weights[:, None] * basis
-        found = np.linalg.lstsq(design, target, rcond=None)[0]
-        trials.append((np.sum((design @ found - target) ** 2), phase, found))
+        found = np.linalg.lstsq(basis, output, rcond=None)[0]
+        trials.append((np.sum((basis @ found - output) ** 2), phase, found))
     _, phase, found = min(trials, key=lambda trial: trial[0])
     # tan(K b) = (A sin K b) / (A cos K b); a bias beyond the largest rate is no start.
     bias = np.arctan2(found[-1] * np.sign(found[0]), np.abs(found[0])) / phase

@@ -105,7 +105,8 @@ def gyro_report(
         for figure in metrics.figures_of_merit(full_scale)
         if given.issuperset(figure.needs) and (figure.fewest_runs < 2 or run is not None)
     ]
-    units, kind = _units(table[is_answered])
+    answered = {name: table[name].to_numpy()[is_answered] for name in table}
+    units, kind = _units(answered)
     # A generator of its own, so that one given moves on by one number alone.
     generator = np.random.RandomState(check_random_state(random_state).randint(2**31 - 1))
     draws = [generator.randint(0, len(units), size=len(units)) for _ in range(n_resamples)]
@@ -113,7 +114,7 @@ def gyro_report(
     names += metrics.ALLAN_FIGURES.items() if allan else []
     report, notes = pd.DataFrame(names, columns=["figure", "unit"]), {}
     for side in sides:
-        cells = _cells(table[is_answered], side, figures, units, kind, draws)
+        cells = _cells(answered, side, figures, units, kind, draws)
         cells += _allan_cells(table, side, is_answered.to_numpy()) if allan else []
         *values, notes[side] = zip(*cells, strict=True)
         report[[side, f"{side}_low", f"{side}_high"]] = np.transpose(values)
@@ -136,24 +137,26 @@ def _joined(notes):
 
 def _units(rows):
     """The rows of each run, or of blocks of rows within the runs; and which of both."""
-    runs = metrics.rows_by_run(rows.get("run"), len(rows))
+    n_rows = rows["rate"].size
+    runs = metrics.rows_by_run(rows.get("run"), n_rows)
     if len(runs) >= _FEWEST_RUNS:
         return runs, "runs"
-    length = max(1, -(-len(rows) // _N_BLOCKS))
+    length = max(1, -(-n_rows // _N_BLOCKS))
     blocks = [run[i : i + length] for run in runs for i in range(0, run.size, length)]
     return blocks, "blocks of rows"
 
 
-def _cells(table, side, figures, units, kind, draws):
+def _cells(answered, side, figures, units, kind, draws):
     """Value, ends of the interval, and a note, of each figure."""
-    step = max(1, -(-len(table) // _MOST_ROWS))
+    step = max(1, -(-answered["rate"].size // _MOST_ROWS))
     thinned = [unit[::step] for unit in units]
-    rows = _columns(table, side)
+    rows = _of_side(answered, side)
     own = [figure for figure in figures if figure.combine is None]
     spreads = []
     with np.errstate(divide="ignore", invalid="ignore"):
         for draw in draws:
-            sample = _columns(table.iloc[np.concatenate([thinned[i] for i in draw])], side)
+            places = np.concatenate([thinned[i] for i in draw])
+            sample = _of_side({name: each[places] for name, each in answered.items()}, side)
             spreads.append([_or_nan(figure.of, sample)[0] for figure in own])
         of_own = dict(zip((figure.name for figure in own), np.transpose(spreads), strict=False))
         cells = []
@@ -183,9 +186,8 @@ def _interval(figure, rows, spreads, draws, kind):
     return np.percentile(spread, _PERCENTILES), ""
 
 
-def _columns(table, side):
+def _of_side(rows, side):
     """The columns with the output of one side, its residual, and its error at the input."""
-    rows = {name: table[name].to_numpy() for name in table}
     rate, output = rows["rate"], rows[side]
     error = metrics.input_error(rate, output)
     return rows | {"output": output, "residual": output - rate, "error": error}

@@ -34,11 +34,6 @@ class ScaleFactorErrorDisplay(GyroDisplay):
 
     ``from_predictions`` takes ``temperature`` [degC].
 
-    Parameters
-    ----------
-    tables : dict of str to DataFrame
-        As :meth:`tables` gives them.
-
     Examples
     --------
     >>> from skanfis.gyro import ScaleFactorErrorDisplay
@@ -102,11 +97,6 @@ class HysteresisDisplay(GyroDisplay):
     ``from_predictions`` takes ``temperature`` [degC] and ``temperature_rate`` [degC/min]; rows of
     less than 0.05 degC/min belong to neither branch.
 
-    Parameters
-    ----------
-    tables : dict of str to DataFrame
-        As :meth:`tables` gives them.
-
     Examples
     --------
     >>> from skanfis.gyro import HysteresisDisplay
@@ -168,11 +158,6 @@ class ResidualSurfaceDisplay(GyroDisplay):
 
     ``from_predictions`` takes ``temperature`` [degC].
 
-    Parameters
-    ----------
-    tables : dict of str to DataFrame
-        As :meth:`tables` gives them.
-
     Examples
     --------
     >>> from skanfis.gyro import ResidualSurfaceDisplay
@@ -221,13 +206,6 @@ class CoverageDisplay(GyroDisplay):
     the dashed line rows are flagged, and within it where the coverage is below ``min_coverage``,
     beyond the dotted line. Colour and lines hold all other inputs at one value.
 
-    Parameters
-    ----------
-    tables : dict of str to DataFrame
-        As :meth:`tables` gives them.
-    min_coverage : float, default=0.1
-        Rows that are covered less are flagged.
-
     Examples
     --------
     >>> import pandas as pd
@@ -240,10 +218,7 @@ class CoverageDisplay(GyroDisplay):
     """
 
     _SIZE = (6.2, 4.0)
-
-    def __init__(self, tables: dict[str, pd.DataFrame], *, min_coverage: float = 0.1) -> None:
-        super().__init__(tables)
-        self.min_coverage = min_coverage
+    min_coverage: float
 
     @classmethod
     def from_estimator(
@@ -291,8 +266,10 @@ class CoverageDisplay(GyroDisplay):
         numbers = _cell_numbers({label: points[label] for label in rows}, _edges(cells))
         points["in a cell with data"] = numbers.map(cells["rows"] > 0).eq(True).astype(int)
         rows = rows.iloc[evenly_chosen(len(rows), _MOST_DOTS)].reset_index(drop=True)
-        tables = {"points": points, "rows": rows, "cells": cells}
-        return cls(tables, min_coverage=min_coverage).plot(ax)
+        display = cls()
+        display.min_coverage = min_coverage
+        display._tables = {"points": points, "rows": rows, "cells": cells}
+        return display.plot(ax)
 
     def _draw(self, axes, points, rows, cells):
         from matplotlib.colors import LinearSegmentedColormap

@@ -17,7 +17,6 @@ from sklearn import get_config
 from sklearn.base import clone
 from sklearn.frozen import FrozenEstimator
 from sklearn.model_selection import GroupKFold, GroupShuffleSplit, KFold, ShuffleSplit, check_cv
-from sklearn.pipeline import Pipeline
 from sklearn.utils import check_array
 from sklearn.utils.metadata_routing import process_routing
 from sklearn.utils.validation import has_fit_parameter
@@ -25,6 +24,7 @@ from sklearn.utils.validation import has_fit_parameter
 from .._sklearn import check_sample_weight, safe_indexing
 from .._validation import check_finite, group_numbers, named_refusals, positive_weights
 from ..exceptions import OutOfBoundsWarning
+from ..export.folding import final_step as last_step
 
 # An exact fit has no deviation to divide by: of the target's range, what rounding leaves.
 _LEAST_DEVIATION = 1e-12
@@ -191,19 +191,6 @@ def leave_one_out_scores(estimator, data, weight, least):
     residual = np.abs(data.targets.reshape(centers.shape) - centers) / freedom
     # The leverage of the row in the model without it is h / (1 - w h).
     return residual if least is None else residual / (np.sqrt(1.0 + leverage / freedom) * noise)
-
-
-def last_step(estimator, X=None):
-    """What predicts, behind what freezes or found it, and X, if given, as it takes it."""
-    if isinstance(estimator, FrozenEstimator):
-        return last_step(estimator.estimator, X)
-    if hasattr(estimator, "best_estimator_"):
-        return last_step(estimator.best_estimator_, X)
-    if not isinstance(estimator, Pipeline):
-        return estimator, X
-    for _, step in estimator.steps[:-1] if X is not None else ():
-        X = X if step is None or step == "passthrough" else step.transform(X)
-    return last_step(estimator.steps[-1][1], X)
 
 
 def row_masses(n_rows, sample_weight=None, groups=None):

@@ -24,7 +24,7 @@ from skanfis.gyro import (
     export_c_physics,
 )
 from skanfis.gyro._columns import ask
-from skanfis.gyro._on_board import export_c_compensator
+from skanfis.gyro.c_code import export_c_compensator
 from skanfis.gyro.compensator import features
 
 from ..export.c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run

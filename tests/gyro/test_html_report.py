@@ -16,8 +16,7 @@ pytest.importorskip("jinja2")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._formulas import formula_of, rules_text
-from skanfis.gyro._headline import proven_bounds
+from skanfis.gyro._headline import formula_of, proven_bounds, rules_text
 from skanfis.gyro._options import ReportOptions, parse_limit
 from skanfis.gyro._results import Picture, Results
 from skanfis.gyro._split import choose_split
@@ -185,13 +184,13 @@ def test_the_verdict_comes_first(page, calibration):
     assert not verdict.model_is_worth_it  # three rules, where the law of the sensor knows more
     title = "Use the arcsine law instead of the fuzzy rules"
     assert title in text[: text.index("Summary")]
-    assert "are of the fuzzy rules all the same: --write rules asked for it" in text
+    assert "are of the fuzzy rules, as --write asks" in text
     assert f"leaves {figures(verdict.rms['arcsine law'])} °/s RMS" in text
     simple = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="recommended")
     text = "".join(Outline(report_page(simple, TITLE)).text)
     model = next(each for each in simple.simpler if each.name == "arcsine law").estimator.base_
     assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What is written") :]
-    assert "are of the arcsine law." in text
+    assert "are of the arcsine law, as recommended" in text
     assert "Can the rules be read?" not in text
 
 

@@ -410,12 +410,15 @@ def test_a_block_that_occurs_twice_is_left_out(tmp_path, truth):
     assert "100 rows occur twice, from time 01.03.2026 10:16:40 to 01.03.2026 10:33:10" in told
 
 
-def test_rows_from_the_last_to_the_first_are_turned_round(tmp_path, truth):
-    table = truth[PARTS].assign(time=10.0 * np.arange(300))
+@pytest.mark.parametrize("n_runs", [1, 5])
+def test_rows_from_the_last_to_the_first_are_turned_round(tmp_path, truth, n_runs):
+    """Also where the clock of every run begins anew: it jumps up from one to the next then."""
+    table = truth[PARTS].assign(time=10.0 * np.tile(np.arange(300 // n_runs), n_runs))
     table[::-1].to_csv(tmp_path / "log.csv", index=False)
     reading = found(tmp_path / "log.csv")
     same(reading, table, PARTS)
     assert reading.name_row(0).endswith("line 301")
+    assert ("run" in reading.log) == (n_runs > 1)
 
 
 @pytest.mark.parametrize(

@@ -94,16 +94,6 @@ def test_noise_in_the_output_reaches_the_rate_by_the_slope(rng):
     assert abs(np.mean(normalised[fastest] * np.sign(rate[fastest]))) < 0.08  # 5 standard errors
 
 
-def test_weights_count_as_copies(rng):
-    X, rate = calibration(rng, n_rows=60)
-    X[:, 0] += 1e4 * rng.standard_normal(60)
-    weights = rng.integers(0, 4, 60)
-    weighted = arcsine().fit(X, rate, sample_weight=weights)
-    repeated = arcsine().fit(np.repeat(X, weights, axis=0), np.repeat(rate, weights))
-    np.testing.assert_allclose(weighted.predict(X[weights > 0]), repeated.predict(X[weights > 0]))
-    np.testing.assert_array_equal(weighted.minimum_, repeated.minimum_)
-
-
 def test_constant_temperature_is_said_and_survived(rng):
     X, rate = calibration(rng)
     X[:, 1] = REFERENCE
@@ -203,8 +193,6 @@ def test_bad_logs_are_refused(rng):
         OpenLoopArcsineRegressor().fit(X, np.full(20, 3.0))
     with pytest.raises(ValueError, match="the output never changes"):
         OpenLoopArcsineRegressor().fit(X * [0.0, 1.0], rate)
-    with pytest.raises(ValueError, match="sample_weight must be zero or positive"):
-        OpenLoopArcsineRegressor().fit(X, rate, sample_weight=-np.ones(20))
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

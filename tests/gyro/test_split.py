@@ -17,9 +17,9 @@ FINE = np.linspace(-100, 100, 401)
 LEVELS = np.linspace(-100, 100, 9)
 
 
-def levels_of(rate, **options):
+def levels_of(rate):
     """The median rate of each level."""
-    groups = group_by_rate_level(rate, signed=True, **options)
+    groups = group_by_rate_level(rate, signed=True)
     return pd.Series(rate).groupby(groups).median().to_numpy()
 
 
@@ -48,17 +48,6 @@ def test_one_level_is_a_level():
     assert levels_of(np.zeros(9)).tolist() == [0.0]
     assert levels_of([38.69, 38.69, 38.69]).tolist() == pytest.approx([38.69])
     assert levels_of([7.0]).tolist() == [7.0]
-    at_rest = np.random.default_rng(0).normal(scale=1e-3, size=500)
-    assert levels_of(at_rest, tolerance=0.01) == pytest.approx([0.0], abs=1e-3)
-
-
-def test_tolerance_decides_where_it_is_given():
-    rate = np.array([0.0, 0.4, 0.8, 5.0, 5.3])
-    assert_allclose(levels_of(rate, tolerance=0.5), [0.4, 5.15])
-    assert_allclose(levels_of(rate, tolerance=0.35), [0.0, 0.4, 0.8, 5.15])
-    for tolerance in (0.0, -1.0, float("nan"), "0.1"):
-        with pytest.raises(ValueError, match="must be a positive number"):
-            levels_of(rate, tolerance=tolerance)
 
 
 @pytest.mark.parametrize(
@@ -196,7 +185,7 @@ def test_pieces_leave_each_temperature_to_the_other_direction():
     # Five pieces of each leg, all of them groups.
     labels = list(dict.fromkeys(split.labels))
     assert len(labels) == 10
-    assert labels[0].startswith("1.1: -30 to ")
+    assert labels[0].startswith("1: -30 to ")
     assert labels[-1].endswith(" to -30 °C")
     every_row_once(split, temperature.size)
 

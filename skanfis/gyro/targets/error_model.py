@@ -5,6 +5,7 @@ law, by interval arithmetic. Intervals are pairs of arrays, with a number for ev
 """
 
 import warnings
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -43,10 +44,10 @@ class ErrorModel:
         """Range of the error over boxes (n_inputs, n_boxes), and of its slopes by input."""
         value, slopes = np.zeros((2, low.shape[1])), np.zeros((2, *low.shape))
         with np.errstate(all="ignore"):
-            for part in self._parts:
-                of_value, of_slopes = part.ranges(low[part.columns], high[part.columns])
+            for columns, ranges in self._parts:
+                of_value, of_slopes = ranges(low[columns], high[columns])
                 value += of_value
-                slopes[:, part.columns] += of_slopes
+                slopes[:, columns] += of_slopes
         if self._is_rate:
             indicated = np.sort(self._own * np.stack([low, high])[:, self._output], axis=0)
             value, slopes = indicated - value[::-1], -slopes[::-1]
@@ -82,69 +83,52 @@ def _polynomial_range(powers, coefficients, low, high):
 
 
 def _parts_of(estimator):
-    """What the prediction of an estimator is the sum of."""
+    """Columns, and what gives ranges over boxes of them, of all that a prediction is the sum of."""
     found = found_by_search(estimator)
     if isinstance(found, ResidualRegressor):
         return [*_parts_of(found.base_), *_parts_of(found.residual_)]
     if isinstance(found, OpenLoopArcsineRegressor):
-        return [_Law(found)]
+        return [(list(found.columns_), partial(_of_law, found))]
     if isinstance(found, Polynomial):
-        return [_Polynomial(found)]
-    return [_Rules(FrozenRules.of(found, getattr(found, "n_features_in_", None)))]
+        return [(list(found.columns_), partial(_of_polynomial, found))]
+    rules = FrozenRules.of(found, getattr(found, "n_features_in_", None))
+    sides = [Enclosure(rules.model, 0, sign) for sign in (-1.0, 1.0)]
+    return [(list(rules.positions), partial(_of_rules, sides))]
 
 
-class _Rules:
-    def __init__(self, rules):
-        self.columns = list(rules.positions)
-        self._sides = [Enclosure(rules.model, 0, sign) for sign in (-1.0, 1.0)]
-
-    def ranges(self, low, high):
-        values, slopes = [], []
-        for side in self._sides:
-            values.append(side.sign * side.values(low, high)[0])
-            each = [side.slope(low, high, j)[0] for j in range(len(low))]
-            slopes.append(side.sign * np.stack(each))
-        return values, slopes
+def _of_rules(sides, low, high):
+    values, slopes = [], []
+    for side in sides:
+        values.append(side.sign * side.values(low, high)[0])
+        each = [side.slope(low, high, j)[0] for j in range(len(low))]
+        slopes.append(side.sign * np.stack(each))
+    return values, slopes
 
 
-class _Polynomial:
-    """Of what has ``coefficients`` and ``powers``, of (x - ``center``) / ``scale``."""
-
-    def __init__(self, polynomial):
-        self._polynomial = polynomial
-        self.columns = list(range(polynomial.powers.shape[1]))
-
-    def ranges(self, low, high):
-        own = self._polynomial
-        scale = own.scale[:, None]
-        ends = [(side - own.center[:, None]) / scale for side in (low, high)]
-        value, slopes = polynomial_ranges(own.powers, own.coefficients, *ends)
-        return value, slopes / scale
+def _of_polynomial(polynomial, low, high):
+    scale = polynomial.scale[:, None]
+    ends = [(side - polynomial.center[:, None]) / scale for side in (low, high)]
+    value, slopes = polynomial_ranges(polynomial.powers, polynomial.coefficients, *ends)
+    return value, slopes / scale
 
 
-class _Law:
+def _of_law(law, low, high):
     """asin(V / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
-
-    def __init__(self, law):
-        self._law, self.columns = law, list(law.columns_)
-
-    def ranges(self, low, high):
-        law = self._law
-        d = [end[1:2] - law.reference_temperature_ for end in (low, high)]
-        (a, a_slope), (k, k_slope), (b, b_slope) = (
-            polynomial_ranges(np.arange(each.size)[:, None], each, *d)
-            for each in (law.amplitude_, law.sagnac_factor_, law.bias_)
-        )
-        over_a, over_k = _inverse(a), _inverse(k)
-        sine = product((low[0], high[0]), over_a)
-        sine = np.where(size(sine) <= np.sin(law.max_phase), sine, np.nan)
-        steep = product(product(over_a, over_k), [1 / np.sqrt(1 - s) for s in square(sine)])
-        phase = np.arcsin(sine)
-        bend = np.array(product(product(sine, a_slope[:, 0]), steep))
-        turn = np.array(product(phase, product(k_slope[:, 0], square(over_k))))
-        slopes = np.zeros((2, *low.shape))
-        slopes[:, 0], slopes[:, 1] = steep, -(bend + turn + b_slope[:, 0])[::-1]
-        return product(phase, over_k) - b[::-1], slopes
+    d = [end[1:2] - law.reference_temperature_ for end in (low, high)]
+    (a, a_slope), (k, k_slope), (b, b_slope) = (
+        polynomial_ranges(np.arange(each.size)[:, None], each, *d)
+        for each in (law.amplitude_, law.sagnac_factor_, law.bias_)
+    )
+    over_a, over_k = _inverse(a), _inverse(k)
+    sine = product((low[0], high[0]), over_a)
+    sine = np.where(size(sine) <= np.sin(law.max_phase), sine, np.nan)
+    steep = product(product(over_a, over_k), [1 / np.sqrt(1 - s) for s in square(sine)])
+    phase = np.arcsin(sine)
+    bend = np.array(product(product(sine, a_slope[:, 0]), steep))
+    turn = np.array(product(phase, product(k_slope[:, 0], square(over_k))))
+    slopes = np.zeros((2, *low.shape))
+    slopes[:, 0], slopes[:, 1] = steep, -(bend + turn + b_slope[:, 0])[::-1]
+    return product(phase, over_k) - b[::-1], slopes
 
 
 def _inverse(ends):

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...export.c.dialect import write_files
-from .._on_board import SUBTRACT, raw_rate_of, units_of
+from ..c_code import SUBTRACT, raw_rate_of, units_of
 from ..metrics import rms
 from .autopilots import NOTES, Cubic
 from .error_model import ErrorModel
