@@ -8,8 +8,8 @@ tolerance of ``simplicity`` s where
 s of the error where the signal is clear, and no more than that part of what the best explains where
 it is weak. Of all within it that have no more rules than the best, the one that costs least to read
 is taken; of equal cost, that with the smaller error. Slopes in common are a claim about each rule:
-what the rules err one by one, e^2 + V by the ambiguity decomposition (see ``penalty``), must not be
-more than v then. What is left of the tolerance goes into agreement (``start``).
+what the rules err one by one, e^2 + V by the ambiguity decomposition (see ``penalty``), must stay
+below v, or within the tolerance too. What is left of it goes into agreement (``start``).
 """
 
 from dataclasses import dataclass

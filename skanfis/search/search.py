@@ -56,11 +56,12 @@ class StructureSearch:
         most = tolerated(best.squared_error, variance, self.simplicity)
         # Only there: with two looks at every size, chance would have two.
         for one in within(self.judged, best, most):
-            if one.candidate.n_rules > 1:
-                simpler = _with_common_slopes(one.candidate, self.in_folds[one.candidate])
-                # A slope that rules share is said of each of them: they are to beat the mean alone.
-                if self._judge(*simpler).squared_error_of_rules > variance:
-                    self.judged.pop()
+            if one.candidate.n_rules == 1:
+                continue
+            simpler = self._judge(*_with_common_slopes(one.candidate, self.in_folds[one.candidate]))
+            of_rules = tolerated(one.squared_error_of_rules, variance, self.simplicity)
+            if simpler.squared_error_of_rules > max(of_rules, variance):
+                self.judged.remove(simpler)
         found = chosen(within(self.judged, best, most))
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
