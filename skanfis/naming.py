@@ -39,8 +39,8 @@ _MOST_DIGITS = 17
 SIGNS = {SigmoidRising: "> ", SigmoidFalling: "< "}
 # A side is 0.9 true this many widths from its cut; digits that are written of that length.
 _MOSTLY_TRUE, _DIGITS_OF_WIDTH = np.log(9.0), 2
-# As rounding leaves the cut between two values.
-_ROUNDING = 1e-6
+# As rounding leaves the cut between two values; and of a range, what no two places differ by.
+_ROUNDING, _ALIKE = 1e-6, 1e-9
 
 
 def default_term_names(antecedent, minimum, maximum, digits=_DIGITS_OF_WIDTH):
@@ -57,7 +57,7 @@ def default_term_names(antecedent, minimum, maximum, digits=_DIGITS_OF_WIDTH):
             numbered = [f"level {k + 1}" for k in range(own.size)]
             names[own] = LINGUISTIC.get(own.size, numbered)
         else:
-            names[own] = _near(places[own])
+            names[own] = _near(places[own], maximum[j] - minimum[j])
     start = 0
     for group in antecedent.groups:
         if group.family in SIGNS:
@@ -158,8 +158,10 @@ def given_term_names(model, names):
     return tuple(found)
 
 
-def _near(places):
-    """Places in as few digits as tell them apart; equal ones are numbered."""
+def _near(places, size):
+    """Places in as few digits as tell them apart; equal ones, but for rounding, are numbered."""
+    if 0.0 < size < np.inf:
+        places = _ALIKE * size * np.round(places / (_ALIKE * size)) + 0.0
     for digits in range(3, _MOST_DIGITS + 1):
         written = [_plain(place, digits) for place in places]
         if len(set(written)) == len(set(places)):

@@ -52,8 +52,9 @@ def test_places_are_written_as_a_person_would(place, name):
     assert default_term_names(scattered([[place]]), *BOX) == (f"near {name}",)
 
 
-def test_terms_at_one_place_are_told_apart():
-    assert default_term_names(scattered([[1.0], [1.0]]), *BOX) == ("near 1", "near 1 (2)")
+def test_terms_at_one_place_but_for_rounding_are_told_apart():
+    found = default_term_names(scattered([[1.0], [1.0 + 1e-15], [-1e-16]]), *BOX)
+    assert found == ("near 1", "near 1 (2)", "near 0")
 
 
 def test_without_terms_there_are_no_names():

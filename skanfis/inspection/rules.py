@@ -62,7 +62,13 @@ def readability_in_training(estimator, model):
     """The fit's ``readability_`` in the names of ``model``, the whole; None where there is none."""
     last = None if isinstance(estimator, TSKModel) else last_step(estimator)
     found = getattr(last, "readability_", None)
-    return None if found is None else replace(found, model=model)
+    if found is None:
+        return None
+    if np.array_equal(model.coefficients, found.model.coefficients):
+        return replace(found, model=model)
+    # Behind a scaler: numbers are rounded in other units now, and what they err is not known.
+    unknown = np.full(model.n_outputs, np.nan)
+    return replace(found, model=model, measures=replace(found.measures, printed_errors=unknown))
 
 
 def writable(model):

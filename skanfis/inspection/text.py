@@ -253,6 +253,7 @@ def _last_lines(said, found, precision=PRECISION):
 
 def _legend(said, precision):
     model, lines = said.model, ["Inputs, as they were trained:"]
+    target = model.target
     named = list(compress(model.memberships(), ~said.says_where))
     for name, low, high in zip(model.input_names, model.minimum, model.maximum, strict=True):
         lines.append(f"  {name}: {_range(low, high, _DIGITS_OF_RANGE)}")
@@ -267,7 +268,7 @@ def _legend(said, precision):
             lines.append(f"Held within the limits of its training: {name}, {limits}.")
     for what, values in (
         ("noise about the rules", model.posterior and model.posterior.noise),
-        ("target", model.target and model.target.spread),
+        ("target", target and np.where(target.maximum > target.minimum, target.spread, 0.0)),
     ):
         if values is not None:
             pairs = zip(model.output_names, values, strict=True)

@@ -11,7 +11,7 @@ from ..export import fold
 from ..model import TSKModel
 from .displays import _position, _pyplot, _section
 from .labels import as_label
-from .rules import condition, writable
+from .rules import condition, has_training_data, writable
 from .sentences import Sentences
 from .text import plain
 
@@ -25,7 +25,7 @@ _N_POINTS = 200
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class TreeDisplay:
-    """The rules of a tree: cuts, and at each leaf its typical value and its share of the rows.
+    """The rules of a tree: cuts, and at each leaf its value and on which part of the rows it leads.
 
     A branch is the thicker the more rows take it. With ``kind="plane"`` it is the prediction over
     the two inputs that are cut, with lines where another rule becomes the strongest, and the values
@@ -100,10 +100,16 @@ class TreeDisplay:
         return self._said.values[:, self.output]
 
     @property
+    def _shares(self):
+        """Of every leaf, the part of the rows on which its rule is the strongest."""
+        rows = self.model.rule_rows
+        return rows / rows.sum() if has_training_data(self.model) else self.model.rule_weights
+
+    @property
     def leaves(self) -> list[str]:
         """Of every leaf, what stands at it."""
         values = [plain(value) for value in self.values]
-        shares = [f"{100.0 * share:.2g} %" for share in self.model.rule_weights]
+        shares = [f"{100.0 * share:.2g} %" for share in self._shares]
         return [f"{value}  ({share})" for value, share in zip(values, shares, strict=True)]
 
     def plot(self, *, ax: Any = None) -> Self:
@@ -121,7 +127,7 @@ class TreeDisplay:
         words = np.reshape(list(map(condition, names, model.term_names)), (2, -1)).T[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
-        share = np.concatenate([model.rule_weights, np.zeros(n_rules - 1)])
+        share = np.concatenate([self._shares, np.zeros(n_rules - 1)])
         for k, pair in enumerate(ends):
             depth[pair] = depth[n_rules + k] + 1.0
         # What is above a cut stands above what is below it.
@@ -149,7 +155,7 @@ class TreeDisplay:
         ax.set_ylim(-0.6, n_rules - 0.2)
         ax.set_axis_off()
         name = as_label(model.output_names[self.output])
-        ax.set_title(f"{name}: typical value (share of the rows)", fontsize="small", loc="left")
+        ax.set_title(f"{name}: typical value (strongest on)", fontsize="small", loc="left")
 
     def _draw_plane(self, ax):
         model, plt = self.model, _pyplot()

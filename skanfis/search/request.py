@@ -223,10 +223,10 @@ class StructureRequest:
         n_distinct = n_distinct_inputs(rows, enough=n_columns)
         if n_distinct < n_columns:
             warn_user(
-                f"{n_rules} rules with {n_basis} coefficients each are {n_columns} consequent "
-                f"parameters for {n_distinct} distinct training rows: most of what the model says "
-                "between them is its prior, that rules agree. Judge it on rows held out, or use "
-                "fewer rules.",
+                f"{n_rules} rule{'s' if n_rules > 1 else ''} with {n_basis} coefficients each are "
+                f"{n_columns} consequent parameters for {n_distinct} distinct training rows: most "
+                "of what the model says between them is its prior. Judge it on rows held out, or "
+                f"use fewer {'rules' if n_rules > 1 else 'inputs'}.",
                 UnderdeterminedWarning,
             )
 

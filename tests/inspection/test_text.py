@@ -264,6 +264,24 @@ def test_a_model_without_data_has_no_weights_to_tell():
     assert "\n10 rules left out.\n" in text
 
 
+def test_what_the_text_errs_is_told_in_the_units_of_the_fit_alone(rng):
+    """Behind a scaler numbers are rounded elsewhere; the other findings stay."""
+    X = rng.uniform(0.0, 1e3, (100, 2))
+    y = np.sin(X[:, 0] / 300.0) + 0.1 * rng.standard_normal(100)
+    plain = ANFISRegressor(n_mfs=2).fit(X, y)
+    scaled = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)).fit(X, y)
+    *_, told = export_text(plain).split("\n\n")
+    assert "; the text as printed errs " in told.splitlines()[0]
+    *_, untold = export_text(scaled).split("\n\n")
+    assert re.fullmatch(r"\d+ numbers\.", untold.splitlines()[0])
+    assert untold.splitlines()[1:] == told.splitlines()[1:]
+
+
+def test_a_target_that_is_constant_has_no_deviation(rng):
+    model = ANFISRegressor().fit(rng.uniform(size=(30, 2)), np.full(30, 4.0))
+    assert "Standard deviation of the target: y 0." in export_text(model)
+
+
 def test_a_rule_that_is_the_strongest_on_no_row_errs_on_none():
     rows = np.ones(12)
     rows[3] = 0.0

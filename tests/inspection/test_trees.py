@@ -13,6 +13,8 @@ from ..quick import quick
 
 plt = pytest.importorskip("matplotlib.pyplot")
 A_TREE = MODELS["tree, order 1, 2 outputs"]
+# As the text says it of every rule: on which part of the rows it is the strongest.
+LEADS = A_TREE.rule_rows / A_TREE.rule_rows.sum()
 
 
 def texts(display):
@@ -45,7 +47,7 @@ def test_values_are_those_of_the_rules_where_their_rows_lie():
     values = constants.coefficients[:, 0, 0]
     assert_allclose(TreeDisplay(model=constants).values, values, atol=0.01 * np.ptp(values))
     shares = [float(leaf.split("(")[1].split(" %")[0]) for leaf in TreeDisplay(model=A_TREE).leaves]
-    assert_allclose(shares, 100.0 * A_TREE.rule_weights, rtol=0.05)
+    assert_allclose(shares, 100.0 * LEADS, rtol=0.05)
 
 
 def test_branches_are_as_thick_as_the_rows_that_take_them():
@@ -54,7 +56,7 @@ def test_branches_are_as_thick_as_the_rows_that_take_them():
     widths = np.array([line.get_linewidth() for line in lines])
     # The first two come from the root, which all rows pass.
     assert_allclose(widths[:2].sum(), 2 * 0.6 + 6.0)
-    assert_allclose(widths[0], 0.6 + 6.0 * A_TREE.rule_weights[:3].sum())
+    assert_allclose(widths[0], 0.6 + 6.0 * LEADS[:3].sum())
 
 
 def plane(rng, n_rows=300):
