@@ -126,7 +126,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     verbose : bool, default=False
         Whether to write a line per iteration.
     random_state : int, RandomState instance or None, default=None
-        Seed of all that is random; None is one fixed seed: the same data give the same model.
+        Seed of clusterings and of rows held out; None is one fixed seed: the same data give the
+        same model. Which rows judge the structure depends on their values alone.
     n_jobs : int, default=None
         Worker threads, -1 is one per core; the result is the same to the last bit for any number.
 
@@ -321,7 +322,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             Targets, in any units.
         sample_weight : array-like of shape (n_samples,), default=None
             Weights, zero or positive. A whole number counts as so many copies of the row, zero as
-            the row's absence.
+            the row's absence. Those that say how precise a row is are to have the mean one.
         groups : array-like of shape (n_samples,), default=None
             The run, device or level that each row belongs to. The structure is chosen by its error
             on groups left out, and ``early_stopping`` holds out whole groups.

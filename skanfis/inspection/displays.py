@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .._validation import check_count, position_of
 from ..antecedent import TreeAntecedent
 from ..export import fold, fold_with_rows
-from .labels import as_label
+from .labels import as_label, title_of
 from .rules import has_training_data
 
 # Points of a membership along its input, and bins of the data behind it.
@@ -254,10 +254,8 @@ class ResponseSurfaceDisplay:
             ax.plot(*self.points.T, ".", color="black", markersize=2, alpha=0.5)
         first, second = map(as_label, self.input_names)
         ax.set(xlabel=first, ylabel=second, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
-        notes = [f"{as_label(name)} = {value:.4g}" for name, value in self.held.items()]
-        if np.any(self.coverage < _COVERED):
-            notes.append("pale: few training data")
-        ax.set_title("; ".join(notes), fontsize="small", loc="left")
+        notes = ["pale: few training data"] if np.any(self.coverage < _COVERED) else []
+        ax.set_title(title_of(self.held, *notes), fontsize="small", loc="left")
         return self
 
 

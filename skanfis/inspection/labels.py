@@ -1,9 +1,12 @@
 """Names from files and tables, as pictures and terminals may show them."""
 
 import unicodedata
+from textwrap import fill
 
 # Some scripts are not written without them.
 _JOINERS = "\u200c\u200d"
+# Inputs that a title names, and its letters in a line.
+_MOST_HELD, _LETTERS = 4, 60
 
 
 def printable(text):
@@ -17,6 +20,14 @@ def printable(text):
 def as_label(name):
     """A name for matplotlib, which takes what stands between dollars for mathematics."""
     return printable(name).replace("$", r"\$")
+
+
+def title_of(held, *notes):
+    """Inputs and the values at which they are held, a few of them, and notes, over a picture."""
+    values = [f"{as_label(name)} = {value:.4g}" for name, value in held.items()]
+    more = len(values) - _MOST_HELD
+    others = [f"{more} more inputs held"] if more > 0 else []
+    return fill("; ".join([*values[:_MOST_HELD], *others, *notes]), _LETTERS)
 
 
 def _is_hidden(sign):

@@ -10,7 +10,7 @@ from ..antecedent import TreeAntecedent
 from ..export import fold
 from ..model import TSKModel
 from .displays import _position, _pyplot, _section
-from .labels import as_label
+from .labels import as_label, title_of
 from .rules import condition, has_training_data, writable
 from .sentences import Sentences
 from .text import plain
@@ -179,5 +179,4 @@ class TreeDisplay:
             ax.text(*center, plain(value), fontsize="small", ha="center", va="center", bbox=box)
         first, second = (as_label(model.input_names[j]) for j in both)
         ax.set(xlabel=first, ylabel=second, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        notes = "; ".join(f"{as_label(name)} = {value:.4g}" for name, value in held.items())
-        ax.set_title(notes, fontsize="small", loc="left")
+        ax.set_title(title_of(held), fontsize="small", loc="left")

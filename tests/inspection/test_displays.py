@@ -14,7 +14,7 @@ from skanfis.inspection import (
     MembershipDisplay,
     ResponseSurfaceDisplay,
 )
-from skanfis.inspection.labels import as_label, printable
+from skanfis.inspection.labels import as_label, printable, title_of
 
 from ..export.rule_bases import EVERY_PAIR, MODELS
 
@@ -190,3 +190,9 @@ def test_every_picture_takes_every_name():
     )
     drawn(MembershipDisplay.from_estimator(model))
     drawn(ResponseSurfaceDisplay.from_estimator(model, features=[name, f"{other}2"]))
+
+
+def test_a_title_names_a_few_of_the_inputs_that_are_held():
+    held = {f"x{k}": 0.5 * k for k in range(9)}
+    assert title_of(dict(list(held.items())[:2]), "pale") == "x0 = 0; x1 = 0.5; pale"
+    assert title_of(held) == "x0 = 0; x1 = 0.5; x2 = 1; x3 = 1.5; 5 more inputs held"
