@@ -98,7 +98,7 @@ def _name_what_is_no_number(table, what, error):
     if what == "X":
         advice = (
             "Drop the column, or encode categories as numbers in a Pipeline before "
-            "(sklearn.preprocessing.OneHotEncoder(sparse_output=False))."
+            "(OneHotEncoder(drop='if_binary', sparse_output=False) of sklearn.preprocessing)."
         )
     raise type(refusal)(
         f"Input {what} holds {kind}{where}, first at row {row}: {refusal}.{also} {advice}"

@@ -56,12 +56,7 @@ class StructureSearch:
         most = tolerated(best.squared_error, variance, self.simplicity)
         # Only there: with two looks at every size, chance would have two.
         for one in within(self.judged, best, most):
-            if one.candidate.n_rules == 1:
-                continue
-            simpler = self._judge(*_with_common_slopes(one.candidate, self.in_folds[one.candidate]))
-            of_rules = tolerated(one.squared_error_of_rules, variance, self.simplicity)
-            if simpler.squared_error_of_rules > max(of_rules, variance):
-                self.judged.remove(simpler)
+            self._judge_common_slopes(one, variance)
         found = chosen(within(self.judged, best, most))
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
@@ -86,6 +81,16 @@ class StructureSearch:
             n_further += 1
             if self.judges.prefer(now, best):
                 best, n_further = now, 0
+
+    def _judge_common_slopes(self, one, variance):
+        """Judge a candidate with slopes in common; it counts where its rules, one by one, hold."""
+        if one.candidate.n_rules == 1:
+            return
+        in_folds = [replace(like, has_common_slopes=True) for like in self.in_folds[one.candidate]]
+        simpler = self._judge(replace(one.candidate, has_common_slopes=True), in_folds)
+        most = tolerated(one.squared_error_of_rules, variance, self.simplicity)
+        if simpler.squared_error_of_rules > max(most, variance):
+            self.judged.remove(simpler)
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""
@@ -129,9 +134,3 @@ class StructureSearch:
             }
             for one in sorted(self.judged, key=lambda one: one.squared_error)
         ]
-
-
-def _with_common_slopes(candidate, in_folds):
-    """The same, of which the rules have slopes in common."""
-    of_folds = [replace(one, has_common_slopes=True) for one in in_folds]
-    return replace(candidate, has_common_slopes=True), of_folds
