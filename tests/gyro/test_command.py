@@ -483,6 +483,9 @@ def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, c
     wrong = ["--columns", "output=gyro_x", "--output", str(out)]
     assert main([*arguments, *wrong]) == 3
     assert "the log, column 'gyro_x' (output): does not follow the rate" in capsys.readouterr().err
+    wrong = ["--columns", "output=gyro_y", "rate=gyro_x", "--units", "output=deg/s", "rate=deg/s"]
+    assert main([*arguments, *wrong, "--output", str(out)]) == 3
+    assert "or the column 'gyro_x' of the rate, the wrong one?" in capsys.readouterr().err
     assert main([*arguments, "--output", str(out)]) == 0
     said, told = capsys.readouterr()
     assert "read 4 of 4" in told
