@@ -339,13 +339,15 @@ def test_ranges_have_digits_that_mean_something():
 
 def test_units_and_notes_stand_in_the_header():
     X, y = surface()
-    notes = ["A star * multiplies; */ and /* and \\ end nothing."]
-    units = {"x1": "degC", "y": "deg/s */"}
+    notes = ["A star * multiplies; */ and /* and \\ end nothing.", "ms? Ask; ??/ and ??? do not."]
+    units = {"x1": "degC?", "y": "deg/s */"}
     header = export_c(quick(n_mfs=1).fit(X, y), name="m", units=units, notes=notes).header
     comment = header.partition("#ifndef")[0]
     assert comment.count("*/") == 1
     assert "A star * multiplies; <U+002A>/ and /<U+002A> and <U+005C> end nothing." in comment
-    assert "[1] x1 [degC]: " in comment
+    # Two question marks may begin a trigraph, one may not.
+    assert "ms? Ask; <U+003F>?/ and <U+003F><U+003F>? do not." in comment
+    assert "[1] x1 [degC?]: " in comment
     assert "[0] y [deg/s <U+002A>/]: " in comment
 
 
@@ -369,6 +371,7 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
 HOSTILE = [
     "*/ int x; /*",
     "??/",
+    "???/",
     'quote " and \\',
     "line\nbreak\r\n#error",
     "x" * 5000,

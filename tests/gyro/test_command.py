@@ -281,7 +281,12 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--columns", "time=a", "time=b"], "time is given twice"),
         (["--units", "time=year"], "time has no unit 'year'"),
         (["--terms", "2,x"], "must be search, or numbers"),
-        (["--terms", "2,2"], "has 2 numbers for the 4 inputs"),
+        (["--terms", "2,2"], "has 2 numbers for 4 inputs: time, temperature, "),
+        (
+            ["--terms", "2", "--inputs", "time", "output"],
+            "has 1 number for 2 inputs: time, output.",
+        ),
+        (["--terms", "2,2", "--inputs", "output"], "has 2 numbers for 1 input: output."),
         (["--physics", "--inputs", "temperature"], "needs the output"),
         (["--inputs", "rate"], "invalid choice: 'rate'"),
         (["--terms", "99999999,1,1,1"], "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
