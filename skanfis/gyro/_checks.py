@@ -257,8 +257,8 @@ def _check_output_follows_rate(log, units):
     correlation = np.corrcoef(output, rate)[0, 1]
     if abs(correlation) < _LEAST_CORRELATION:
         raise LogError(
-            f"does not follow the rate (correlation {correlation:.3f}); is it, or that of the "
-            "rate, the wrong column?",
+            f"does not follow the rate (correlation {correlation:.3f}); is it, or the column "
+            "of the rate, the wrong one?",
             "output",
         )
     slope = np.polyfit(rate, output, 1)[0]

@@ -14,6 +14,7 @@ from ._units import assumed_text, settle_units
 from .errors import LogError
 
 _SAMPLE_ROWS = 100_000
+_TEMPERATURE = "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度"
 _RATE = "rate omega w angular velocity speed drehrate"
 _OUTPUT = (
     "gyro gyr gyroscope fog output out signal raw counts count adc measured meas indicated sensor "
@@ -23,7 +24,8 @@ _TRUTH = (
     "true truth table turntable drehtisch ref reference stage commanded command cmd encoder soll "
     "consigne"
 )
-# How much a word in a column's name speaks for a part. A chamber's thermometer is no gyro's.
+# How much a word in a column's name speaks for a part. A chamber's thermometer is no gyro's; what
+# is of a temperature, as its rate, is no rotation.
 _WORDS = {
     "time": {
         5.0: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime temps 时间",
@@ -31,12 +33,12 @@ _WORDS = {
         3.0: "t sec secs seconds epoch utc tow ms millis us",
     },
     "temperature": {
-        5.0: "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度",
+        5.0: _TEMPERATURE,
         3.0: "t",
         -3.5: "start set setpoint target chamber oven ambient amb room min max board",
     },
-    "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} setpoint"},
-    "rate": {6.0: f"{_TRUTH} setpoint", 2.0: _RATE, -4.5: _OUTPUT},
+    "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} setpoint {_TEMPERATURE}"},
+    "rate": {6.0: f"{_TRUTH} setpoint", 2.0: _RATE, -4.5: _OUTPUT, -99.0: _TEMPERATURE},
 }
 _SCORES = {
     part: {word: score for score, words in table.items() for word in words.split()}
@@ -46,9 +48,9 @@ _STRANGER = -0.5  # any other word
 _FOLLOWS = 0.9  # correlation of the axis that the table turns
 _SIGNAL, _UNIT = 3.0, 0.25  # a unit of a raw signal, for the output; any unit
 _OF_NO_PART = (
-    "residual fit fitted error err std sigma var variance status flag valid crc checksum seq "
-    "sequence index trend delta diff acc accel accelerometer mag pressure humidity supply vdd "
-    "current heater bias corrected compensated filtered direction"
+    "residual fit fitted error err noise random walk std sigma var variance status flag valid crc "
+    "checksum seq sequence index trend delta diff acc accel accelerometer mag pressure humidity "
+    "supply vdd current heater bias corrected compensated filtered direction"
 )
 _LABVIEW = {"X_Value": ("time", "s")}  # its name for the time
 _LABELS = {

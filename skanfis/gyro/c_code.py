@@ -177,7 +177,8 @@ def export_c_physics(
     Returns
     -------
     code : CCode
-        The text of both files, and the cost of an evaluation; the one arcsine is not counted.
+        The text of both files, and the most that an evaluation takes; the one arcsine is not
+        counted.
 
     Raises
     ------
@@ -371,15 +372,17 @@ def _cost(whole):
     of_rules, itemsize = whole.part.cost, whole.dtype.itemsize
     sizes = [values.size for values in whole.tables.values()]
     n_inputs, n_rules_inputs = whole.law.columns_.size, whole.rules.positions.size
-    adds, divisions, table_bytes = sum(sizes) - len(sizes) + 1, 2, n_inputs
+    # Per polynomial its degree; the lag of the thermometer, and the slope beyond the phase.
+    products, divisions, table_bytes = sum(sizes) - len(sizes) + (n_inputs > 2), 2, n_inputs
+    products += not whole.is_cubic and whole.law.out_of_bounds == "linear"
     if whole.is_cubic:
         powers = whole.law.powers
-        adds, divisions, table_bytes = int(powers.sum()) + len(powers) + 1, n_inputs, powers.size
+        products, divisions, table_bytes = int(powers.sum()), n_inputs, powers.size
     table_bytes += itemsize * (sum(sizes) + 2 * n_inputs) + n_rules_inputs
     n_held = n_rules_inputs + 1 + n_inputs * whole.is_cubic
     return replace(
         of_rules,
-        multiply_adds=of_rules.multiply_adds + adds,
+        multiply_adds=of_rules.multiply_adds + products,
         divisions=of_rules.divisions + divisions,
         table_bytes=of_rules.table_bytes + table_bytes,
         stack_bytes=of_rules.stack_bytes + itemsize * n_held,

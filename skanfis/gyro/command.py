@@ -20,6 +20,7 @@ import pandas as pd
 
 from ..export.c.dialect import STATUS
 from ..inspection.labels import printable
+from ..inspection.text import counted
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
@@ -127,7 +128,7 @@ def _read(options, paths, tell):
         tell(f"note: {note}")
     numbers = {"row": reading.n_rows}
     numbers |= {name: reading.log[name].nunique() for name in LABELS if name in reading.log}
-    tell(", ".join(f"{n:,} {name}{'s' if n > 1 else ''}" for name, n in numbers.items()))
+    tell(", ".join(counted(f"{n:,}", name) for name, n in numbers.items()))
     try:
         at_rest = _settle_rest(reading, tell)
         recipe = _recipe(options, reading, at_rest)
@@ -166,7 +167,8 @@ def _recipe(options, reading, at_rest):
         raise UsageError("--physics: the arcsine law needs the output among the inputs.")
     if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
         raise UsageError(
-            f"--terms has {len(options.terms)} numbers for the {len(inputs)} inputs {named}."
+            f"--terms has {counted(len(options.terms), 'number')} for "
+            f"{counted(len(inputs), 'input')}: {named}."
         )
     if options.scale_factor is not None and not (at_rest and unit in SIGNALS):
         raise UsageError("--scale-factor is for a raw signal at rest: else the rate tells it.")

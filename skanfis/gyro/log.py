@@ -347,7 +347,9 @@ class LogFile:
             return error
         name = self.layout.name(error.column)
         part = "" if name == error.column else f" ({error.column})"
-        return LogError(f"{where}, column {name!r}{part}: {error.reason}")
+        rate = f"column {self.layout.name('rate')!r} of the rate"
+        reason = error.reason.replace("column of the rate", rate)
+        return LogError(f"{where}, column {name!r}{part}: {reason}")
 
 
 def _longest_step(time):

@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from dataclasses import astuple, replace
 from fractions import Fraction
 
 import numpy as np
@@ -267,30 +268,65 @@ def test_files_are_cpp_too(dtype, tmp_path):
     subprocess.run(["g++", *flags, "-c", "all.cpp", "-o", "all.o"], cwd=tmp_path, check=True)
 
 
-def test_tree_takes_an_exponential_per_node():
+def cost_of(model, policy, min_coverage=None, **changes):
+    """Exponentials, logarithms, square roots, multiplications and divisions."""
+    model = replace(model, out_of_bounds=policy, **changes)
+    return np.array(astuple(export_c(model, name="m", min_coverage=min_coverage).cost)[:5])
+
+
+def test_tree_takes_an_exponential_per_node_and_two_out_of_range():
     model = MODELS["tree, order 1, 1 outputs"]
-    cost = export_c(model, name="m", min_coverage=None).cost
-    assert (cost.exponentials, cost.divisions, cost.logarithms) == (5, 5, 0)
     # The place on the sigmoid, its other side, two products; per rule its value and three slopes.
-    assert cost.multiply_adds == 5 * 4 + 6 * 4
+    inside = np.array([5, 0, 0, 5 * 4 + 6 * 4, 5])
+    for policy in ("clip", "nan", "raise"):
+        np.testing.assert_array_equal(cost_of(model, policy), inside)
+    # The way ahead, the place, three products; per rule twice the value; three inputs, one output.
+    tangent, scale = np.array([5, 0, 0, 5 * 5 + 2 * 6 * 4, 5]), np.array([0, 0, 0, 3 + 1, 3])
+    np.testing.assert_array_equal(cost_of(model, "linear"), inside + tangent + scale)
+    # Two inputs are held: three places, of which every one takes the strengths, but not the values.
+    moved = tangent + np.array([5, 0, 0, 5 * 4, 5])
+    at = np.array([np.nan, 20.0, 0.0])
+    out = cost_of(model, "linear", tangent_at=at)
+    np.testing.assert_array_equal(out, inside + 3 * moved + scale)
     # z, the sum, and what comes to leaves and nodes.
-    assert cost.stack_bytes == 8 * (3 + 1 + 6 + 5)
+    code = export_c(replace(model, out_of_bounds="nan"), name="m", min_coverage=None)
+    assert code.cost.stack_bytes == 8 * (3 + 1 + 6 + 5)
 
 
 def test_grid_takes_an_exponential_per_term():
     g = np.random.default_rng(0)
     X = g.uniform(-1.0, 1.0, (800, 2))
-    model = quick(n_mfs=6, solver="lse").fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1])
-    cost = export_c(model, name="m").cost
-    assert cost.exponentials == 12
-    assert cost.logarithms == 0
-    # 2 per term and 1 to normalise it; per rule a product of shares, two slopes, a value.
-    assert cost.multiply_adds == 12 * 3 + 36 * (1 + 3)
-    assert cost.divisions == 2
+    model = quick(n_mfs=6, solver="lse").fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1]).model_
+    # 2 per term and 1 to normalise it; per rule two shares, two slopes, a value; a sum per input.
+    inside = np.array([12, 0, 0, 12 * 3 + 36 * (2 + 3), 2])
+    np.testing.assert_array_equal(cost_of(model, "nan"), inside)
+    # Slopes: place, width, minus two, the way ahead, the mean; values twice; the scale as above.
+    outside = [0, 0, 0, 12 * 5 + 2 * 36 * 3 + 2 + 1, 2]
+    np.testing.assert_array_equal(cost_of(model, "linear"), inside + outside)
     # Per rule three entries of a factor, two squares, and five more.
-    known = 1 + np.count_nonzero(model.model_.support.share)
-    assert cost.coverage_multiply_adds == known * (3 + 2 + 5)
-    assert export_c(model, name="m", min_coverage=None).cost.coverage_multiply_adds == 0
+    known = 1 + np.count_nonzero(model.support.share)
+    coverage = [known, 0, known, known * (3 + 2 + 5), 0]
+    np.testing.assert_array_equal(cost_of(model, "nan", 0.1), inside + coverage)
+    # It falls with the distance: per input two products, and two with the exponential.
+    fades = [1, 0, 0, 2 * 2 + 2, 0]
+    np.testing.assert_array_equal(cost_of(model, "clip", 0.1), inside + coverage + fades)
+    whole = inside + outside + coverage + fades
+    np.testing.assert_array_equal(cost_of(model, "linear", 0.1), whole)
+    told = export_c(replace(model, out_of_bounds="linear"), name="m", min_coverage=0.1).header
+    said = "{} exponentials, {} logarithms, {} square roots, {} multiply-adds, {} divisions."
+    assert f"whatever the row, at most: {said.format(*whole)}" in told.replace("\n *", "")
+
+
+def test_scattered_rules_take_an_exponential_per_rule_and_what_their_terms_do():
+    model = MODELS["scattered on two inputs, order 0, 2 outputs"]
+    # Three rules of two bells: a logarithm of |u| and one of 1 + exp; u, twice log |u|, the
+    # exponent. The shares; two values.
+    inside = np.array([3 + 6, 2 * 6, 0, 6 * 3 + 3 + 3 * 2, 1])
+    np.testing.assert_array_equal(cost_of(model, "nan"), inside)
+    # Of a slope the sigmoid takes one exponential and a division, by u another; u, twice log |u|,
+    # the exponent, three more and the way ahead; then the mean, and values twice.
+    outside = [6, 6, 0, 6 * 7 + 3 + 2 * 3 * 2 + 3 + 2, 2 * 6 + 3]
+    np.testing.assert_array_equal(cost_of(model, "linear"), inside + outside)
 
 
 def test_ranges_have_digits_that_mean_something():
@@ -303,13 +339,15 @@ def test_ranges_have_digits_that_mean_something():
 
 def test_units_and_notes_stand_in_the_header():
     X, y = surface()
-    notes = ["A star * multiplies; */ and /* and \\ end nothing."]
-    units = {"x1": "degC", "y": "deg/s */"}
+    notes = ["A star * multiplies; */ and /* and \\ end nothing.", "ms? Ask; ??/ and ??? do not."]
+    units = {"x1": "degC?", "y": "deg/s */"}
     header = export_c(quick(n_mfs=1).fit(X, y), name="m", units=units, notes=notes).header
     comment = header.partition("#ifndef")[0]
     assert comment.count("*/") == 1
     assert "A star * multiplies; <U+002A>/ and /<U+002A> and <U+005C> end nothing." in comment
-    assert "[1] x1 [degC]: " in comment
+    # Two question marks may begin a trigraph, one may not.
+    assert "ms? Ask; <U+003F>?/ and <U+003F><U+003F>? do not." in comment
+    assert "[1] x1 [degC?]: " in comment
     assert "[0] y [deg/s <U+002A>/]: " in comment
 
 
@@ -333,6 +371,7 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
 HOSTILE = [
     "*/ int x; /*",
     "??/",
+    "???/",
     'quote " and \\',
     "line\nbreak\r\n#error",
     "x" * 5000,

@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 from copy import deepcopy
+from dataclasses import astuple
 from functools import cache
 
 import numpy as np
@@ -17,6 +18,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
+from skanfis.export import export_c
 from skanfis.gyro import (
     GyroCompensator,
     OpenLoopArcsineRegressor,
@@ -26,6 +28,7 @@ from skanfis.gyro import (
 from skanfis.gyro._columns import ask
 from skanfis.gyro.c_code import export_c_compensator
 from skanfis.gyro.compensator import features
+from skanfis.gyro.compose import law_and_rules
 
 from ..export.c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from ..quick import quick
@@ -274,7 +277,7 @@ def test_header_of_a_compensator_says_units_and_how_inputs_are_made(log, tmp_pat
     assert "compensated rate: take it in the place of the raw rate" in text
     assert "subtract" not in text
     assert "[0] rate, in deg/s" in text
-    assert "in range: an arcsine, " in text
+    assert "at most: an arcsine, " in text
 
 
 def test_the_rate_of_the_temperature_is_made_as_the_header_says(log):
@@ -286,6 +289,21 @@ def test_the_rate_of_the_temperature_is_made_as_the_header_says(log):
         previous = temperature
         by_hand.append(rate)
     np.testing.assert_allclose(made, by_hand, atol=1e-15)
+
+
+def test_law_takes_what_its_degrees_do_besides_the_rules():
+    def besides(model):
+        """Exponentials, logarithms, square roots, multiplications and divisions."""
+        whole = export_c_physics(model, name="m").cost
+        rules = export_c(law_and_rules(model)[1].model, name="m").cost
+        return list(np.subtract(astuple(whole), astuple(rules))[:5])
+
+    # Degrees, the lag of the thermometer, the slope beyond the phase; sine and phase are divided.
+    assert besides(everything()[0]) == [0, 0, 0, 2 + 2 + 3 + 1 + 1, 2]
+    model, _ = whole()
+    law = model.base_
+    degrees = law.amplitude_.size + law.sagnac_factor_.size + law.bias_.size - 3
+    assert besides(model) == [0, 0, 0, degrees + (law.out_of_bounds == "linear"), 2]
 
 
 @pytest.mark.skipif(shutil.which("cppcheck") is None, reason="cppcheck is not installed")

@@ -281,7 +281,12 @@ def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
         (["--columns", "time=a", "time=b"], "time is given twice"),
         (["--units", "time=year"], "time has no unit 'year'"),
         (["--terms", "2,x"], "must be search, or numbers"),
-        (["--terms", "2,2"], "has 2 numbers for the 4 inputs"),
+        (["--terms", "2,2"], "has 2 numbers for 4 inputs: time, temperature, "),
+        (
+            ["--terms", "2", "--inputs", "time", "output"],
+            "has 1 number for 2 inputs: time, output.",
+        ),
+        (["--terms", "2,2", "--inputs", "output"], "has 2 numbers for 1 input: output."),
         (["--physics", "--inputs", "temperature"], "needs the output"),
         (["--inputs", "rate"], "invalid choice: 'rate'"),
         (["--terms", "99999999,1,1,1"], "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
@@ -483,6 +488,9 @@ def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, c
     wrong = ["--columns", "output=gyro_x", "--output", str(out)]
     assert main([*arguments, *wrong]) == 3
     assert "the log, column 'gyro_x' (output): does not follow the rate" in capsys.readouterr().err
+    wrong = ["--columns", "output=gyro_y", "rate=gyro_x", "--units", "output=deg/s", "rate=deg/s"]
+    assert main([*arguments, *wrong, "--output", str(out)]) == 3
+    assert "or the column 'gyro_x' of the rate, the wrong one?" in capsys.readouterr().err
     assert main([*arguments, "--output", str(out)]) == 0
     said, told = capsys.readouterr()
     assert "read 4 of 4" in told

@@ -141,6 +141,20 @@ def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth):
         np.testing.assert_allclose(reading.log["output"], -27_000.0 * truth["output"])
 
 
+@pytest.mark.parametrize("name", ["temperature_rate", "Temp rate", "rate_of_temperature"])
+def test_the_rate_of_a_temperature_is_no_rate_of_the_table(tmp_path, truth, name):
+    slope = np.gradient(truth["temperature"], 10.0)
+    noise = truth["rate_random_walk"]
+    table = truth[["time", "temperature", "output"]].assign(**{name: slope}, random_walk_rate=noise)
+    table.to_csv(tmp_path / "log.csv", index=False)
+    assert "rate" not in found(tmp_path / "log.csv").log
+    # Nor where the column of the rate is none of numbers: that is what is said.
+    commas = truth["rate"].map("{:.6f}".format).str.replace(".", ",")
+    table.assign(rate=commas).to_csv(tmp_path / "log.csv", index=False)
+    with pytest.raises(LogError, match=r"line 2, column 'rate': '-?\d+,\d{6}' is not a number"):
+        found(tmp_path / "log.csv")
+
+
 def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
     table = pd.DataFrame({"a": truth["temperature"], "b": truth["output"], "d": truth["rate"]})
     table.to_csv(tmp_path / "log.csv", index=False)

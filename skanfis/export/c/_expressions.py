@@ -66,7 +66,7 @@ def body_of(family, dialect, is_slope=False):
     return [dialect.write(line) for line in [*lines, f"return {texts[result]};"]]
 
 
-def cost_of(family):
-    """Exponentials, logarithms and multiplications that a value takes."""
-    operations = Counter(one.template for one in _steps(family))
-    return [operations[one] for one in ("$EXP({0})", "$LOG({0})", "{0} * {1}")]
+def cost_of(family, is_slope=False):
+    """Exponentials, logarithms, multiplications and divisions of log mu, or of its derivative."""
+    operations = Counter(one.template for one in _steps(family, is_slope))
+    return [operations[one] for one in ("$EXP({0})", "$LOG({0})", "{0} * {1}", "{0} / {1}")]

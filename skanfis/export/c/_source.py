@@ -21,39 +21,38 @@ _INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 
 @dataclass(frozen=True)
 class CCost:
-    """What one evaluation inside the box takes, and the memory of the function.
+    """What one evaluation takes at most, whatever the row, and the memory of the function.
+
+    The row that takes most lies outside the range, where the policy answers there, and is covered
+    by no rule. A row in range that its strongest rule covers takes much less.
 
     Parameters
     ----------
-    exponentials, logarithms : int
-        Calls of ``exp`` and ``log``, at most, coverage aside.
+    exponentials, logarithms, square_roots : int
+        Calls of ``exp``, ``log`` and ``sqrt``.
     multiply_adds, divisions : int
         Multiplications, most of them with an addition to follow; divisions.
     table_bytes, stack_bytes : int
         Constant tables, which may lie in read-only memory; arrays on the stack.
-    coverage_exponentials, coverage_square_roots, coverage_multiply_adds : int
-        What the coverage takes besides, at most. Where the strongest rule alone covers the row, it
-        is one quadratic form. Zero with ``min_coverage=None``.
 
     Examples
     --------
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.export import export_c
-    >>> model = ANFISRegressor(n_mfs=4).fit(*make_jang_sinc())
-    >>> export_c(model, name="sinc").cost.exponentials  # 2 inputs of 4 terms, not 16 rules
+    >>> model = ANFISRegressor(n_mfs=4, out_of_bounds="nan").fit(*make_jang_sinc())
+    >>> code = export_c(model, name="sinc", min_coverage=None)
+    >>> code.cost.exponentials  # 2 inputs of 4 terms, not 16 rules
     8
     """
 
     exponentials: int
     logarithms: int
+    square_roots: int
     multiply_adds: int
     divisions: int
     table_bytes: int
     stack_bytes: int
-    coverage_exponentials: int = 0
-    coverage_square_roots: int = 0
-    coverage_multiply_adds: int = 0
 
 
 class Source:
@@ -68,6 +67,8 @@ class Source:
         # Logarithms of terms, and the zero of "none".
         self.n_logarithms = self.n_terms + int((numbers.rule_terms == self.n_terms).any())
         self.facts = self._facts()
+        # Places at which tangents are found.
+        self.n_groups = 1 + int(max(numbers.tangent_group)) if "moves" in self.facts else 1
 
     def _facts(self):
         """What decides which lines there are."""
@@ -96,40 +97,61 @@ class Source:
         return {fact for fact, holds in facts.items() if holds}
 
     def cost(self):
-        """CCost of a row in the box."""
-        numbers, itemsize = self.numbers, self.numbers.dtype.itemsize
-        n_inputs = self.model.n_inputs
-        of_terms = [
-            len(terms.constants) * np.array(cost_of(terms.family)) for terms in numbers.terms
-        ]
-        exponentials, logarithms, multiply_adds = map(int, sum(of_terms, np.zeros(3)))
-        n_shares = self.n_terms if self.is_grid else self.model.n_rules
-        divisions = len(numbers.counts) if self.is_grid else 1
-        if self.is_tree:
-            # The place on the sigmoid, its other side, and what goes above and below.
-            n_shares, divisions = 0, self.n_terms // 2
-            exponentials, logarithms, multiply_adds = divisions, 0, 4 * divisions
-        # Of a grid, products of shares.
-        products = self.model.n_rules * max(len(numbers.counts or ()) - 1, 0)
+        """CCost of the row that takes most."""
+        numbers, itemsize, facts = self.numbers, self.numbers.dtype.itemsize, self.facts
+        n_inputs, of_value = self.model.n_inputs, numbers.coefficients.size
+        operations = self._strengths_cost()
+        operations += [0, 0, of_value, 0]
+        if "linear" in facts:
+            # Twice per coefficient: where the tangent starts, and along it.
+            tangent = self._strengths_cost(is_slope=True)
+            tangent += [0, 0, 2 * of_value, 0]
+            tangent += self._strengths_cost() * ("moves" in facts)
+            operations += self.n_groups * tangent
+            # The scale: per input what it adds and what it divides, and it is taken back.
+            operations += [0, 0, n_inputs + self.model.n_outputs, n_inputs]
+        if "fades" in facts:
+            # Per input its deviation and the square, then the exponential of half their sum.
+            operations += [1, 0, 2 * n_inputs + 2, 0]
         # The strongest rule is asked, then all that have data.
-        asked = "covers" in self.facts and 1 + int(np.count_nonzero(numbers.support[:, 0]))
-        main, tangent = self.arrays()
-        n_values = sum(main.values()) + ("linear" in self.facts) * sum(tangent.values())
-        tables = self.tables().values()
+        asked = int("covers" in facts and 1 + np.count_nonzero(numbers.support[:, 0]))
+        # The factor's triangle, its square, share and strength.
+        operations += [asked, 0, asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5), 0]
+        main, own = self.arrays()
+        n_held = sum(main.values()) + ("linear" in facts) * sum(own.values())
+        exponentials, logarithms, multiply_adds, divisions = map(int, operations)
         return CCost(
-            exponentials=exponentials + n_shares,
+            exponentials=exponentials,
             logarithms=logarithms,
-            multiply_adds=multiply_adds + products + n_shares + numbers.coefficients.size,
+            square_roots=asked,
+            multiply_adds=multiply_adds,
             divisions=divisions,
             table_bytes=sum(
-                values.size * _INDEX_BYTES.get(kind, itemsize) for values, kind in tables
+                values.size * _INDEX_BYTES.get(kind, itemsize)
+                for values, kind in self.tables().values()
             ),
-            stack_bytes=n_values * itemsize,
-            coverage_exponentials=int(asked),
-            coverage_square_roots=int(asked),
-            # The factor's triangle, its square, share and strength.
-            coverage_multiply_adds=asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5),
+            stack_bytes=n_held * itemsize,
         )
+
+    def _strengths_cost(self, is_slope=False):
+        """Exponentials, logarithms, multiplications and divisions of what ``_strengths`` writes."""
+        numbers, counts = self.numbers, self.numbers.counts
+        if self.is_tree:
+            # The place on the sigmoid, its other side, and what goes above and below.
+            return self.n_terms // 2 * np.array([1, 0, 4 + is_slope, 1])
+        operations = np.zeros(4, dtype=int)
+        for terms in numbers.terms:
+            operations += len(terms.constants) * np.array(cost_of(terms.family, is_slope))
+        n_shares = self.n_terms if self.is_grid else self.model.n_rules
+        if is_slope:
+            # Along e, and less their mean.
+            operations += [0, 0, self.n_terms + n_shares, 0]
+            return operations
+        # Of a grid, products of shares; one division for each sum.
+        products = numbers.rule_terms.size if counts else 0
+        n_sums = len(counts) if self.is_grid else 1
+        operations += [n_shares, 0, n_shares + products, n_sums]
+        return operations
 
     def text(self, include):
         """All of it; ``include`` is the name of the header."""
@@ -150,9 +172,7 @@ class Source:
             "tangent_given": "const $real *at, const $real *way, $int g"
             if "moves" in self.facts
             else ", ".join(f"const $real *{name}" for name in [*taken, "e"]),
-            "n_groups": str(1 + np.max(self.numbers.tangent_group, initial=0))
-            if "moves" in self.facts
-            else "1",
+            "n_groups": str(self.n_groups),
             "tangent_indices": ", ".join(["i"] * (self.n_terms > 0) + indices),
             "tangent_arrays": _declared(tangent),
             "arrays": _declared(main),

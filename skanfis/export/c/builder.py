@@ -85,17 +85,12 @@ def header(numbers, dialect, cost, min_coverage, limits, units=None, notes=()):
 
 
 def cost_lines(cost, besides=""):
-    """What an evaluation takes, and the memory; ``besides`` comes first."""
+    """What an evaluation takes at most, and the memory; ``besides`` comes first."""
     yield (
-        f"Per evaluation in range: {besides}{cost.exponentials} exponentials, {cost.logarithms} "
-        f"logarithms, {cost.multiply_adds} multiply-adds, {cost.divisions} divisions."
+        f"Per evaluation, whatever the row, at most: {besides}{cost.exponentials} exponentials, "
+        f"{cost.logarithms} logarithms, {cost.square_roots} square roots, "
+        f"{cost.multiply_adds} multiply-adds, {cost.divisions} divisions."
     )
-    if cost.coverage_multiply_adds:
-        yield (
-            f"Coverage takes at most {cost.coverage_exponentials} exponentials, "
-            f"{cost.coverage_square_roots} square roots and {cost.coverage_multiply_adds} "
-            "multiply-adds more; where the strongest rule covers the row, a small part of them."
-        )
     yield f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack."
 
 

@@ -135,12 +135,12 @@ def comment(text):
     """Any name as something that cannot end a comment, continue a line or make a trigraph."""
     text = str(text)
     rest = "..." if len(text) > _LONGEST_COMMENT else ""
-    return _escaped(r"[^ -~]|[*?\\]", text[:_LONGEST_COMMENT]) + rest
+    return _escaped(r"[^ -~]|[*\\]|\?(?=\?)", text[:_LONGEST_COMMENT]) + rest
 
 
 def remark(text):
     """A text of any length for a comment, in which a star may multiply."""
-    return _escaped(r"[^ -~]|[?\\]|\*(?=/)|(?<=/)\*", text)
+    return _escaped(r"[^ -~]|\\|\?(?=\?)|\*(?=/)|(?<=/)\*", text)
 
 
 def _escaped(unsafe, text):
