@@ -143,6 +143,21 @@ class Constraints:
         for point, value in zip(self.points, self.values, strict=True):
             if not np.isfinite(point).all() or not np.isfinite(value).all():
                 raise ValueError(f"FixedPoint({point}, {value}) must be of finite numbers.")
+            if (value <= self.lower).any() or (value >= self.upper).any():
+                raise ValueError(
+                    f"FixedPoint({point}, {value}) is not within the OutputLimits "
+                    f"{self.lower} to {self.upper}: leave some room between."
+                )
+            for k, signs in enumerate(self.signs):
+                way, free = self.points - point, signs == 0
+                is_above = (way[:, free] == 0.0).all(axis=1) & (way * signs >= 0.0).all(axis=1)
+                is_above &= way.any(axis=1) & (self.values[:, k] < value[k])
+                for other in np.flatnonzero(is_above):
+                    raise ValueError(
+                        f"monotonic_cst and constraints contradict one another: output {k} is "
+                        f"fixed to {value[k]:g} at {point}, and to {self.values[other, k]:g} at "
+                        f"{self.points[other]}, where it must not be less."
+                    )
 
 
 def _signs(given, input_names, n_outputs):

@@ -58,6 +58,12 @@ def has_training_data(model):
     return bool(np.any(model.rule_rows))
 
 
+def parts_led(model):
+    """Of the training rows, on which each rule is the strongest; without data, its weight."""
+    rows = model.rule_rows
+    return rows / rows.sum() if has_training_data(model) else model.rule_weights
+
+
 def readability_in_training(estimator, model):
     """The fit's ``readability_`` in the names of ``model``, the whole; None where there is none."""
     last = None if isinstance(estimator, TSKModel) else last_step(estimator)

@@ -15,6 +15,7 @@ from ..policies import policy_in_words
 from .rules import (
     condition,
     has_training_data,
+    parts_led,
     premise_texts,
     readability_in_training,
     rename,
@@ -158,7 +159,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     premises = premise_texts(model, said.levels)
     cells: dict = {}
     if has_training_data(model):
-        cells["data", "rows"] = [_share(model, r) for r in chosen]
+        cells["data", "rows"] = [percent(part) for part in parts_led(model)[chosen]]
         if found is not None:
             fires = model.rule_rows > 0
             cells["data", "error"] = [_errors(found, r) if fires[r] else "" for r in chosen]
@@ -228,12 +229,13 @@ def _on_rows(model, found, r):
         return []
     if not model.rule_rows[r]:
         return ["strongest on no row"]
-    share = [f"strongest on {_share(model, r)} of the rows"]
+    share = [f"strongest on {percent(parts_led(model)[r])} of the rows"]
     return share if found is None else [*share, f"errs by {_errors(found, r)} there"]
 
 
-def _share(model, r):
-    share = 100.0 * model.rule_rows[r] / model.rule_rows.sum()
+def percent(part):
+    """Write "48 %", "6.5 %"."""
+    share = 100.0 * part
     return f"{share:{'.0f' if share >= 10.0 else '.2g'}} %"
 
 

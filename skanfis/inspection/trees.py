@@ -11,9 +11,9 @@ from ..export import fold
 from ..model import TSKModel
 from .displays import _position, _pyplot, _section
 from .labels import as_label, title_of
-from .rules import condition, has_training_data, writable
+from .rules import condition, parts_led, writable
 from .sentences import Sentences
-from .text import plain
+from .text import percent, plain
 
 # Inches: of a letter, of a leaf, around the tree.
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
@@ -100,16 +100,10 @@ class TreeDisplay:
         return self._said.values[:, self.output]
 
     @property
-    def _shares(self):
-        """Of every leaf, the part of the rows on which its rule is the strongest."""
-        rows = self.model.rule_rows
-        return rows / rows.sum() if has_training_data(self.model) else self.model.rule_weights
-
-    @property
     def leaves(self) -> list[str]:
         """Of every leaf, what stands at it."""
         values = [plain(value) for value in self.values]
-        shares = [f"{100.0 * share:.2g} %" for share in self._shares]
+        shares = map(percent, parts_led(self.model))
         return [f"{value}  ({share})" for value, share in zip(values, shares, strict=True)]
 
     def plot(self, *, ax: Any = None) -> Self:
@@ -127,7 +121,7 @@ class TreeDisplay:
         words = np.reshape(list(map(condition, names, model.term_names)), (2, -1)).T[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
-        share = np.concatenate([self._shares, np.zeros(n_rules - 1)])
+        share = np.concatenate([parts_led(model), np.zeros(n_rules - 1)])
         for k, pair in enumerate(ends):
             depth[pair] = depth[n_rules + k] + 1.0
         # What is above a cut stands above what is below it.
