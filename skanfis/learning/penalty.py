@@ -62,11 +62,14 @@ class Penalty:
     slope_pulls: dict[int, float] = field(default_factory=dict)
     # Inputs, and the rules that have one slope by each.
     common: tuple[tuple[int, tuple[int, ...]], ...] = ()
+    # Inputs, and the rules that have no slope by each.
+    absent: tuple[tuple[int, tuple[int, ...]], ...] = ()
 
     @property
     def n_held(self):
         """How many coefficients less there are: of every common slope, one is left."""
-        return sum(len(rules) - 1 for _, rules in self.common)
+        n_common = sum(len(rules) - 1 for _, rules in self.common)
+        return n_common + sum(len(rules) for _, rules in self.absent)
 
     @property
     def rho(self):
@@ -193,27 +196,31 @@ class CommonLine:
 
     def free(self, penalty: Penalty):
         """Orthonormal columns that u is made of, (n_columns, n_free); None where it is any."""
-        if not penalty.common:
+        held = penalty.common, penalty.absent
+        if not any(held):
             return None
-        if penalty.common not in self._free:
-            is_free, shared = np.ones(self.height.size, dtype=bool), []
+        if held not in self._free:
+            columns, is_free = np.eye(self.height.size), np.ones(self.height.size, dtype=bool)
             for j, rules in penalty.common:
-                k = self._function[j]
-                own = np.array(rules) * self._n_basis + 1 + k
-                is_free[own] = False
+                own = self._places(j, rules)
                 # Slopes per unit of z are one: local ones are as the units.
-                column = np.zeros(self.height.size)
-                column[own] = 1.0 / self._per_unit[list(rules), k]
-                shared.append(column / np.linalg.norm(column))
-            columns = np.concatenate([np.eye(self.height.size)[is_free], shared])
-            self._free[penalty.common] = np.ascontiguousarray(columns.T)
-        return self._free[penalty.common]
+                shared = 1.0 / self._per_unit[list(rules), self._function[j]]
+                columns[own[0], own] = shared / np.linalg.norm(shared)
+                is_free[own[1:]] = False
+            for j, rules in penalty.absent:
+                is_free[self._places(j, rules)] = False
+            self._free[held] = np.ascontiguousarray(columns[is_free].T)
+        return self._free[held]
+
+    def _places(self, j, rules):
+        """Of the slopes by an input of some rules, in u."""
+        return np.array(rules) * self._n_basis + 1 + self._function[j]
 
     def of_slopes(self, j, rules):
         """Slopes by an input of some rules out of u, per unit of z times a typical extent."""
-        k = self._function[j]
         found = np.zeros((rules.size, self.height.size))
-        found[np.arange(rules.size), rules * self._n_basis + 1 + k] = self._per_unit[rules, k]
+        per_unit = self._per_unit[rules, self._function[j]]
+        found[np.arange(rules.size), self._places(j, rules)] = per_unit
         return found
 
     def contrasts(self, j, rules):

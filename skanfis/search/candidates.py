@@ -35,7 +35,7 @@ class Candidate:
     counts: tuple[int, ...]
     n_clusters: int = 0  # of scattered rules
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
-    has_common_slopes: bool = False  # where the evidence asks for no more
+    has_sparse_slopes: bool = False  # where the evidence asks for no more
 
     @property
     def kind(self):
@@ -66,7 +66,7 @@ class Candidate:
         if not self.is_grid:
             words = "tree of {} rules" if self.splits else "{} scattered rules"
         words = "one rule" if self.n_rules == 1 else words.format(self.n_rules)
-        return words + (", slopes in common" if self.has_common_slopes else "")
+        return words + (", sparse slopes" if self.has_sparse_slopes else "")
 
     def with_more_terms(self, j):
         """The grid with one more term on an input."""

@@ -56,7 +56,7 @@ class StructureSearch:
         most = tolerated(best.squared_error, variance, self.simplicity)
         # Only there: with two looks at every size, chance would have two.
         for one in within(self.judged, best, most):
-            self._judge_common_slopes(one, variance)
+            self._judge_sparse_slopes(one, variance)
         found = chosen(within(self.judged, best, most))
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
@@ -82,14 +82,12 @@ class StructureSearch:
             if self.judges.prefer(now, best):
                 best, n_further = now, 0
 
-    def _judge_common_slopes(self, one, variance):
-        """Judge a candidate with slopes in common; it counts where its rules, one by one, hold."""
-        if one.candidate.n_rules == 1:
-            return
-        in_folds = [replace(like, has_common_slopes=True) for like in self.in_folds[one.candidate]]
-        simpler = self._judge(replace(one.candidate, has_common_slopes=True), in_folds)
+    def _judge_sparse_slopes(self, one, variance):
+        """Judge a candidate with fewer slopes; it counts if there are, and its rules hold alone."""
+        in_folds = [replace(like, has_sparse_slopes=True) for like in self.in_folds[one.candidate]]
+        simpler = self._judge(replace(one.candidate, has_sparse_slopes=True), in_folds)
         most = tolerated(one.squared_error_of_rules, variance, self.simplicity)
-        if simpler.squared_error_of_rules > max(most, variance):
+        if simpler.cost == one.cost or simpler.squared_error_of_rules > max(most, variance):
             self.judged.remove(simpler)
 
     def _judge(self, candidate, in_folds):

@@ -30,8 +30,8 @@ from .tuning import (
     settled,
     tune,
     tune_unbounded,
-    with_common_slopes,
     with_most_agreement,
+    with_sparse_slopes,
 )
 
 # What terms without bounds must leave of the expected squared error: nearer, chance decides.
@@ -95,7 +95,7 @@ def tuned_start(
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_free = freed, True
-    left, simpler = 1.0, with_common_slopes(best, free)
+    left, simpler = 1.0, with_sparse_slopes(best, free)
     error = min(best.expected_error, simpler.expected_error)
     if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))

@@ -26,7 +26,7 @@ from .candidates import Candidate, RuleBases, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
 from .splits import best_splits
-from .tuning import FIRST_STEPS, Tuned, tune, with_common_slopes
+from .tuning import FIRST_STEPS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters, and at least.
 _ROWS_EACH, _FEWEST_ROWS = 40, 1000
@@ -170,9 +170,9 @@ class Trials:
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
         if candidate not in self._found:
-            if candidate.has_common_slopes:
-                trained = self.tuned(replace(candidate, has_common_slopes=False))
-                found = with_common_slopes(trained, self.plan.free)
+            if candidate.has_sparse_slopes:
+                trained = self.tuned(replace(candidate, has_sparse_slopes=False))
+                found = with_sparse_slopes(trained, self.plan.free)
             else:
                 found = self._train(candidate, begun=self._begun[candidate])
             self._found[candidate] = found

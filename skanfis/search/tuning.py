@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ..learning.common_slopes import common_slopes
 from ..learning.evidence import (
     PRIOR_DISPLACEMENT,
     Laplace,
@@ -28,6 +27,7 @@ from ..learning.evidence import (
 from ..learning.objective import Evaluation, SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
+from ..learning.sparse_slopes import sparse_slopes
 from ..learning.varpro import varpro
 from ..reading_cost import reading_cost
 
@@ -290,13 +290,13 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
     return best if best is tuned else replace(best, agreement_is_raised=True)
 
 
-def with_common_slopes(tuned: Tuned, free) -> Tuned:
-    """The same with one slope for as many rules as the evidence allows, by every input."""
-    problem, is_line = tuned.problem, tuned.problem.antecedent.n_rules == 1
-    if is_line or "alpha" not in free or problem.n_columns > MOST_COLUMNS:
+def with_sparse_slopes(tuned: Tuned, free) -> Tuned:
+    """The same with as few slopes as the evidence allows: one for several rules, or none."""
+    problem = tuned.problem
+    if not {"alpha", "slope"} <= set(free) or problem.n_columns > MOST_COLUMNS:
         return tuned
-    common = common_slopes(tuned.posterior, tuned.solved.normal.coefficients)
-    penalty, n_rows = replace(tuned.penalty, common=common), tuned.posterior.n_rows
+    common, absent = sparse_slopes(tuned.posterior, tuned.solved.normal.coefficients)
+    penalty, n_rows = replace(tuned.penalty, common=common, absent=absent), tuned.posterior.n_rows
     posterior = _improved(
         problem,
         tuned.evaluation,

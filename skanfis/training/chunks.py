@@ -356,6 +356,9 @@ class Solved:
 def fitted_weights(estimator, sums: RowSums):
     """The weights of the penalty that a fit to these rows has found, times rows, in plain types."""
     place, n_rows = list(sums.base.input_names).index, sums.effective_weight
+    model = estimator.model_
+    is_absent = (model.coefficients[:, 1:] == 0.0).all(axis=2)
+    varying = sums.consequent_inputs[(model.maximum > model.minimum)[sums.consequent_inputs]]
     return {
         "agreement": n_rows * estimator.agreement_,
         "alpha": n_rows * estimator.alpha_,
@@ -366,8 +369,13 @@ def fitted_weights(estimator, sums: RowSums):
         "slope_pulls": [[place(name), pull] for name, pull in estimator.slope_pulls_.items()],
         "common": [
             [j, np.flatnonzero(rules).tolist()]
-            for j, rules in enumerate(estimator.model_.common_slopes.T)
+            for j, rules in enumerate(model.common_slopes.T)
             if rules.any()
+        ],
+        "absent": [
+            [int(j), np.flatnonzero(is_absent[:, j]).tolist()]
+            for j in varying
+            if is_absent[:, j].any()
         ],
     }
 
@@ -386,8 +394,9 @@ def solve(sums: RowSums, given, first=None) -> Solved:
         if "alpha" not in given:
             found["pulls"] = {tuple(component): pull for component, pull in first["pulls"]}
             found["slope_pulls"] = dict(first["slope_pulls"])
-            # Slopes that rules have in common stay so.
-            found["common"] = tuple((j, tuple(rules)) for j, rules in first["common"])
+            # Slopes that rules have in common, or have not, stay so.
+            for key in ("common", "absent"):
+                found[key] = tuple((j, tuple(rules)) for j, rules in first[key])
         given = found | given
     free = [key for key in _FREE if key not in given]
     problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))

@@ -122,7 +122,7 @@ class _Fit:
             start = self.request.for_all(start, rows.sample, rows)
         if not self.solver.goes_on_from_tuning:
             # Nor do descents keep slopes in common: every rule has its own.
-            penalty = replace(start.penalty, common=())
+            penalty = replace(start.penalty, common=(), absent=())
             start = replace(start, displacement=None, penalty=penalty)
         if self.printer is not None:
             self.printer.tell_start(start)

@@ -1,4 +1,4 @@
-r"""Slopes that are common to several rules: those of which the evidence asks no more.
+r"""Slopes that several rules have in common, and slopes of zero: where the evidence asks no more.
 
 With M and P of ``evidence``, the consequents of an output have the posterior N(m, V), V = sigma^2 /
 n M^-1, and before the data N(0, V0), V0 = sigma^2 / n P^-1. That some rules have one slope by an
@@ -7,8 +7,9 @@ what it takes from the evidence is
 
     -2 log p(C u = 0 | data) / p(C u = 0)  =  (C m)' (C V C')^-1 C m + log |C V C'| - log |C V0 C'|
 
-at a given sigma. So one factorisation tells of every input and of every set of rules. What is found
-is conditioned on before the next is asked for.
+at a given sigma. With C the slope that they have in common, or that of a single rule, it says that
+there is none. So one factorisation tells of every input and of every set of rules. What is found is
+conditioned on before the next is asked for; the inputs of which the rules say least come first.
 """
 
 import numpy as np
@@ -16,16 +17,17 @@ from scipy import linalg
 
 from .evidence import Laplace
 
-# What a slope of its own must be worth of the evidence, in -2 log p: as much as a parameter costs
-# by Akaike's criterion.
+# What a number must be worth of the evidence, in -2 log p: as much as a parameter costs by Akaike's
+# criterion.
 _WORTH = 2.0
 _TINY = np.finfo(float).tiny
 
 
-def common_slopes(posterior: Laplace, coefficients):
-    """Inputs, and the rules that have one slope by each, as ``Penalty.common``.
+def sparse_slopes(posterior: Laplace, coefficients):
+    """Inputs, and the rules that have one slope by each; and those that have none.
 
-    ``coefficients`` are the local ones, (n_columns, n_outputs).
+    They are ``Penalty.common`` and ``Penalty.absent``; ``coefficients`` are the local ones,
+    (n_columns, n_outputs).
     """
     line, unit = posterior.line, posterior.noise_variance / posterior.n_rows
     identity, n_outputs = np.eye(len(coefficients)), coefficients.shape[1]
@@ -33,18 +35,28 @@ def common_slopes(posterior: Laplace, coefficients):
         unit * half.T @ half
         for half in (factor.half_solve(identity) for factor in (posterior.prior, posterior.factor))
     )
-    state, every, found = [coefficients, after, before], np.arange(line.n_rules), []
-    whole = [_loss(state, line.contrasts(j, every)) for j in line.slopes]
+    state, every, common, absent = [coefficients, after, before], np.arange(line.n_rules), [], []
+    whole = [_loss(state, line.of_slopes(j, every)) for j in line.slopes]
     for k in np.argsort(whole, kind="stable"):
         j, rules = line.slopes[k], every
         while rules.size > 1:
             contrasts = line.contrasts(j, rules)
             if _loss(state, contrasts) < _WORTH * contrasts.shape[0] * n_outputs:
-                found.append((j, tuple(rules.tolist())))
-                state = _given(state, contrasts)
                 break
             rules = np.delete(rules, _farthest(state, line.of_slopes(j, rules)))
-    return tuple(sorted(found))
+        if rules.size > 1:
+            state = _given(state, contrasts)
+        else:
+            # Of two that differ neither is the farther one: the rule that can do without it best.
+            alone = [_loss(state, line.of_slopes(j, rule)) for rule in every[:, None]]
+            rules = every[[int(np.argmin(alone))]]
+        slope = line.of_slopes(j, rules[:1])
+        if _loss(state, slope) < _WORTH * n_outputs:
+            absent.append((j, tuple(rules.tolist())))
+            state = _given(state, slope)
+        elif rules.size > 1:
+            common.append((j, tuple(rules.tolist())))
+    return tuple(sorted(common)), tuple(sorted(absent))
 
 
 def _loss(state, contrasts):
