@@ -17,8 +17,8 @@ from sklearn.utils.estimator_checks import estimator_checks_generator
 from skanfis import ANFISRegressor
 from skanfis.intervals import ConformalRegressor
 from skanfis.intervals._scores import (
+    final_step,
     group_scores,
-    last_step,
     one_row_per_group,
     row_masses,
     score_quantile,
@@ -154,7 +154,7 @@ def test_leave_one_out_is_that_of_refits(weighting):
     root = np.sqrt(w)
     beta = np.linalg.lstsq(root[:, None] * A, root * y, rcond=None)[0]
     noise = np.sqrt(np.sum(w * (y - A @ beta) ** 2) / (w.sum() - 3.0))
-    assert_allclose(last_step(model.estimator_)[0].noise_std_, noise, rtol=1e-8)
+    assert_allclose(final_step(model.estimator_)[0].noise_std_, noise, rtol=1e-8)
     expected, residuals = [], []
     for i in range(25):
         rest, own = np.delete(A, i, axis=0), np.delete(w, i)
