@@ -301,11 +301,6 @@ class TestAsRuleTable:
             model = rule_bases.MODELS[f"{name}, order 1, 1 outputs"]
             assert model.as_rule_table() is model
 
-    def test_three_cuts_of_an_input_on_a_path_are_refused_by_name(self):
-        found = rule_bases.a_tree().split(0, 0, 1.4, -2.0)
-        with pytest.raises(ValueError, match=r"Rule 0 has 3 terms of 'time' \(at"):
-            rule_bases.build(found).as_rule_table()
-
 
 @pytest.mark.parametrize("counts", [(2, 2), (3, 2)])
 def test_apply_gives_the_strongest_rule_and_of_equals_the_first(counts):

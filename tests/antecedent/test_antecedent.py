@@ -103,18 +103,19 @@ def test_without_terms_one_rule_always_fires(Z):
         assert_array_equal(same.strengths(Z), np.ones((1, 60)))
 
 
-@pytest.mark.parametrize("kind", ["grid", "scattered", "table"])
+@pytest.mark.parametrize("kind", ["grid", "scattered", "table", "tree"])
 def test_the_rest_fires_as_before_in_proportion(kind, rng):
     g, Z = np.random.default_rng(1), rng.normal(size=(3, 50))
     antecedent = {
         "grid": lambda: oracles.random_grid(g, [Gaussian, Bell, Gaussian], [2, 3, 2]),
         "scattered": lambda: oracles.random_scattered(g, Gaussian, 5, [0, 1, 2]),
         "table": lambda: oracles.random_table(g),
+        "tree": lambda: oracles.random_tree(g),
     }[kind]()
     left, terms = antecedent.without_rules([0, 3])
     kept = np.setdiff1d(np.arange(antecedent.n_rules), [0, 3])
     before = antecedent.strengths(Z)[kept]
-    assert isinstance(left, RuleTableAntecedent)
+    assert type(left) is RuleTableAntecedent
     assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-9)
     assert terms.size == left.n_terms
 

@@ -158,15 +158,6 @@ def test_a_walk_from_the_root_meets_every_place_once(n_rules, rng):
     assert_allclose(come[:n_rules], found.strengths(Z), rtol=1e-9, atol=1e-14)
 
 
-def test_without_some_leaves_the_others_are_a_table(rng):
-    Z, found = rng.normal(size=(3, 100)), tree(6)
-    left, terms = found.without_rules([1, 4])
-    assert type(left) is RuleTableAntecedent
-    before = found.strengths(Z)[[0, 2, 3, 5]]
-    assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-9)
-    assert terms.size == left.n_terms
-
-
 class TestOneTermEach:
     """Sides of an input on one path as one term."""
 

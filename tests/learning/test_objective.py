@@ -4,12 +4,9 @@ The points at which they are compared are far from any optimum. Gradients are co
 dense cost, with beta eliminated inside it: nothing is left out of the derivative.
 """
 
-from multiprocessing.pool import ThreadPool
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from threadpoolctl import threadpool_limits
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.learning import data as rows
@@ -196,27 +193,6 @@ def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
     assert len(split.rows.chunks(split.problem._block_rows)) > 10
     for one, other in zip(arrays(*split.at_point()), whole, strict=True):
         assert_all_close(one, other, 1e-9)
-
-
-def pool_map(function, items):
-    with ThreadPool(3) as pool:
-        yield from pool.imap(function, items)
-
-
-def backward_map(function, items):
-    """The last chunk is done first, but handed over last."""
-    return reversed([function(item) for item in reversed(items)])
-
-
-@pytest.mark.parametrize("map_ordered", [pool_map, backward_map])
-@pytest.mark.parametrize("name", ["grid of both", "scattered"])
-def test_workers_change_not_one_bit(monkeypatch, name, map_ordered):
-    many_small_chunks(monkeypatch)
-    alone = Case.named(name)
-    shared = Case(alone.problem.antecedent, alone.order, alone.rows, map_ordered=map_ordered)
-    with threadpool_limits(limits=1, user_api="blas"):
-        for one, other in zip(arrays(*shared.at_point()), arrays(*alone.at_point()), strict=True):
-            assert_array_equal(one, other)
 
 
 def test_reference_coefficients_do_not_change_the_answer(case, rng):

@@ -82,14 +82,6 @@ class TestWeightOfAgreement:
             own.fit(model.basis.T, model.y, sample_weight=w * model.share)
             assert_allclose(solved[r], own.coef_.T, rtol=1e-6, atol=1e-8)
 
-    def test_at_zero_it_is_the_regression_on_the_design(self, kind, order):
-        model = Model(kind, order, 2)
-        solved = model.evaluate(Penalty()).coefficients
-        design = (model.w[:, None] * model.basis).reshape(-1, 200).T
-        root = np.sqrt(model.share)[:, None]
-        expected, *_ = np.linalg.lstsq(root * design, root * model.y, rcond=None)
-        assert_allclose(design @ solved, design @ expected, atol=1e-7)
-
     def test_without_end_all_rules_are_one_line(self, kind, order):
         model = Model(kind, order, 2)
         solved = model.evaluate(Penalty(agreement=1e7)).coefficients.reshape(model.beta.shape)
