@@ -12,7 +12,6 @@ from sklearn.linear_model import BayesianRidge, LinearRegression
 from sklearn.model_selection import GroupKFold, KFold, ShuffleSplit
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
-from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import ANFISRegressor
 from skanfis.intervals import ConformalRegressor
@@ -338,19 +337,3 @@ def test_fit_that_is_interrupted_leaves_what_was_there(monkeypatch):
         model.fit(np.hstack([X, X**2]), y)
     assert vars(model) == before | {"cv": 4}
     assert len(model.predict_interval(X)[0]) == 40
-
-
-CHECKED = ConformalRegressor(ANFISRegressor(n_mfs=1, alpha=0.1), cv=2)
-
-
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning")
-@pytest.mark.parametrize(
-    ("estimator", "check"),
-    [
-        pytest.param(estimator, check, id=getattr(check, "func", check).__name__)
-        for estimator, check in estimator_checks_generator(CHECKED)
-    ],
-)
-def test_estimator_passes_the_checks_of_scikit_learn(estimator, check):
-    check(estimator)
