@@ -111,16 +111,6 @@ def test_model_about_its_reference_keeps_the_digits_that_the_textbook_form_loses
 
 
 @ALL
-def test_consequents_are_those_of_the_rules(frozen, rng):
-    X = inside(frozen, rng, 5)
-    by_rule = np.stack([p[0] + X @ p[1:] for p in frozen.consequents])
-    a, b = frozen.coefficients[:, :1], frozen.coefficients[:, 1:]
-    expected = a + (np.einsum("nj,rjo->rno", X - frozen.reference, b) if frozen.order else 0.0)
-    assert_allclose(by_rule, np.broadcast_to(expected, by_rule.shape), rtol=1e-11, atol=1e-12)
-    assert frozen.consequents.shape == (frozen.n_rules, 4, frozen.n_outputs)
-
-
-@ALL
 def test_blocks_give_what_the_whole_gives(frozen, rng, monkeypatch):
     X = around(frozen, rng, 333)
     answers = [

@@ -82,13 +82,6 @@ def test_parameters_make_the_round_trip(antecedent, Z, rng):
     )
 
 
-def test_two_gaussians_of_one_width_share_by_a_logistic_curve(Z):
-    # nu_2 / nu_1 = exp((c_2 - c_1) (z - (c_1 + c_2) / 2) / sigma^2)
-    theta = np.array([[-1.0, 2.0], np.log([1.5, 1.5])])
-    strengths = GridAntecedent.build([Gaussian], [1], [theta]).strengths(Z)
-    assert_allclose(strengths[1], 1 / (1 + np.exp(-3.0 * (Z[1] - 0.5) / 2.25)), rtol=1e-12)
-
-
 def test_without_terms_one_rule_always_fires(Z):
     antecedent = no_terms()
     assert_array_equal(antecedent.strengths(Z), np.ones((1, 60)))

@@ -69,25 +69,6 @@ def test_a_split_leaves_the_other_leaves_as_they_are(rng):
     assert split.paths[3] == [*whole.paths[2], (4, False)]
 
 
-def test_a_node_moves_the_output_by_what_stands_above_and_below_it(rng):
-    # d yhat / d z_n = (1 - s_n) sum_above w_r f_r - s_n sum_below w_r f_r
-    Z, found = rng.normal(size=(3, 80)), tree(8)
-    f = rng.normal(size=(8, 80))
-    log_mu = found.log_memberships(Z)
-    truth = np.exp(log_mu[:7])
-    strengths, shares = found.normalise(log_mu)
-    by_term = found.term_sensitivity(strengths * f, (strengths * f).sum(axis=0), shares)
-    # log s and log (1 - s) move by 1 - s and by -s.
-    chained = (1.0 - truth) * by_term[:7] - truth * by_term[7:]
-    for n in range(7):
-        sums = [
-            sum((strengths[r] * f[r] for r, path in enumerate(found.paths) if (n, up) in path))
-            for up in (True, False)
-        ]
-        expected = (1.0 - truth[n]) * sums[0] - truth[n] * sums[1]
-        assert_allclose(chained[n], expected, rtol=1e-10, atol=1e-12)
-
-
 @pytest.mark.theory
 @pytest.mark.parametrize("agreement", [0.0, 0.05])
 @pytest.mark.parametrize(("order", "n_outputs"), [(1, 1), (0, 2)])

@@ -149,25 +149,6 @@ def test_gauss_newton_is_the_schur_complement(case):
     assert_all_close(linearisation.gauss_newton, linearisation.gauss_newton.T, 1e-14)
 
 
-@pytest.mark.theory
-def test_gauss_newton_is_the_curvature_where_the_model_fits_exactly(rng):
-    # Without residuals the second derivatives of the model drop out: H is the Hessian itself.
-    antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 2])
-    X = rng.normal(size=(60, 2))
-    plain = StandardisedData.of(X, X)
-    Z = plain.inputs.apply(X.T, np.empty((2, 60)))
-    phi = oracles.dense_design(antecedent, antecedent.parameters, Z, 1)
-    exact = StandardisedData.of(X, phi @ rng.normal(size=(phi.shape[1], 1)))
-    problem = SeparableProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
-    at = antecedent.parameters
-    evaluation = problem.evaluate(at)
-    evaluation = problem.evaluate(at, evaluation.coefficients)
-    assert evaluation.mean_squared_error < 1e-18
-    dense = oracles.DenseProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
-    hessian = oracles.central_difference(dense.gradient, at, 1e-3)
-    assert_all_close(problem.linearise(evaluation).gauss_newton, hessian, 1e-5)
-
-
 @pytest.mark.parametrize("alpha", [1e-6, 1e-8, 1e-10])
 def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
     # Solving with one factorisation and projecting with another is 4 % wrong here (anchors.md).
