@@ -46,11 +46,7 @@ class Start:
 
     def data(self):
         log = make_ofog(
-            n_devices=1,
-            n_runs=_N_RUNS,
-            max_residual_heat=0.0,
-            rates=[0.0],
-            random_state=self.seed,
+            n_devices=1, n_runs=_N_RUNS, max_residual_heat=0.0, rates=[0.0], random_state=self.seed
         )
         log = with_thermal_rate(log).iloc[::_EVERY_ROW]
         return log[_STARTS].to_numpy(), log["error"].to_numpy(), log["run"].to_numpy()

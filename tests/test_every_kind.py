@@ -13,18 +13,10 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.antecedent import (
-    GridAntecedent,
-    ScatteredAntecedent,
-    TreeAntecedent,
-)
+from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, gradient_bounds, monotonicity
 from skanfis.exceptions import ForgottenRowsWarning
-from skanfis.export import (
-    export_json,
-    fold,
-    read_json,
-)
+from skanfis.export import export_json, fold, read_json
 from skanfis.export.json_reader import parse_json
 from skanfis.learning import VariableProjection
 

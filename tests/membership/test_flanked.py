@@ -5,11 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent
-from skanfis.membership.flanked import (
-    PiShaped,
-    Trapezoidal,
-    Triangular,
-)
+from skanfis.membership.flanked import PiShaped, Trapezoidal, Triangular
 from skanfis.membership.profiles import LinearProfile, SplineProfile
 
 WITH_FOOT = pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped])

@@ -52,8 +52,7 @@ def measured():
 
 
 @pytest.fixture(
-    scope="module",
-    params=[{"n_mfs": [2, 3, 1]}, {"partition": FuzzyCMeans(3, random_state=0)}],
+    scope="module", params=[{"n_mfs": [2, 3, 1]}, {"partition": FuzzyCMeans(3, random_state=0)}]
 )
 def known(request, data):
     return quick(**request.param).fit(*data)
