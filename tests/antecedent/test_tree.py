@@ -148,17 +148,6 @@ class TestOneTermEach:
         found = ROOT.split(0, 1, first, np.log(0.3)).split(0, 1, second, np.log(0.2))
         return found.split(1, 0, 0.1, np.log(0.5))
 
-    @pytest.mark.parametrize("second", [1.5, -1.5])
-    def test_strengths_are_the_same(self, second, rng):
-        Z, found = 2.0 * rng.normal(size=(2, 500)), self.two_cuts(0.2, second)
-        table, made = found.with_one_term_each(["a", "b"])
-        assert type(table) is RuleTableAntecedent
-        assert_allclose(table.strengths(Z), found.strengths(Z), rtol=0, atol=1e-12)
-        inputs = table.term_inputs
-        for place in table.table.T:
-            assert np.unique(inputs[place[place >= 0]]).size == 1
-        assert len(made) == table.n_terms
-
     def test_every_pair_of_directions_has_a_family(self):
         found = set()
         for second in (1.5, -1.5):

@@ -87,17 +87,6 @@ def test_planted_slopes_are_found(rng):
     assert dict(found) == {0: (0, 1), 1: (0, 1, 2)}
 
 
-def test_contrasts_are_of_slopes_by_unit_of_the_input(rng):
-    problem, _, _ = posterior_of(*planted(rng, 200))
-    coefficients = rng.normal(size=(3, 4))
-    coefficients[:, 2] = 0.3
-    local = problem.local.to_local(coefficients.reshape(-1, 1))
-    every = np.arange(3)
-    assert_allclose(problem.common_line.contrasts(1, every) @ local, 0.0, atol=1e-12)
-    slopes = (problem.common_line.of_slopes(0, every) @ local)[:, 0]
-    assert_allclose(slopes / slopes[0], coefficients[:, 1] / coefficients[0, 1])
-
-
 def test_held_slopes_are_one_and_count_as_one(rng):
     X, y = planted(rng)
     free = posterior_of(X, y)[2]
