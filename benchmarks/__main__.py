@@ -40,7 +40,7 @@ def parse():
         metavar="PATH",
         help="a CSV of a rate-table campaign, columns gyro_counts, temp_c, rate_true_deg_s",
     )
-    parser.add_argument("--details", action="store_true", help="also what explains the figures")
+    parser.add_argument("--details", action="store_true", help="certain: also one by one")
     parser.add_argument(
         "--rows", type=int, default=10_000_000, metavar="N", help="long_logs: rows of a log"
     )

@@ -7,8 +7,6 @@ process of at most 400 rows. Coverages are of rows that nothing has seen. Widths
 another at equal coverage: intervals are stretched about their centres until they cover 90 %.
 """
 
-from time import process_time
-
 import numpy as np
 from sklearn.frozen import FrozenEstimator
 from sklearn.model_selection import KFold
@@ -21,7 +19,7 @@ from . import battery, real_sets
 from .cases import evaluate, geometric_mean
 from .compensation import with_thermal_rate
 from .random_functions import make_data
-from .report import Measure, Results, Row, Table
+from .report import Measure, Results, Row
 from .rivals import gaussian_process
 
 __all__ = ["cases", "run"]
@@ -48,11 +46,7 @@ class Start:
 
     def data(self):
         log = make_ofog(
-            n_devices=1,
-            n_runs=_N_RUNS,
-            max_residual_heat=0.0,
-            rates=[0.0],
-            random_state=self.seed,
+            n_devices=1, n_runs=_N_RUNS, max_residual_heat=0.0, rates=[0.0], random_state=self.seed
         )
         log = with_thermal_rate(log).iloc[::_EVERY_ROW]
         return log[_STARTS].to_numpy(), log["error"].to_numpy(), log["run"].to_numpy()
@@ -85,7 +79,7 @@ def normal(model, new):
 
 
 def intervals(X, y, groups, new):
-    """Lower and upper bound, and seconds, by each method."""
+    """Lower and upper bound by each method."""
     # With runs the default would compare structures by runs left out, once more in every fold.
     regressor = ANFISRegressor() if groups is None else ANFISRegressor(_N_TERMS)
     fitted = regressor.fit(X, y)
@@ -98,35 +92,28 @@ def intervals(X, y, groups, new):
             model.set_params(calibration_fraction=0.5)
         return model.fit(X, y, **given).predict_interval(new, COVERAGE, confidence)
 
-    def rival():
-        rows = np.random.default_rng(0).permutation(len(X))[:_GP_ROWS]
-        return normal(gaussian_process(X.shape[1]).fit(X[rows], y[rows]), new)
-
-    methods = {"std": lambda: normal(fitted, new), "folds": lambda: conformal("folds")}
+    found = {"std": normal(fitted, new), "folds": conformal("folds")}
     if groups is not None:
-        methods["run"] = lambda: conformal("folds", 0.9)
-    methods["split"] = lambda: conformal("split")
+        found["run"] = conformal("folds", 0.9)
+    found["split"] = conformal("split")
     if groups is None:
-        methods["loo"] = lambda: conformal("loo")
-    found = {}
-    for name, method in {**methods, "Gaussian process": rival}.items():
-        start = process_time()
-        found[name] = *method(), process_time() - start
-    return found
+        found["loo"] = conformal("loo")
+    rows = np.random.default_rng(0).permutation(len(X))[:_GP_ROWS]
+    process = gaussian_process(X.shape[1]).fit(X[rows], y[rows])
+    return {**found, "Gaussian process": normal(process, new)}
 
 
 def measure(case, options):
     X, y, groups, new, truth, test_groups = parts(case)
     kinds = {Start: "cold starts", real_sets.RealSet: "real sets"}
-    result = {"case": str(case), "kind": kinds.get(type(case), "battery"), "by run": {}}
-    result |= {"coverage": {}, "width": {}, "seconds": {}}
-    for name, (low, high, seconds) in intervals(X, y, groups, new).items():
+    result = {"case": str(case), "kind": kinds.get(type(case), "battery")}
+    result |= {"by run": {}, "coverage": {}, "width": {}}
+    for name, (low, high) in intervals(X, y, groups, new).items():
         inside = (low <= truth) & (truth <= high)
         half = np.maximum(0.5 * (high - low), 1e-12 * np.std(truth))
         stretch = np.quantile(np.abs(truth - 0.5 * (low + high)) / half, COVERAGE)
         result["coverage"][name] = float(np.mean(inside))
         result["width"][name] = float(stretch * np.mean(2.0 * half) / np.std(truth))
-        result["seconds"][name] = seconds
         if test_groups is not None:
             runs = np.unique(test_groups)
             result["by run"][name] = [float(np.mean(inside[test_groups == run])) for run in runs]
@@ -140,7 +127,7 @@ def run(options):
         own = [figures for figures in found if figures["kind"] == kind]
         if own:
             rows += [row(kind, own, method) for method in METHODS if method in own[0]["coverage"]]
-    return Results(rows, [table(found, "coverage"), table(found, "width")])
+    return Results(rows)
 
 
 def row(kind, found, method):
@@ -161,15 +148,3 @@ def row(kind, found, method):
             Measure("width over the Gaussian process's at equal coverage", widths),
         ],
     )
-
-
-def table(found, key):
-    title = {
-        "coverage": "How sure: part of new rows in 90 % intervals",
-        "width": "How sure: mean width at 90 % coverage, in deviations of the target",
-    }[key]
-    lines = [
-        [figures["case"], *(figures[key].get(method, "") for method in METHODS)]
-        for figures in found
-    ]
-    return Table(title, ["data", *METHODS], lines)

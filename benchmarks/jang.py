@@ -13,14 +13,15 @@ import numpy as np
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_jang_three_input, make_mackey_glass
 
+from .cases import rms
 from .report import Measure, Results, Row
 from .timing import best_of
 
-__all__ = ["PROBLEMS", "run"]
+__all__ = ["run"]
 
 
 def rmse(model, X, y):
-    return float(np.sqrt(np.mean((model.predict(X) - y) ** 2)))
+    return rms(model.predict(X) - y)
 
 
 def percentage_error(model, X, y):
@@ -49,17 +50,11 @@ class Problem:
         weights = dict(self.penalty)
         return ANFISRegressor(n_mfs=self.n_mfs, mf=self.mf, **weights).fit(*self.train)
 
-    def errors(self, model):
-        return self.error(model, *self.train), self.error(model, *self.check)
-
     def row(self):
         seconds, model = best_of(self.fit)
-        measures = [
-            Measure(*entry)
-            for entry in zip(
-                self.names, self.errors(model), [self.unit] * 2, self.bars, self.aims, strict=True
-            )
-        ]
+        errors = [self.error(model, *rows) for rows in (self.train, self.check)]
+        told = zip(self.names, errors, [self.unit] * 2, self.bars, self.aims, strict=True)
+        measures = [Measure(*entry) for entry in told]
         return Row(
             f"{self.name}, {self.mf} ({self.reference})",
             [*measures, Measure("CPU", seconds, "s", 1.0)],

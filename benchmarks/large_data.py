@@ -11,6 +11,7 @@ import numpy as np
 
 from skanfis import ANFISRegressor
 
+from .cases import rms
 from .fresh import alone
 from .report import Measure, Results, Row
 from .timing import best_of
@@ -40,7 +41,7 @@ def million():
         seconds, model = best_of(lambda: ANFISRegressor(_N_MFS).fit(X, y), rounds=1)
         extra = (status("VmHWM") - before) * 1024 / 1e6 if _STATUS.exists() else None
     fresh = np.random.default_rng(99).uniform(-0.999, 0.999, (50_000, 3))
-    off = float(np.sqrt(np.mean((model.predict(fresh) - surface(fresh)) ** 2)))
+    off = rms(model.predict(fresh) - surface(fresh))
     return seconds, off, extra
 
 

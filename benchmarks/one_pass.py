@@ -7,27 +7,21 @@ No large array is freed before the passes: the C library then keeps memory at ha
 what allocation costs them in a fresh process.
 """
 
-from unittest.mock import patch
-
 import numpy as np
 from scipy.linalg import blas
 
-from skanfis.learning import objective
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Gaussian
 from skanfis.search import Spacing, grid_antecedent
 
-from .fresh import alone
 from .report import Measure, Results, Row, Table
 from .timing import side_by_side
 
 __all__ = ["run"]
 
 _N_ROWS = 400_000
-_BLOCK_BYTES = [2**k for k in range(18, 25)]
-_HALVES = ["evaluate", "linearise"]
 
 
 def make_problem():
@@ -67,39 +61,13 @@ def passes(problem):
     }
 
 
-def measure(block_bytes):
-    """Seconds of products and passes with blocks of this size, and the rows of a block."""
-    with patch.object(objective, "_BLOCK_BYTES", block_bytes):
-        problem = make_problem()
-        block_rows = problem._block_rows
-    return side_by_side({**bare_products(problem), **passes(problem)}), block_rows
-
-
-def in_products(seconds):
-    """Times in units of the faster product; the whole pass last."""
-    product = min(seconds[name] for name in seconds if name.startswith("product"))
-    ratios = {name: value / product for name, value in seconds.items()}
-    return {**ratios, "pass": sum(ratios[half] for half in _HALVES)}
-
-
 def run(options):
-    seconds, _ = measure(objective._BLOCK_BYTES)
-    ratios = in_products(seconds)
+    problem = make_problem()
+    products, halves = bare_products(problem), passes(problem)
+    seconds = side_by_side({**products, **halves})
+    product = min(seconds[name] for name in products)
+    whole = sum(seconds[name] for name in halves) / product
     work = f"one pass, n={_N_ROWS:,}, 27 rules, 3 inputs, in bare products Φ'Φ"
-    rows = [Row(work, [Measure("pass", ratios["pass"], "x", 2.5, 1.5)])]
-    lines = [[name, value, ratios[name]] for name, value in seconds.items()]
-    tables = [Table("One pass", ["work", "CPU [s]", "in products"], lines)]
-    if options.details:
-        tables.append(block_sizes())
-    return Results(rows, tables)
-
-
-def block_sizes():
-    """The measurement behind ``objective._BLOCK_BYTES``."""
-    lines = []
-    for size in _BLOCK_BYTES:
-        seconds, block_rows = alone(measure, size)
-        ratios = in_products(seconds)
-        lines.append([f"{size // 1024} KiB", block_rows, *(ratios[k] for k in [*_HALVES, "pass"])])
-    head = ["block", "rows", *_HALVES, "pass, in products"]
-    return Table("Size of a block (objective._BLOCK_BYTES), each in a fresh process", head, lines)
+    rows = [Row(work, [Measure("pass", whole, "x", 2.5, 1.5)])]
+    lines = [[name, value, value / product] for name, value in seconds.items()]
+    return Results(rows, [Table("One pass", ["work", "CPU [s]", "in products"], lines)])

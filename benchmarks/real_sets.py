@@ -5,7 +5,7 @@ changed. Rows with missing values are left out. A column with two values becomes
 values have an order, their number in it; any other a column of 0 and 1 for each value but the
 first. Names of rows, and columns that the target was computed from, are left out.
 
-Needs what ``pip install --group bench`` installs. A rival that is not installed is left out.
+Needs what ``pip install --group bench`` installs.
 """
 
 from dataclasses import dataclass, field
@@ -17,9 +17,9 @@ import pandas as pd
 from .cases import evaluate, fitted_in_folds, geometric_mean
 from .readable import readability
 from .report import Measure, Results, Row, Table
-from .rivals import BEST_OF, RIVALS, rival_in_folds
+from .rivals import BEST_OF, rival_in_folds
 
-__all__ = ["SETS", "RealSet", "cases", "in_deviations", "load", "rivals", "run"]
+__all__ = ["SETS", "RealSet", "cases", "in_deviations", "load", "rival_errors", "run"]
 
 _SEED = 0
 
@@ -114,44 +114,41 @@ def cases():
     return SETS
 
 
-def rivals(real_set, names=tuple(RIVALS), fit=True):
-    """What ``rival_in_folds`` finds, by name."""
-    key = f"real_sets/{real_set.name}"
-    return {name: rival_in_folds(name, key, *load(real_set), fit=fit) for name in names}
-
-
 def in_deviations(squares, y):
     """The error of all rows from sums of squares."""
     return float(np.sqrt(np.sum(squares) / len(y)) / y.std())
+
+
+def rival_errors(key, X, y, n_folds=5, fit=True):
+    """The errors of rivals, by name; LookupError where one is not remembered and not fitted."""
+    found = {}
+    for name in BEST_OF:
+        parts = rival_in_folds(name, key, X, y, n_folds, fit)
+        if None in parts:
+            raise LookupError("its rivals are not remembered yet")
+        found[name] = in_deviations([squares for squares, _ in parts], y)
+    return found
 
 
 def measure(real_set, options):
     """What is kept of a set: everything of five folds."""
     X, y = load(real_set)
     start = perf_counter()
-    found = rivals(real_set, fit=not options.quick)
-    found = {name: np.array(parts) for name, parts in found.items() if None not in parts}
-    if not set(BEST_OF) <= set(found):
-        raise LookupError("its rivals are not remembered yet")
-    errors = {name: in_deviations(parts[:, 0], y) for name, parts in found.items()}
+    errors = rival_errors(f"real_sets/{real_set.name}", X, y, fit=not options.quick)
     rivals_wall = perf_counter() - start
     squares, parts = [], []
     for model, seconds, train, left in fitted_in_folds(X, y, options):
         squares.append(left @ left)
         parts.append(readability(model, X[train], y[train]) | {"seconds": seconds})
     error = in_deviations(squares, y)
-    middle = {key: float(np.median([part[key] for part in parts])) for key in parts[0]}
-    counts = {key: sum(part[key] for part in parts) for key in ("false", "alike")}
     return {
         "case": real_set.name,
         "rows": X.shape[0],
         "inputs": X.shape[1],
         "error": error,
-        "ratio": error / min(errors[name] for name in BEST_OF),
-        **middle,
-        **counts,
+        "ratio": error / min(errors.values()),
+        **{key: float(np.median([part[key] for part in parts])) for key in parts[0]},
         "rivals": errors,
-        "rivals_seconds": {name: float(np.median(parts[:, 1])) for name, parts in found.items()},
         "rivals_wall": rivals_wall,
     }
 
@@ -160,84 +157,57 @@ def run(options):
     found, failed = evaluate("real_sets", measure, cases(), options)
     if not found:
         return Results([Row("real sets", [failed])])
-    ratios = [figures["ratio"] for figures in found]
     worst = max(found, key=lambda figures: figures["ratio"])
-    strongest = [figures["strongest"] for figures in found]
-    terms = float(sum(figures["false"] + figures["alike"] for figures in found))
-    times = [figures["seconds"] for figures in found]
+
+    def middle(key):
+        return float(np.median([figures[key] for figures in found]))
+
+    def most(key):
+        return max(figures[key] for figures in found)
+
     work = f"{len(found)} real sets, five folds, defaults"
+    ratios = [figures["ratio"] for figures in found]
     rows = [
         Row(
             f"{work}: over the best of {', '.join(BEST_OF)}",
             [
                 Measure("geometric mean", geometric_mean(ratios), "", 1.0, 0.96),
                 Measure(f"worst ({worst['case']})", worst["ratio"], "", 1.15),
-                Measure("median fit, CPU", float(np.median(times)), "s"),
+                Measure("median fit, CPU", middle("seconds"), "s"),
                 failed,
             ],
         ),
         Row(
             f"{work}: strongest rule alone, RMS to the model in deviations of the target",
             [
-                Measure("median", float(np.median(strongest)), "", 0.3, 0.15),
-                Measure("worst", max(strongest), "", 0.6, 0.3),
+                Measure("median", middle("strongest"), "", 0.3, 0.15),
+                Measure("worst", most("strongest"), "", 0.6, 0.3),
             ],
         ),
         Row(
             f"{work}: reading cost, numerals in the rules",
             [
-                Measure("median", float(np.median([figures["cost"] for figures in found])), ""),
-                Measure(
-                    "text over model, worst", max(one["text"] for one in found), "", 1.05, 1.02
-                ),
+                Measure("median", middle("cost"), ""),
+                Measure("text over model, worst", most("text"), "", 1.05, 1.02),
             ],
         ),
-        Row(
-            f"{work}: terms nowhere truer than 0.5, or crossing a neighbour above 0.9",
-            [Measure("terms", terms, "", 0)],
-        ),
     ]
-    return Results(rows, [errors(found), rules(found)])
+    return Results(rows, [by_set(found)])
 
 
-def label(figures):
-    return f"{figures['case']}, {figures['rows']} x {figures['inputs']}"
-
-
-def errors(found):
-    names = [name for name in RIVALS if all(name in figures["rivals"] for figures in found)]
+def by_set(found):
+    keys = ("error", "ratio", "rules", "cost", "strongest", "seconds")
     lines = [
-        [label(f), *(f["rivals"][name] for name in names), f["error"], f["ratio"]] for f in found
-    ]
-    means = []
-    for name in names:
-        ratios = [
-            figures["rivals"][name] * figures["ratio"] / figures["error"] for figures in found
+        [
+            f"{figures['case']}, {figures['rows']} x {figures['inputs']}",
+            *figures["rivals"].values(),
+            *(figures[key] for key in keys),
         ]
-        means.append(geometric_mean(ratios))
-    ours = geometric_mean([figures["ratio"] for figures in found])
-    lines.append(["geometric mean of the ratios", *means, ours, ours])
-    middle = [float(np.median([f["rivals_seconds"][name] for f in found])) for name in names]
-    own = float(np.median([figures["seconds"] for figures in found]))
-    lines.append(["CPU of a fit, median [s]", *middle, own, ""])
+        for figures in found
+    ]
+    head = ["data", *BEST_OF, "ANFISRegressor()", "ratio to the best", "rules", "numerals"]
     return Table(
-        f"Real sets: error of five folds, in deviations of the target; the ratio is to the best of "
-        f"{', '.join(BEST_OF)} (the last on at most 1,500 rows)",
-        ["data", *names, "ANFISRegressor()", "ratio"],
+        "Real sets: errors of five folds in deviations of the target, medians of the rules",
+        [*head, "strongest alone [sd]", "fit [s]"],
         lines,
     )
-
-
-def rules(found):
-    keys = ("rules", "cost", "strongest", "false", "alike", "seconds")
-    lines = [[label(figures), *(figures[key] for key in keys)] for figures in found]
-    head = [
-        "data",
-        "rules",
-        "reading cost [numerals]",
-        "strongest alone [sd]",
-        "terms never true",
-        "terms alike",
-        "fit, CPU [s]",
-    ]
-    return Table("Real sets: the rules, medians and sums of five folds", head, lines)

@@ -19,8 +19,7 @@ from skanfis.datasets import make_ofog
 from . import gyro
 from .cases import evaluate, fitted, rms
 from .compensation import cold_starts, polynomial
-from .readable import readability
-from .report import Measure, Results, Row, Table
+from .report import Measure, Results, Row
 
 __all__ = ["cases", "run"]
 
@@ -65,16 +64,9 @@ def replicated(X, fresh, truth, seed, options):
     found = []
     for rows in (X, X + _JITTER * rng.standard_normal(X.shape)):
         model, seconds = fitted(rows, y, options)
-        found.append((rms(model.predict(fresh) - truth(fresh)), model.n_rules_, seconds))
-    (error, n_rules, seconds), (without, without_rules, _) = found
-    return {
-        "ratio": error / without,
-        "error": error,
-        "error without": without,
-        "rules": n_rules,
-        "rules without": without_rules,
-        "seconds": seconds,
-    }
+        found.append((rms(model.predict(fresh) - truth(fresh)), seconds))
+    (error, seconds), (without, _) = found
+    return {"ratio": error / without, "error": error, "seconds": seconds}
 
 
 # Friedman's first function ----------------------------------------------------------------------
@@ -85,14 +77,14 @@ def friedman(seed, n_rows, n_inputs, options):
     X, y = make_friedman1(n_rows, n_inputs, noise=1.0, random_state=seed)
     fresh, truth = make_friedman1(_N_TEST, n_inputs, noise=0.0, random_state=1000 + seed)
     model, seconds = fitted(X, y, options)
-    squares = (model.predict(fresh) - truth) ** 2
-    inside = ((X.min(axis=0) <= fresh) & (fresh <= X.max(axis=0))).all(axis=1)
-    return {
-        "ratio": float(np.sqrt(squares.mean() + 1.0)),
-        "in the box": float(np.sqrt(squares[inside].mean() + 1.0)),
-        "seconds": seconds,
-        **readability(model, X, y),
-    }
+    return {"ratio": np.hypot(rms(model.predict(fresh) - truth), 1.0), "seconds": seconds}
+
+
+def by_policy(model, X):
+    """Predictions by the policy for rows outside; the default's are called "ratio"."""
+    yield "ratio", model.predict(X)
+    for policy in ("clip", "linear"):
+        yield policy, model.set_params(out_of_bounds=policy).predict(X)
 
 
 # Cold starts, one left out ----------------------------------------------------------------------
@@ -106,24 +98,15 @@ def left_out(seed, make_log, inputs, grouped, options):
     """RMS of the error in the run left out, over the noise floor; by policy for rows outside."""
     log = make_log(seed)
     X, y, run = log[list(inputs)].to_numpy(), log["error"].to_numpy(), log["run"].to_numpy()
-    left = {policy: np.empty(len(y)) for policy in ("default", "clip", "linear")}
-    times, rules = [], []
+    left, times = {policy: np.empty(len(y)) for policy in ("ratio", "clip", "linear")}, []
     for train, test in LeaveOneGroupOut().split(X, y, run):
         groups = run[train] if grouped else None
         model, seconds = fitted(X[train], y[train], options, groups)
         times.append(seconds)
-        rules.append(model.n_rules_)
-        for policy, errors in left.items():
-            given = {} if policy == "default" else {"out_of_bounds": policy}
-            errors[test] = model.set_params(**given).predict(X[test]) - y[test]
-    floor = rms(log["noise"])
-    return {
-        "ratio": rms(left["default"]) / floor,
-        "clip": rms(left["clip"]) / floor,
-        "linear": rms(left["linear"]) / floor,
-        "rules": float(np.median(rules)),
-        "seconds": float(np.median(times)),
-    }
+        for policy, prediction in by_policy(model, X[test]):
+            left[policy][test] = prediction - y[test]
+    found = {policy: rms(errors) / rms(log["noise"]) for policy, errors in left.items()}
+    return {**found, "seconds": float(np.median(times))}
 
 
 # Three runs of a gyro, and a fourth ---------------------------------------------------------------
@@ -141,7 +124,6 @@ def fourth_run(seed, grouped, options):
         "ratio": error / other,
         "error": error,
         "on the three": rms(model.predict(X[train]) - y[train]),
-        "rules": model.n_rules_,
         "seconds": seconds,
     }
 
@@ -163,13 +145,11 @@ def saturating(seed, options):
     y = truth(X) + 0.05 * rng.standard_normal(len(X))
     model, seconds = fitted(X, y, options)
     beyond = (np.abs(fresh) > 1).any(axis=1)
-    found = {}
-    for policy in ("default", "clip", "linear"):
-        given = {} if policy == "default" else {"out_of_bounds": policy}
-        errors = model.set_params(**given).predict(fresh[beyond]) - truth(fresh[beyond])
-        found[policy] = rms(errors) / y.std()
-    found["ratio"] = found.pop("default")
-    return {**found, "seconds": seconds, "rules": int(model.n_rules_)}
+    found = {
+        policy: rms(prediction - truth(fresh[beyond])) / y.std()
+        for policy, prediction in by_policy(model, fresh[beyond])
+    }
+    return {**found, "seconds": seconds}
 
 
 # The gyro-like surface --------------------------------------------------------------------------
@@ -185,12 +165,7 @@ def surface(seed, options, with_product=False):
         X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
     model, seconds = fitted(X, y, options)
     inside, everywhere = gyro.score(model.predict(fresh), X, fresh, truth)
-    return {
-        "ratio": inside,
-        "all rows": everywhere,
-        "seconds": seconds,
-        **readability(model, X, y),
-    }
+    return {"ratio": inside, "all rows": everywhere, "seconds": seconds}
 
 
 # Many inputs ------------------------------------------------------------------------------------
@@ -208,11 +183,7 @@ def wide(seed, n_rows, options, n_inputs=200):
     y = truth(X) + noise * rng.standard_normal(n_rows)
     model, seconds = fitted(X, y, options)
     error = np.hypot(rms(model.predict(fresh) - truth(fresh)), noise)
-    return {
-        "ratio": float(error / np.hypot(truth(fresh).std(), noise)),
-        "seconds": seconds,
-        "rules": int(model.n_rules_),
-    }
+    return {"ratio": float(error / np.hypot(truth(fresh).std(), noise)), "seconds": seconds}
 
 
 def few_rows(seed, n_rows, n_inputs, n_active, options):
@@ -230,7 +201,6 @@ def few_rows(seed, n_rows, n_inputs, n_active, options):
         "ratio": float(errors[0] / errors[1]),
         "over the target's deviation": float(errors[0] / np.sqrt(noise**2 + n_active)),
         "seconds": seconds,
-        "rules": int(model.n_rules_),
     }
 
 
@@ -350,14 +320,12 @@ def measure(problem, options):
 
 def run(options):
     found, failed = evaluate("small_problems", measure, cases(), options)
-    rows, lines = [Row("small problems", [failed])], []
+    rows = [Row("small problems", [failed])]
     for name, kind in KINDS.items():
         some = [figures for figures in found if figures["kind"] == name]
         if some:
             rows.append(row(name, kind, some))
-            lines += [[figures["case"], figures["ratio"], rest(figures)] for figures in some]
-    table = Table("Small problems, one by one", ["case", "figure", "more"], lines)
-    return Results(rows, [table])
+    return Results(rows)
 
 
 def row(name, kind, some):
@@ -371,9 +339,3 @@ def row(name, kind, some):
     measures += [measured(key, key, bar) for key, bar in kind.further]
     measures.append(Measure("median fit, CPU", float(np.median([f["seconds"] for f in some])), "s"))
     return Row(f"{name}; {len(some)} seeds", measures)
-
-
-def rest(figures):
-    """All that is known besides."""
-    left_out = ("case", "kind", "ratio", "number")
-    return ", ".join(f"{key} {value:.3g}" for key, value in figures.items() if key not in left_out)

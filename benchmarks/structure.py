@@ -17,9 +17,9 @@ from sklearn.preprocessing import StandardScaler
 from . import real_sets
 from .cases import evaluate, fitted, fitted_in_folds, geometric_mean, remembered, rms
 from .every_table import part
-from .real_sets import in_deviations
-from .report import Measure, Results, Row, Table
-from .rivals import BEST_OF, fitted_rival, rival_in_folds
+from .real_sets import in_deviations, rival_errors
+from .report import Measure, Results, Row
+from .rivals import fitted_rival
 
 __all__ = ["cases", "run"]
 
@@ -125,13 +125,10 @@ def of_functions(case, options, n_seeds=1):
         parts = []
         for seed in range(n_seeds):
             X, y, fresh, truth, noise = drawn(case, seed)
-            model, seconds = fitted(X, y, options, simplicity=simplicity)
+            model, _ = fitted(X, y, options, simplicity=simplicity)
             left = rms(model.predict(fresh) - truth)
-            new = math.hypot(left, noise)
-            parts.append(
-                figures_of(model, y.std() / new) | {"error": left / (truth.std() or noise)}
-            )
-            parts[-1]["seconds"] = seconds
+            figures = figures_of(model, y.std() / math.hypot(left, noise))
+            parts.append(figures | {"error": left / (truth.std() or noise)})
         found[simplicity] = parts
     return found
 
@@ -154,19 +151,14 @@ def of_folds(X, y, n_folds, options):
     for simplicity in SIMPLICITIES:
         parts, squares = [], []
         in_folds = fitted_in_folds(X, y, options, n_folds, simplicity=simplicity)
-        for model, seconds, train, left in in_folds:
+        for model, _, train, left in in_folds:
             squares.append(left @ left)
-            parts.append(figures_of(model, y[train].std() / y.std()) | {"seconds": seconds})
+            parts.append(figures_of(model, y[train].std() / y.std()))
         error = max(in_deviations(squares, y), _EXACT)
         found[simplicity] = [each | {"error": error} for each in parts]
         for each in found[simplicity]:
             each["true"] /= error
     return found
-
-
-def rival_errors(key, X, y, n_folds):
-    found = {name: np.array(rival_in_folds(name, key, X, y, n_folds)) for name in BEST_OF}
-    return {name: max(in_deviations(parts[:, 0], y), _EXACT) for name, parts in found.items()}
 
 
 def smooth_rivals(case):
@@ -191,23 +183,18 @@ def measure(case, options):
         if not options.quick:
             key = f"{folder}/{case.name.replace('/', '-')}"
             rivals = rival_errors(key, X, y, n_folds)
+            rivals = {name: max(error, _EXACT) for name, error in rivals.items()}
     else:
         found = of_functions(case, options, 1 if case.kind == "smooth" else 5)
         if case.kind == "smooth" and not options.quick:
             key = f"structure/{case}".replace(" ", "_")
             rivals = remembered(key, lambda *_: smooth_rivals(case), *drawn(case)[:2])
     best = min(rivals.values(), default=np.nan)
-    figures = {"case": str(case), "kind": case.kind, "rivals": rivals}
+    figures = {"case": str(case), "kind": case.kind}
     for simplicity, parts in found.items():
-        middle = {
-            name: float(np.median([p[name] for p in parts]))
-            for name in parts[0]
-            if name != "several"
-        }
-        figures[f"{simplicity:g}"] = middle | {
-            "over the rivals": middle["error"] / best,
-            "parts": parts,
-        }
+        middle = {name: float(np.median([p[name] for p in parts])) for name in ("error", "cost")}
+        middle["over the rivals"] = middle["error"] / best
+        figures[f"{simplicity:g}"] = middle | {"parts": parts}
     return figures
 
 
@@ -243,16 +230,7 @@ def run(options):
             rows += [_smooth(some, n) for n in (250, 1000, 4000, 16000)]
         else:
             rows.append(_row(kind, some))
-    head = ["case", "best rival", *(f"{name}, {s:g}" for s in SIMPLICITIES for name in _TOLD)]
-    lines = [
-        [one["case"], min(one["rivals"].values(), default=None)]
-        + [one[f"{s:g}"][name] for s in SIMPLICITIES for name in _TOLD]
-        for one in found
-    ]
-    return Results(rows, [Table("Structure, medians; simplicity behind the comma", head, lines)])
-
-
-_TOLD = ("error", "rules", "cost", "true", "seconds")
+    return Results(rows)
 
 
 def _row(kind, some):

@@ -11,7 +11,7 @@ from . import oracles
 LOW, HIGH = np.array([-2.0, -3.0, -1.0]), np.array([2.5, 1.0, 4.0])
 # As in the module.
 MARGIN = 0.25
-FACTOR, RATIO, OUTER, UNIT = np.log(4.0), np.log(2.2), np.log(1.45), 3.0**0.5
+FACTOR, UNIT = np.log(4.0), 3.0**0.5
 
 
 def grid(families, counts, inputs=None):

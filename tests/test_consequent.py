@@ -30,26 +30,6 @@ def gram_of(strengths, Z, weight, order):
     return (phi * weight) @ phi.T
 
 
-def explicit(local):
-    """T entry by entry: columns are the functions (z_j - a_rj) / h_rj on [1, z]."""
-    n_rules, n_slopes = local.center.shape
-    n_basis = 1 + n_slopes
-    matrix = np.zeros((n_rules * n_basis, n_rules * n_basis))
-    for r in range(n_rules):
-        first = r * n_basis
-        matrix[first, first] = 1.0
-        for j in range(n_slopes):
-            matrix[first + 1 + j, first + 1 + j] = 1.0 / local.spread[r, j]
-            matrix[first, first + 1 + j] = -local.center[r, j] / local.spread[r, j]
-    return matrix
-
-
-def random_local(rng, n_slopes=N_INPUTS):
-    return LocalBasis(
-        rng.normal(size=(N_RULES, n_slopes)), rng.uniform(0.1, 2.0, (N_RULES, n_slopes))
-    )
-
-
 def positive_definite(rng, n=12, condition=1e4):
     q, _ = np.linalg.qr(rng.normal(size=(n, n)))
     return (q * np.geomspace(1.0, 1.0 / condition, n)) @ q.T
@@ -79,21 +59,6 @@ def test_rule_that_fires_on_one_spot_has_a_spread(Z, weight, strengths):
     assert_array_equal(local.spread[0], 0.05)
 
 
-def test_transforms_are_the_explicit_matrix(rng):
-    local, gram = random_local(rng), positive_definite(rng, N_RULES * (1 + N_INPUTS))
-    T = explicit(local)
-    before = gram.copy()
-    assert_allclose(local.transform_gram(gram), T.T @ gram @ T, rtol=1e-11, atol=1e-13)
-    assert_array_equal(gram, before)
-    rows = rng.normal(size=(len(T), 5))
-    beta = rng.normal(size=(len(T), 2))
-    assert_allclose(local.to_global(beta), T @ beta, rtol=1e-12, atol=1e-13)
-    assert_allclose(local.to_local(beta), np.linalg.solve(T, beta), rtol=1e-11, atol=1e-12)
-    expected = T.T @ rows
-    assert local.transform_rows(rows) is rows
-    assert_allclose(rows, expected, rtol=1e-12, atol=1e-13)
-
-
 def test_local_basis_spares_the_gram_matrix_its_condition(rng):
     # Two narrow rules far apart: w_r and w_r z are parallel, (z - a) / h and one are not.
     Z = np.concatenate([rng.normal(-100.0, 1.0, 500), rng.normal(100.0, 1.0, 500)])[None]
@@ -101,41 +66,6 @@ def test_local_basis_spares_the_gram_matrix_its_condition(rng):
     gram = gram_of(strengths, Z, np.full(1000, 1e-3), 1)
     assert np.linalg.cond(gram) > 1e7
     assert np.linalg.cond(LocalBasis.from_gram(gram, 2).transform_gram(gram)) < 1.5
-
-
-def rounding(matrix):
-    """What may be added to a matrix for the sake of rounding."""
-    return len(matrix) * np.finfo(float).eps * np.diagonal(matrix).max()
-
-
-@pytest.mark.parametrize("alpha", [1e-10, 1e-3, 1.0])
-def test_factor_solves_the_normal_equations(rng, alpha):
-    matrix, right = positive_definite(rng) + alpha * np.eye(12), rng.normal(size=(12, 2))
-    before = matrix.copy()
-    factor = NormalFactor(matrix)
-    assert 0.0 < factor.shift <= rounding(matrix)
-    assert_array_equal(matrix, before)
-    assert_allclose(factor.solve(right), np.linalg.solve(matrix, right), rtol=1e-9)
-
-
-@pytest.mark.parametrize("scale", [1e-9, 1.0, 1e9])
-def test_determinant(rng, scale):
-    matrix = scale * positive_definite(rng)
-    sign, expected = np.linalg.slogdet(matrix)
-    assert sign == 1.0
-    assert_allclose(NormalFactor(matrix).log_determinant(), expected, rtol=1e-11)
-
-
-@pytest.mark.parametrize("alpha", [1e-8, 0.1, 100.0])
-def test_traces_give_the_effective_parameters(rng, alpha):
-    # tr (G + P)^-1 G is the trace of the hat matrix, and what it lacks of p is due to P.
-    phi, root = rng.normal(size=(40, 6)), rng.normal(size=(3, 6))
-    gram, penalty = phi.T @ phi, alpha * (root.T @ root)
-    hat = phi @ np.linalg.solve(gram + penalty, phi.T)
-    factor = NormalFactor(gram + penalty)
-    of_gram, of_penalty = factor.trace(gram), factor.trace(penalty)
-    assert_allclose(of_gram, np.trace(hat), rtol=1e-9)
-    assert_allclose(of_gram + of_penalty, 6.0, rtol=1e-10)
 
 
 def test_traces_of_large_matrices_are_exact_where_no_sign_matters(rng):
@@ -148,14 +78,6 @@ def test_traces_of_large_matrices_are_exact_where_no_sign_matters(rng):
     assert_allclose(factor.squares(rows), np.diag(rows) ** 2 / diagonal, rtol=1e-9)
     dense = positive_definite(rng, 600)
     assert_allclose(NormalFactor(dense).trace(dense), 600.0, rtol=1e-6)
-
-
-def test_squares_of_rows_are_the_diagonal_of_what_they_make(rng):
-    matrix, rows = positive_definite(rng), rng.normal(size=(5, 12))
-    factor = NormalFactor(matrix)
-    expected = np.diag(rows @ np.linalg.solve(matrix, rows.T))
-    assert_allclose(factor.squares(rows), expected, rtol=1e-9)
-    assert_allclose(factor.root @ matrix @ factor.root.T, np.eye(12), atol=1e-10)
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1e-12, 1e-4])

@@ -1,10 +1,12 @@
-"""scikit-learn's own checks: the default, and rules from clusters with all that surrounds a fit."""
+"""scikit-learn's own checks of rules, of the clusterers and of intervals, without exception."""
 
 import pytest
 from sklearn.cluster import KMeans
 from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import ANFISRegressor
+from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
+from skanfis.intervals import ConformalRegressor
 from skanfis.learning import VariableProjection
 from skanfis.options import EarlyStopping
 
@@ -18,7 +20,8 @@ pytestmark = [
     pytest.mark.filterwarnings("ignore::skanfis.exceptions.ForgottenRowsWarning"),
     pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning"),
     pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning"),
-    # Many short fits: MAX_ITER below, and KMeans on fewer distinct rows than clusters.
+    # Many short fits: max_iter below, KMeans on fewer distinct rows than clusters, and centres of
+    # fuzzy c-means that coincide in columns of noise.
     pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning"),
 ]
 
@@ -36,6 +39,9 @@ ESTIMATORS = {
         early_stopping=EarlyStopping(validation_fraction=0.3),
         max_iter=5,
     ),
+    "subtractive": SubtractiveClustering(),
+    "fuzzy": FuzzyCMeans(n_clusters=2, m="auto", n_init=1),
+    "conformal": ConformalRegressor(ANFISRegressor(n_mfs=1, alpha=0.1), cv=2),
 }
 
 

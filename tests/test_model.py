@@ -11,7 +11,7 @@ from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import TSKModel
-from skanfis.policies import OUT_OF_BOUNDS, TargetRange
+from skanfis.policies import TargetRange
 
 from . import oracles
 from .export import rule_bases
@@ -111,16 +111,6 @@ def test_model_about_its_reference_keeps_the_digits_that_the_textbook_form_loses
 
 
 @ALL
-def test_consequents_are_those_of_the_rules(frozen, rng):
-    X = inside(frozen, rng, 5)
-    by_rule = np.stack([p[0] + X @ p[1:] for p in frozen.consequents])
-    a, b = frozen.coefficients[:, :1], frozen.coefficients[:, 1:]
-    expected = a + (np.einsum("nj,rjo->rno", X - frozen.reference, b) if frozen.order else 0.0)
-    assert_allclose(by_rule, np.broadcast_to(expected, by_rule.shape), rtol=1e-11, atol=1e-12)
-    assert frozen.consequents.shape == (frozen.n_rules, 4, frozen.n_outputs)
-
-
-@ALL
 def test_blocks_give_what_the_whole_gives(frozen, rng, monkeypatch):
     X = around(frozen, rng, 333)
     answers = [
@@ -147,14 +137,6 @@ def test_in_bounds_is_the_closed_box(frozen):
             row[j] = np.nextafter(edge[j], side)
             assert not frozen.in_bounds(row[None])[0]
     assert not frozen.in_bounds(np.full((1, 3), np.nan))[0]
-
-
-@ALL
-def test_all_policies_agree_inside(frozen, rng):
-    X = inside(frozen, rng)
-    expected = frozen.predict(X)
-    for policy in OUT_OF_BOUNDS:
-        assert_array_equal(frozen.with_out_of_bounds(policy).predict(X), expected)
 
 
 @ALL
@@ -300,11 +282,6 @@ class TestAsRuleTable:
         for name in ("grid", "scattered", "rule table", "one rule"):
             model = rule_bases.MODELS[f"{name}, order 1, 1 outputs"]
             assert model.as_rule_table() is model
-
-    def test_three_cuts_of_an_input_on_a_path_are_refused_by_name(self):
-        found = rule_bases.a_tree().split(0, 0, 1.4, -2.0)
-        with pytest.raises(ValueError, match=r"Rule 0 has 3 terms of 'time' \(at"):
-            rule_bases.build(found).as_rule_table()
 
 
 @pytest.mark.parametrize("counts", [(2, 2), (3, 2)])

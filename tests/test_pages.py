@@ -17,6 +17,7 @@ WITH_PROMPTS = {
     "add_a_membership": 5,
     "files": 5,
     "how_sure": 15,
+    "large_data": 5,
     "reading_rules": 20,
     "training": 20,
     "trees": 9,
@@ -55,6 +56,8 @@ def test_page_as_pasted(page, tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("page", WITH_PROMPTS)
 def test_page_with_prompts(page, tmp_path, monkeypatch):
+    if page == "large_data":
+        pytest.importorskip("dask")
     monkeypatch.chdir(tmp_path)
     path = str(DOCS / f"{page}.rst")
     failed, tried = doctest.testfile(path, module_relative=False, optionflags=LOOSELY)

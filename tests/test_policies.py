@@ -9,15 +9,6 @@ from numpy.testing import assert_allclose
 from skanfis.policies import TargetRange, check_policy, describe_out_of_bounds, policy_in_words
 
 
-def test_columns_that_leave_their_range_are_told_with_rows_and_ranges():
-    X = np.array([[0.0, 5.0, 1.0], [-1.5, 5.0, 1.0], [2.5, 7.0, 1.0], [3.0, 5.0, 1.0]])
-    told = describe_out_of_bounds(X, [0.0, 5.0, 1.0], [2.0, 6.0, 1.0], ["time", "rate", "flat"])
-    assert told == (
-        "X lies outside the training data: 'time' in 3 of 4 rows (trained on [0, 2], found "
-        "[-1.5, 3]); 'rate' in 1 of 4 rows (trained on [5, 6], found [5, 7])."
-    )
-
-
 def test_values_are_told_in_as_many_digits_as_tell_them_apart():
     X = np.array([[1_000_001.5], [1_000_000.25]])
     told = describe_out_of_bounds(X, [999_999.5], [1_000_001.0], ["time"])

@@ -98,11 +98,3 @@ def test_what_the_api_page_lists_exists():
     named = [name.rpartition(".") for name in listed_on_api_page()]
     assert named
     assert [(module, name) for module, _, name in named if name not in exports(module)] == []
-
-
-def test_version_is_exported():
-    assert re.match(r"\d+\.\d+\.\d+", skanfis.__version__)
-
-
-def test_package_tells_type_checkers_that_it_is_typed():
-    assert Path(skanfis.__file__).with_name("py.typed").is_file()

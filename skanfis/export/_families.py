@@ -40,19 +40,9 @@ def _sigmoid(u):
     return (u < 0.0).where(small, 1.0) / (small + 1.0)
 
 
-def _gaussian_constants(theta):
-    location, log_width = theta
-    return [location, np.sqrt(0.5) * np.exp(-log_width)]
-
-
 def _gaussian(x, p):
     t = (x - p[0]) * p[1]
     return lambda: -(t * t), lambda: t * p[1] * -2.0
-
-
-def _bell_constants(theta):
-    location, log_width, log_slope = theta
-    return [location, np.exp(-log_width), np.exp(log_slope)]
 
 
 def _bell(x, p):
@@ -173,8 +163,8 @@ def _side(x, p):
 
 
 _BY_NAME = {
-    "gaussian": (_gaussian_constants, _gaussian),
-    "bell": (_bell_constants, _bell),
+    "gaussian": (lambda theta: [theta[0], np.sqrt(0.5) * np.exp(-theta[1])], _gaussian),
+    "bell": (lambda theta: [theta[0], np.exp(-theta[1]), np.exp(theta[2])], _bell),
     "triangular": (_two_sided_constants, _flanked(_two_sided, _with_foot(_linear))),
     "trapezoidal": (_two_sided_constants, _flanked(_two_sided, _with_foot(_linear))),
     "two_sided_gaussian": (_two_sided_constants, _flanked(_two_sided, _gaussian_profile)),

@@ -118,7 +118,8 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, "Reader"]:
     columns = [_Column(j, name) for j, name in enumerate(names)]
     for label, step in steps:
         columns = _columns_after(label, step, columns)
-    keys = [column.key for column in columns]
+    # What orders the inputs, and no two of them share.
+    keys = [(column.source, column.place) for column in columns]
     for column, key in zip(columns, keys, strict=True):
         if keys.count(key) > 1:
             raise ValueError(
@@ -141,10 +142,9 @@ def last_step(estimator: Any) -> Any:
 
 def final_step(estimator: Any, X: Any = None) -> tuple[Any, Any]:
     """What predicts, behind what freezes or found it, and X, if given, as it takes it."""
+    estimator = found_by_search(estimator)
     if isinstance(estimator, FrozenEstimator):
         return final_step(estimator.estimator, X)
-    if hasattr(estimator, "best_estimator_"):
-        return final_step(estimator.best_estimator_, X)
     if not isinstance(estimator, Pipeline):
         return estimator, X
     for _, step in estimator.steps[:-1] if X is not None else ():
@@ -169,11 +169,6 @@ class _Column:
     scale: float = 1.0
     encode: Callable[..., np.ndarray] | None = None
     place: int = -1
-
-    @property
-    def key(self):
-        """What orders the inputs, and no two of them share."""
-        return self.source, self.place
 
     def values(self, X):
         """The input on the rows of the user's table."""

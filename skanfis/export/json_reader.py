@@ -23,15 +23,7 @@ from ..model import TSKModel
 from ..policies import OUT_OF_BOUNDS, TargetRange
 from ..posterior import MOST_PARAMETERS, Posterior
 from ..support import RuleSupport
-from .limits import (
-    LARGEST_NUMBER,
-    SMALLEST_NUMBER,
-    check_size,
-    groups_of,
-    number,
-    numbers,
-    shown,
-)
+from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, groups_of, number, numbers, shown
 
 FORMAT = "skanfis-model"
 # The first knew no trees.

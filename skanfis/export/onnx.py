@@ -81,7 +81,7 @@ def _convert(scope, node, container):
     dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
     graph = _Graph(scope, container, np.dtype(dtype))
     x = graph.node("Cast", _Value(graph, given.full_name), to=kind)
-    y = _Formula(Numbers(model, dtype), model.out_of_bounds, graph).outputs(x)
+    y = _Formula(Numbers(model, dtype), graph).outputs(x)
     graph.node("Identity", y, output=node.outputs[0].full_name)
 
 
@@ -157,8 +157,8 @@ class _Value:
 class _Formula:
     """The model's formula, written with values of a graph."""
 
-    def __init__(self, numbers, policy, graph):
-        self.numbers, self.policy, self.graph = numbers, policy, graph
+    def __init__(self, numbers, graph):
+        self.numbers, self.graph, self.policy = numbers, graph, numbers.model.out_of_bounds
 
     def outputs(self, x):
         """The outputs (n_rows, n_outputs) at inputs (n_rows, n_inputs)."""

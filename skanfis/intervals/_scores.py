@@ -24,7 +24,7 @@ from sklearn.utils.validation import has_fit_parameter
 from .._sklearn import check_sample_weight, safe_indexing
 from .._validation import check_finite, group_numbers, named_refusals, positive_weights
 from ..exceptions import OutOfBoundsWarning
-from ..export.folding import final_step as last_step
+from ..export.folding import final_step
 
 # An exact fit has no deviation to divide by: of the target's range, what rounding leaves.
 _LEAST_DEVIATION = 1e-12
@@ -144,7 +144,7 @@ def predicted(estimator, X, least):
         centers = mean.reshape(len(mean), -1)
         return centers, np.ones(centers.shape)
     # By itself: with metadata routing a Pipeline would have to be told of return_std.
-    final, X = last_step(estimator, X)
+    final, X = final_step(estimator, X)
     if "return_std" not in inspect.signature(final.predict).parameters:
         raise ValueError(
             f"scaled=True needs predict(X, return_std=True), which {type(final).__name__} does not "
@@ -158,7 +158,7 @@ def predicted(estimator, X, least):
 def held_out_scores(estimator, data, rows, least):
     """Scores of rows that an estimator has not seen, (n_rows, n_outputs)."""
     is_frozen = isinstance(estimator, FrozenEstimator)
-    if not is_frozen and getattr(last_step(estimator)[0], "out_of_bounds", None) == "raise":
+    if not is_frozen and getattr(final_step(estimator)[0], "out_of_bounds", None) == "raise":
         raise ValueError(
             "out_of_bounds='raise' refuses rows held out beyond the range of the others. Use "
             "'clip' or 'linear', or a fitted FrozenEstimator(model) with method='split'."
@@ -172,7 +172,7 @@ def held_out_scores(estimator, data, rows, least):
 
 def leave_one_out_scores(estimator, data, weight, least):
     """Studentised residuals: |y - y_(-i)| over the deviation of y_(-i)."""
-    final = last_step(estimator)[0]
+    final = final_step(estimator)[0]
     noise = getattr(final, "noise_std_", None)
     if noise is None:
         raise ValueError(

@@ -82,13 +82,6 @@ def test_parameters_make_the_round_trip(antecedent, Z, rng):
     )
 
 
-def test_two_gaussians_of_one_width_share_by_a_logistic_curve(Z):
-    # nu_2 / nu_1 = exp((c_2 - c_1) (z - (c_1 + c_2) / 2) / sigma^2)
-    theta = np.array([[-1.0, 2.0], np.log([1.5, 1.5])])
-    strengths = GridAntecedent.build([Gaussian], [1], [theta]).strengths(Z)
-    assert_allclose(strengths[1], 1 / (1 + np.exp(-3.0 * (Z[1] - 0.5) / 2.25)), rtol=1e-12)
-
-
 def test_without_terms_one_rule_always_fires(Z):
     antecedent = no_terms()
     assert_array_equal(antecedent.strengths(Z), np.ones((1, 60)))
@@ -103,18 +96,19 @@ def test_without_terms_one_rule_always_fires(Z):
         assert_array_equal(same.strengths(Z), np.ones((1, 60)))
 
 
-@pytest.mark.parametrize("kind", ["grid", "scattered", "table"])
+@pytest.mark.parametrize("kind", ["grid", "scattered", "table", "tree"])
 def test_the_rest_fires_as_before_in_proportion(kind, rng):
     g, Z = np.random.default_rng(1), rng.normal(size=(3, 50))
     antecedent = {
         "grid": lambda: oracles.random_grid(g, [Gaussian, Bell, Gaussian], [2, 3, 2]),
         "scattered": lambda: oracles.random_scattered(g, Gaussian, 5, [0, 1, 2]),
         "table": lambda: oracles.random_table(g),
+        "tree": lambda: oracles.random_tree(g),
     }[kind]()
     left, terms = antecedent.without_rules([0, 3])
     kept = np.setdiff1d(np.arange(antecedent.n_rules), [0, 3])
     before = antecedent.strengths(Z)[kept]
-    assert isinstance(left, RuleTableAntecedent)
+    assert type(left) is RuleTableAntecedent
     assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-9)
     assert terms.size == left.n_terms
 

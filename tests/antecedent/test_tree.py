@@ -69,25 +69,6 @@ def test_a_split_leaves_the_other_leaves_as_they_are(rng):
     assert split.paths[3] == [*whole.paths[2], (4, False)]
 
 
-def test_a_node_moves_the_output_by_what_stands_above_and_below_it(rng):
-    # d yhat / d z_n = (1 - s_n) sum_above w_r f_r - s_n sum_below w_r f_r
-    Z, found = rng.normal(size=(3, 80)), tree(8)
-    f = rng.normal(size=(8, 80))
-    log_mu = found.log_memberships(Z)
-    truth = np.exp(log_mu[:7])
-    strengths, shares = found.normalise(log_mu)
-    by_term = found.term_sensitivity(strengths * f, (strengths * f).sum(axis=0), shares)
-    # log s and log (1 - s) move by 1 - s and by -s.
-    chained = (1.0 - truth) * by_term[:7] - truth * by_term[7:]
-    for n in range(7):
-        sums = [
-            sum((strengths[r] * f[r] for r, path in enumerate(found.paths) if (n, up) in path))
-            for up in (True, False)
-        ]
-        expected = (1.0 - truth[n]) * sums[0] - truth[n] * sums[1]
-        assert_allclose(chained[n], expected, rtol=1e-10, atol=1e-12)
-
-
 @pytest.mark.theory
 @pytest.mark.parametrize("agreement", [0.0, 0.05])
 @pytest.mark.parametrize(("order", "n_outputs"), [(1, 1), (0, 2)])
@@ -158,15 +139,6 @@ def test_a_walk_from_the_root_meets_every_place_once(n_rules, rng):
     assert_allclose(come[:n_rules], found.strengths(Z), rtol=1e-9, atol=1e-14)
 
 
-def test_without_some_leaves_the_others_are_a_table(rng):
-    Z, found = rng.normal(size=(3, 100)), tree(6)
-    left, terms = found.without_rules([1, 4])
-    assert type(left) is RuleTableAntecedent
-    before = found.strengths(Z)[[0, 2, 3, 5]]
-    assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-9)
-    assert terms.size == left.n_terms
-
-
 class TestOneTermEach:
     """Sides of an input on one path as one term."""
 
@@ -175,17 +147,6 @@ class TestOneTermEach:
         """Two cuts of input 1 on one path, and one of input 0."""
         found = ROOT.split(0, 1, first, np.log(0.3)).split(0, 1, second, np.log(0.2))
         return found.split(1, 0, 0.1, np.log(0.5))
-
-    @pytest.mark.parametrize("second", [1.5, -1.5])
-    def test_strengths_are_the_same(self, second, rng):
-        Z, found = 2.0 * rng.normal(size=(2, 500)), self.two_cuts(0.2, second)
-        table, made = found.with_one_term_each(["a", "b"])
-        assert type(table) is RuleTableAntecedent
-        assert_allclose(table.strengths(Z), found.strengths(Z), rtol=0, atol=1e-12)
-        inputs = table.term_inputs
-        for place in table.table.T:
-            assert np.unique(inputs[place[place >= 0]]).size == 1
-        assert len(made) == table.n_terms
 
     def test_every_pair_of_directions_has_a_family(self):
         found = set()

@@ -1,39 +1,11 @@
-"""scikit-learn's own checks of the clusterers, without exception."""
+"""What both clusterers have to do, whatever the order of the rows; errors say where."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from sklearn.base import clone
-from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import cluster
-
-# In the columns of noise that the checks make, all centres of fuzzy c-means coincide, and it says
-# so; under this project's settings a warning is an error.
-pytestmark = pytest.mark.filterwarnings("ignore:Only:sklearn.exceptions.ConvergenceWarning")
-
-ESTIMATORS = [
-    cluster.SubtractiveClustering(),
-    cluster.FuzzyCMeans(n_clusters=2, m="auto", n_init=1),
-]
-
-
-def name_of(check):
-    return getattr(check, "func", check).__name__
-
-
-# Not parametrize_with_checks: scikit-learn 1.6 hands pytest a generator, of which pytest 9 warns.
-@pytest.mark.parametrize(
-    ("estimator", "check"),
-    [
-        pytest.param(clone, check, id=f"{estimator}-{name_of(check)}")
-        for estimator in ESTIMATORS
-        for clone, check in estimator_checks_generator(estimator)
-    ],
-)
-def test_clusterer_passes_the_checks_of_scikit_learn(estimator, check):
-    check(estimator)
-
 
 BOTH = pytest.mark.parametrize(
     "clusterer",

@@ -89,14 +89,20 @@ def test_search_by_groups_with_weights_is_that_of_one_process(few_are_many, monk
 
 
 def test_few_rows_are_fetched_and_trained_on_as_ever():
-    table = frame(500)
+    table = frame(500).assign(weight=np.linspace(0.0, 2.0, 500), run=np.arange(500) // 50)
     lazy = dd.from_pandas(table, npartitions=3)
-    here = ANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
-    there = DaskANFISRegressor(n_mfs=2).fit(lazy[NAMES], lazy["error"])
+    settings = {"n_mfs": 2, "early_stopping": True}
+    here, there, eager = (
+        model(**settings).fit(own[NAMES], own["error"], own["weight"], own["run"])
+        for model, own in (
+            (ANFISRegressor, table),
+            (DaskANFISRegressor, lazy),
+            (DaskANFISRegressor, table),
+        )
+    )
     assert_array_equal(there.consequents_, here.consequents_)
     assert list(there.feature_names_in_) == NAMES
     assert there.model_.output_names == ("error",)
-    eager = DaskANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
     assert_array_equal(eager.consequents_, here.consequents_)
 
 

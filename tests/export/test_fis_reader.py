@@ -87,7 +87,6 @@ REFUSED = [
     ("NumInputs=", "NumInputs=\N{ARABIC-INDIC DIGIT TWO}", "a whole number"),
     ("Version=", "Verzion=2.0", r"\[System\] has the unknown key 'Verzion'"),
     ("Version=", "Type='sugeno'", "'Type' for the second time"),
-    # names
     # sections
     ("[Input1]", "[Input01]", r"expected \[System\], .* found '\[Input01\]'"),
     ("[Input2]", "[Input1]", r"\[Input1\] stands here for the second time"),
@@ -117,8 +116,7 @@ REFUSED = [
 @pytest.mark.parametrize(("old", "new", "message"), REFUSED)
 def test_refuses_with_the_line(old, new, message):
     text, line = with_line(old, new)
-    place = "line" if message is None else f"line {line}: .*{message}"
-    with pytest.raises(ValueError, match=place):
+    with pytest.raises(ValueError, match=f"line {line}: .*{message}"):
         parse_fis(text)
 
 

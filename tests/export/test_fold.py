@@ -226,8 +226,7 @@ def test_what_does_not_fold_is_named(step, message):
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [{"func": np.log, "inverse_func": np.exp}, {"transformer": PowerTransformer()}],
+    "settings", [{"func": np.log, "inverse_func": np.exp}, {"transformer": PowerTransformer()}]
 )
 def test_a_bent_target_is_refused(settings):
     X, y = data()

@@ -20,11 +20,7 @@ from skanfis.bounds import FixedPoint, OutputLimits
 from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
 from skanfis.export import TRUSTED_TYPES, register_onnx_converter
 from skanfis.export.fis.reader import parse_fis
-from skanfis.gyro import (
-    OpenLoopArcsineRegressor,
-    ResidualRegressor,
-    ThermalRate,
-)
+from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, ThermalRate
 from skanfis.intervals import ConformalRegressor
 from skanfis.learning import SOLVERS, Hybrid
 from skanfis.membership import FAMILIES, MEMBERSHIPS
@@ -48,7 +44,7 @@ ESTIMATORS = {
     ),
     **{name: quick(solver=solver()) for name, solver in SOLVERS.items()},
     "constrained": quick(
-        constraints=[OutputLimits(-50.0, 50.0), FixedPoint([5.0, 0.5], [-0.4, 2.5])],
+        constraints=[OutputLimits(-50.0, 50.0), FixedPoint([5.0, 0.5], [-0.4, 2.5])]
     ),
     **{mf: quick(mf=mf) for mf in MEMBERSHIPS},
 }

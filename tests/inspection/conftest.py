@@ -1,6 +1,4 @@
-"""A fitted pipeline, and figures that are closed after every test."""
-
-import sys
+"""A fitted pipeline."""
 
 import numpy as np
 import pandas as pd
@@ -9,13 +7,6 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from ..quick import quick
-
-
-@pytest.fixture(autouse=True)
-def _close_figures():
-    yield
-    if pyplot := sys.modules.get("matplotlib.pyplot"):
-        pyplot.close("all")
 
 
 @pytest.fixture(scope="session")

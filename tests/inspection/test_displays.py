@@ -10,10 +10,7 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.preprocessing import MinMaxScaler
 
 from skanfis import ANFISRegressor
-from skanfis.inspection import (
-    MembershipDisplay,
-    ResponseSurfaceDisplay,
-)
+from skanfis.inspection import MembershipDisplay, ResponseSurfaceDisplay
 from skanfis.inspection.labels import as_label, printable, title_of
 
 from ..export.rule_bases import EVERY_PAIR, MODELS

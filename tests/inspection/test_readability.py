@@ -10,12 +10,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.inspection import (
-    export_text,
-    measures,
-    readability,
-    rules_html,
-)
+from skanfis.inspection import export_text, measures, readability, rules_html
 from skanfis.inspection.readability import readability_of_rows
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of

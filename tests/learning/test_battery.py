@@ -178,17 +178,9 @@ def test_one_rule_has_nothing_to_iterate_on(name):
 @every_iterative_solver
 def test_what_watches_can_end_the_training(name):
     rows, premise = noisy()
-    seen = []
-
-    def watch(n_iter, evaluation):
-        seen.append((n_iter, evaluation.mean_squared_error))
-        return n_iter == 3
-
-    result = solve(name, rows, premise, on_iteration=watch)
-    assert result.status == "stopped"
+    result = solve(name, rows, premise, on_iteration=lambda n_iter, _: n_iter == 3)
+    assert (result.status, result.n_iter) == ("stopped", 3)
     assert result.converged
-    assert [n for n, _ in seen] == [1, 2, 3]
-    assert_array_equal(result.loss_curve[1:], [loss for _, loss in seen])
 
 
 def test_least_squares_moves_no_premise(rng):

@@ -1,4 +1,4 @@
-"""Parts of the departures: against means and differences, and functions whose parts are known."""
+"""Parts of the departures, against means and differences."""
 
 from dataclasses import replace
 
@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.consequent import NormalFactor
-from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Bell, Gaussian
@@ -97,44 +96,3 @@ class TestComponents:
         expected = one.line.squares(np.linalg.inv(root).T)
         factor = NormalFactor(root @ root.T)
         assert_allclose(one.line.traces(factor), expected, rtol=1e-9, atol=1e-12)
-
-
-def of_a_function(value, slopes):
-    """Squares of every component of rules that follow a function; rows are a grid, evenly."""
-    levels = np.linspace(-1.0, 1.0, 9)
-    X = np.stack(np.meshgrid(levels, levels, levels, indexing="ij"), axis=-1).reshape(-1, 3)
-    rows = StandardisedData.of(X, X[:, :1])
-    centers = [np.array([-1.0, 0.2, 1.1]), np.array([-0.9, 0.8])]
-    thetas = [Gaussian.start(c, np.ones(c.size), 0.6) for c in centers]
-    antecedent = GridAntecedent.build([Gaussian] * 2, [0, 1], thetas)
-    problem = SeparableProblem(rows, antecedent, 1, Penalty())
-    center = problem.local.center
-    local = np.column_stack([value(*center.T), *slopes(*center.T)])
-    local[:, 1:] *= problem.local.spread
-    line = problem.common_line
-    squares = line.squares(local.reshape(-1, 1))[len(line.slopes) :]
-    return dict(zip(line.departures.components, squares, strict=True))
-
-
-class TestKnownFunctions:
-    """Rules that are the tangents of a function at their centres."""
-
-    def only(self, squares, *concerned, atol=1e-20):
-        total = sum(squares.values())
-        for key, square in squares.items():
-            assert square > 1e-3 * total if key in concerned else square < atol * total, key
-
-    def test_a_sum_of_functions_of_one_input_each(self):
-        squares = of_a_function(
-            lambda x, y, z: np.sin(2.0 * x) + y**2 + 3.0 * z,
-            lambda x, y, z: [2.0 * np.cos(2.0 * x), 2.0 * y, np.full_like(z, 3.0)],
-        )
-        self.only(squares, (0,), (1,))
-
-    def test_a_slope_by_an_input_without_terms_that_changes(self):
-        # Such as a scale factor that depends on temperature.
-        squares = of_a_function(
-            lambda x, y, z: z * np.exp(x), lambda x, y, z: [z * np.exp(x), 0.0 * y, np.exp(x)]
-        )
-        # How far a rule stands for rows, the unit of its slopes, may depend on more.
-        self.only(squares, (0, 2), atol=1e-4)

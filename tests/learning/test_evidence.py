@@ -9,12 +9,7 @@ from scipy import integrate, optimize, stats
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.evidence import (
-    PRIOR_DISPLACEMENT,
-    extrapolated,
-    laplace,
-    reestimated,
-)
+from skanfis.learning.evidence import PRIOR_DISPLACEMENT, extrapolated, laplace, reestimated
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise

@@ -48,17 +48,6 @@ class TestJointGradient:
         expected = oracles.complex_step(lambda p: case.dense.cost_at(p, coefficients), case.point)
         assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
-    @pytest.mark.theory
-    def test_gradient_by_coefficients(self, case):
-        coefficients = any_coefficients(case)
-        found = case.problem.joint(case.point, coefficients).coefficients
-        expected = oracles.complex_step(
-            lambda flat: case.dense.cost_at(case.point, flat.reshape(coefficients.shape)),
-            coefficients.ravel(),
-        )
-        expected = expected.reshape(coefficients.shape)
-        assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
-
     def test_at_solved_coefficients_it_is_the_reduced_gradient(self, case):
         evaluation, linearisation = case.at_point()
         joint = case.problem.joint(case.point, evaluation.coefficients)

@@ -4,12 +4,9 @@ The points at which they are compared are far from any optimum. Gradients are co
 dense cost, with beta eliminated inside it: nothing is left out of the derivative.
 """
 
-from multiprocessing.pool import ThreadPool
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from threadpoolctl import threadpool_limits
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.learning import data as rows
@@ -152,25 +149,6 @@ def test_gauss_newton_is_the_schur_complement(case):
     assert_all_close(linearisation.gauss_newton, linearisation.gauss_newton.T, 1e-14)
 
 
-@pytest.mark.theory
-def test_gauss_newton_is_the_curvature_where_the_model_fits_exactly(rng):
-    # Without residuals the second derivatives of the model drop out: H is the Hessian itself.
-    antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 2])
-    X = rng.normal(size=(60, 2))
-    plain = StandardisedData.of(X, X)
-    Z = plain.inputs.apply(X.T, np.empty((2, 60)))
-    phi = oracles.dense_design(antecedent, antecedent.parameters, Z, 1)
-    exact = StandardisedData.of(X, phi @ rng.normal(size=(phi.shape[1], 1)))
-    problem = SeparableProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
-    at = antecedent.parameters
-    evaluation = problem.evaluate(at)
-    evaluation = problem.evaluate(at, evaluation.coefficients)
-    assert evaluation.mean_squared_error < 1e-18
-    dense = oracles.DenseProblem(exact, antecedent, 1, Penalty(alpha=1e-14))
-    hessian = oracles.central_difference(dense.gradient, at, 1e-3)
-    assert_all_close(problem.linearise(evaluation).gauss_newton, hessian, 1e-5)
-
-
 @pytest.mark.parametrize("alpha", [1e-6, 1e-8, 1e-10])
 def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
     # Solving with one factorisation and projecting with another is 4 % wrong here (anchors.md).
@@ -196,27 +174,6 @@ def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
     assert len(split.rows.chunks(split.problem._block_rows)) > 10
     for one, other in zip(arrays(*split.at_point()), whole, strict=True):
         assert_all_close(one, other, 1e-9)
-
-
-def pool_map(function, items):
-    with ThreadPool(3) as pool:
-        yield from pool.imap(function, items)
-
-
-def backward_map(function, items):
-    """The last chunk is done first, but handed over last."""
-    return reversed([function(item) for item in reversed(items)])
-
-
-@pytest.mark.parametrize("map_ordered", [pool_map, backward_map])
-@pytest.mark.parametrize("name", ["grid of both", "scattered"])
-def test_workers_change_not_one_bit(monkeypatch, name, map_ordered):
-    many_small_chunks(monkeypatch)
-    alone = Case.named(name)
-    shared = Case(alone.problem.antecedent, alone.order, alone.rows, map_ordered=map_ordered)
-    with threadpool_limits(limits=1, user_api="blas"):
-        for one, other in zip(arrays(*shared.at_point()), arrays(*alone.at_point()), strict=True):
-            assert_array_equal(one, other)
 
 
 def test_reference_coefficients_do_not_change_the_answer(case, rng):

@@ -9,17 +9,7 @@ from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
 
 from .. import oracles
-from ..premises import (
-    ALL,
-    FACTOR,
-    HIGH,
-    LOW,
-    ON_ALONE,
-    ORDERED,
-    in_the_box,
-    kind_of,
-    terms,
-)
+from ..premises import ALL, FACTOR, HIGH, LOW, ON_ALONE, ORDERED, in_the_box, kind_of, terms
 
 
 @ALL

@@ -101,17 +101,6 @@ def test_of_a_line_the_slopes_by_useless_inputs_are_absent(rng):
     assert (common, dict(absent)) == ((), {1: (0,), 3: (0,), 4: (0,)})
 
 
-def test_contrasts_are_of_slopes_by_unit_of_the_input(rng):
-    problem, _, _ = posterior_of(*planted(rng, 200))
-    coefficients = rng.normal(size=(3, 6))
-    coefficients[:, 2] = 0.3
-    local = problem.local.to_local(coefficients.reshape(-1, 1))
-    every = np.arange(3)
-    assert_allclose(problem.common_line.contrasts(1, every) @ local, 0.0, atol=1e-12)
-    slopes = (problem.common_line.of_slopes(0, every) @ local)[:, 0]
-    assert_allclose(slopes / slopes[0], coefficients[:, 1] / coefficients[0, 1])
-
-
 def test_held_slopes_are_one_and_count_as_one(rng):
     X, y = planted(rng)
     free = posterior_of(X, y)[2]

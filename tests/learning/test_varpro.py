@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import optimize
 
 from skanfis.antecedent import ScatteredAntecedent
-from skanfis.learning import MESSAGES
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
@@ -281,28 +280,23 @@ class Recording:
 
 
 class TestStatus:
-    """Every reason to stop, each reached by a small problem."""
-
-    def check(self, result, status, converged=True):
-        assert result.status == status
-        assert result.message == MESSAGES[status]
-        assert result.converged is converged
-        assert result.loss_curve.shape == (result.n_iter + 1,)
+    """Reasons to stop that noisy rows do not reach, each by a small problem."""
 
     def test_gradient_vanishes_where_the_target_is_constant(self, rng):
         X = rng.normal(size=(50, 2))
         rows = StandardisedData.of(X, np.full((50, 1), 3.0))
         premise = Premise.of(start_of("grid", rows), *oracles.box(rows))
         _, result = solve(rows, premise)
-        self.check(result, "gradient")
-        assert result.n_iter == 0
+        assert (result.status, result.n_iter) == ("gradient", 0)
+        assert result.converged
 
     def test_gradient_vanishes_where_all_displacements_are_stuck(self):
         # The minimum of Rosenbrock's valley in this box is its corner.
         result = varpro(rosenbrock(), Box([-1.0, 0.0], [0.0, 0.0]), max_iter=9, tol=1e-6)
-        self.check(result, "gradient")
+        assert result.status == "gradient"
 
     def test_step_is_the_end_where_nothing_is_tolerated(self):
         rows, premise, *_ = planted("scattered", 0, noise=0.1)
         _, result = solve(rows, premise, tol=0.0, max_iter=5000)
-        self.check(result, "step")
+        assert result.status == "step"
+        assert result.converged

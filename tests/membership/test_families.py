@@ -9,8 +9,8 @@ from skanfis.membership import MEMBERSHIPS, Bell, Gaussian, membership_families
 
 from ..oracles import central_difference, complex_step, corners, textbook_membership
 
-# What sets families apart. Whatever else is added is taken for smooth, one at its center, falling
-# to both sides, and its left and right exchanged where parameters have these names.
+# What sets families apart. Whatever else is added is taken for smooth, one at its center, and
+# falling to both sides.
 WITH_FOOT = {"triangular", "trapezoidal", "pi_shaped", "s_shaped", "z_shaped"}
 SIDES = {"sigmoid_rising", "sigmoid_falling"}
 SIDES_TWICE = {"sigmoids_rising", "sigmoids_falling", "sigmoids_apart"}
@@ -18,9 +18,6 @@ OPEN_SIDE = {"s_shaped": 1.0, "z_shaped": -1.0, "sigmoid_rising": 1.0, "sigmoid_
 OPEN_SIDE |= {"sigmoids_rising": 1.0, "sigmoids_falling": -1.0}
 TOP_BELOW_ONE = {"sigmoid_difference", "sigmoid_product"}
 PEAKED = {"triangular"}
-MIRRORED = {"s_shaped": "z_shaped", "z_shaped": "s_shaped"}
-MIRRORED |= {"sigmoid_rising": "sigmoid_falling", "sigmoid_falling": "sigmoid_rising"}
-MIRRORED |= {"sigmoids_rising": "sigmoids_falling", "sigmoids_falling": "sigmoids_rising"}
 # The floor of log mu where mu is zero: this much of a Gaussian.
 FLOOR = 1e-10
 
@@ -55,16 +52,6 @@ def points(family, theta, distances):
 
 def falling_sides(family):
     return [side for side in (-1.0, 1.0) if side != OPEN_SIDE.get(family.name)]
-
-
-def mirror(family, theta):
-    """The family and theta of the terms mirrored at zero."""
-    mirrored = EVERY_FAMILY[MIRRORED.get(family.name, family.name)]
-    names = [parameter.name for parameter in family.parameters]
-    turned = [{"left": "right", "right": "left"}.get(name, name) for name in names]
-    theta = theta[[names.index(name) for name in turned]]
-    theta[0] *= -1.0
-    return mirrored, theta
 
 
 def floored(family, x, theta):
@@ -184,19 +171,6 @@ def test_at_its_center_a_term_is_one_and_flat(family, rng, distance):
     # A peak has a slope on either side of it, by its location; none by its widths, nor at the top.
     flat = gradient[1:] if family.name in PEAKED and distance else gradient
     assert_allclose(flat, 0.0, atol=1e-25)
-
-
-@FAMILIES
-def test_values_lie_between_zero_and_one_and_left_is_as_right(family, rng):
-    theta = random_theta(family, rng)
-    theta[0] = 0.0
-    x = points(family, theta, NEAR)
-    mu = np.exp(family.log_value(x, theta))
-    assert (mu >= 0.0).all()
-    assert (mu <= 1.0).all()
-    mirrored, turned = mirror(family, theta)
-    # The last bit is lost where two sigmoids are added in the other order.
-    assert_allclose(np.exp(mirrored.log_value(-x, turned)), mu, rtol=1e-13)
 
 
 @FAMILIES

@@ -154,17 +154,13 @@ def gaussian(x, term):
     return np.exp(-0.5 * ((x - term["center"]) / term["width"]) ** 2)
 
 
-def test_too_few_rows_for_anything_but_a_line(rng):
-    X = np.array([[0.0], [1.0], [2.0], [3.0]])
-    model = ANFISRegressor().fit(X, 2.0 * X[:, 0] + 1.0)
-    assert_allclose(model.predict([[0.5], [2.5]]), [2.0, 6.0], rtol=1e-2)
-
-
 @pytest.mark.parametrize("n_rows", [2, 3, 40])
 def test_a_target_that_is_constant_or_exactly_a_line_is_a_rule(rng, n_rows):
     X = inputs(rng, n_rows, 1)
     assert_allclose(ANFISRegressor().fit(X, np.full(n_rows, 0.64)).predict(X), 0.64)
-    assert ANFISRegressor().fit(X, 2.0 * X[:, 0]).n_rules_ == 1
+    line = ANFISRegressor().fit(X, 2.0 * X[:, 0] + 1.0)
+    assert line.n_rules_ == 1
+    assert_allclose(line.predict(0.5 * X), X[:, 0] + 1.0, atol=2e-2)
 
 
 @pytest.mark.floors
@@ -259,17 +255,6 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     model = ANFISRegressor(simplicity=0).fit(X, truth(X) + noise * rng.standard_normal(800))
     errors = model.predict(fresh) - truth(fresh)
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
-
-
-def test_weights_that_are_given_stay_as_they_are(rng):
-    X = inputs(rng, 100)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
-    model = ANFISRegressor(partition="grid", alpha=3e-5).fit(X, y)
-    assert (model.alpha_, model.slope_alpha_) == (3e-5, 3e-5)
-    given = {"agreement": 1e-3, "solver": VariableProjection(stiffness=0.01)}
-    model = ANFISRegressor(partition="grid", simplicity=0.5, **given).fit(X, y)
-    assert model.n_rules_ > 1
-    assert (model.agreement_, model.stiffness_) == (1e-3, 0.01)
 
 
 # ----------------------------------------------------------------------------- what is said of it
@@ -402,14 +387,3 @@ def test_of_columns_that_are_equal_their_order_says_nothing(partition):
         clone(plain).fit(columns, y).predict(columns) for columns in (twice, twice[:, ::-1].copy())
     ]
     assert_allclose(found[1], found[0], atol=1e-5 * y.std())
-
-
-@pytest.mark.parametrize("partition", ["grid", "scattered"])
-def test_a_weight_is_so_many_repeats(rng, partition):
-    X, y, plain = plain_fit(partition)
-    times = rng.integers(1, 4, 100)
-    weighted = clone(plain).fit(X, y, times)
-    repeated = clone(plain).fit(X.repeat(times, axis=0), y.repeat(times))
-    errors = [[o["expected_error"] for o in m.structures_] for m in (weighted, repeated)]
-    assert_allclose(errors[1], errors[0], rtol=1e-4)
-    assert_allclose(repeated.predict(X), weighted.predict(X), atol=1e-5 * y.std())

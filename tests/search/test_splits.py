@@ -64,22 +64,6 @@ def test_the_statistic_is_the_formula_at_every_cut(rng, n_outputs):
     assert [(split.leaf, split.input) for split in splits] == order
 
 
-@pytest.mark.parametrize(
-    ("function", "asked"),
-    [
-        (lambda X: np.tanh(5.0 * X[:, 3]), {3}),
-        (lambda X: X[:, 0] * X[:, 2], {0, 2}),
-        (lambda X: np.where(X[:, 1] > 0.3, X[:, 4], 0.0), {1, 4}),
-    ],
-    ids=["saturation", "product", "switch"],
-)
-def test_a_planted_split_comes_first(rng, function, asked):
-    X = rng.uniform(-1.0, 1.0, (800, 6))
-    y = function(X) + X @ rng.normal(size=6) + 0.1 * rng.normal(size=800)
-    first, *_ = best_splits(model_of(X, y), range(6), 1)
-    assert first.input in asked
-
-
 def test_cuts_are_as_wide_as_half_of_the_leaf_and_crisp_between_two_values(rng):
     X = np.column_stack(
         [rng.normal(size=400), rng.integers(0, 2, 400), 1e-3 * rng.normal(size=400)]

@@ -68,22 +68,6 @@ def test_of_rules_that_are_given_simplicity_raises_the_agreement(rng):
     assert not given.agreement_is_raised
 
 
-def test_rules_that_are_given_are_reported_as_the_one_candidate(rng):
-    rows, found = of_grid(3, sine, rng, 0.1, weights={"agreement": 1e-3, "alpha": 1e-4})
-    (told,) = found.candidates
-    assert told | {"expected_error": 0.0} == {
-        "structure": "3 rules as given",
-        "kind": "grid",
-        "rules": 3,
-        "n_mfs": None,
-        "reading_cost": 3 * (1 + 2),
-        "expected_error": 0.0,
-        "chosen": True,
-    }
-    # In deviations of the target: the noise is a tenth, and the sine's is known.
-    assert_allclose(told["expected_error"] * rows.targets.scale, 0.1, rtol=0.1)
-
-
 @pytest.mark.parametrize("left", [1.0, 1.5])
 def test_a_candidate_begins_where_its_trial_ended(rng, left):
     """With the weights of as many rows as there are; raised agreement holds for any number."""

@@ -95,17 +95,18 @@ def test_pipeline_is_a_clusterer_too():
 WEIGHTS = ("agreement_", "alpha_", "slope_alpha_", "stiffness_")
 
 
-def test_weights_given_are_obeyed():
+@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"partition": "grid", "simplicity": 0.5}])
+def test_weights_given_are_obeyed(settings):
     X, y = data()
-    model = ANFISRegressor(
-        n_mfs=2, agreement=0.3, alpha=0.02, solver=VariableProjection(stiffness=1e-3)
-    ).fit(X, y)
-    assert [getattr(model, name) for name in WEIGHTS] == [0.3, 0.02, 0.02, 1e-3]
+    given = {"agreement": 1e-3, "alpha": 0.02, "solver": VariableProjection(stiffness=1e-3)}
+    model = ANFISRegressor(**settings, **given).fit(X, y)
+    assert model.n_rules_ > 1
+    assert [getattr(model, name) for name in WEIGHTS] == [1e-3, 0.02, 0.02, 1e-3]
     # One that is given leaves the others to be found.
-    model = ANFISRegressor(n_mfs=2, agreement=0.3).fit(X, y)
-    assert model.agreement_ == 0.3
-    assert model.alpha_ not in (0.0, 0.3)
-    model = ANFISRegressor(n_mfs=2, alpha=0.02).fit(X, y)
+    model = ANFISRegressor(**settings, agreement=1e-3).fit(X, y)
+    assert model.agreement_ == 1e-3
+    assert model.alpha_ not in (0.0, 1e-3)
+    model = ANFISRegressor(**settings, alpha=0.02).fit(X, y)
     assert (model.alpha_, model.slope_alpha_) == (0.02, 0.02)
     assert model.agreement_ > 0.0
     assert model.stiffness_ > 0.0

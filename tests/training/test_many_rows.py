@@ -92,9 +92,7 @@ def test_gradient_is_that_of_all_rows(agreement):
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [{"solver": "hybrid", "max_iter": 3}, {"solver": "lse"}],
-    ids=str,
+    "settings", [{"solver": "hybrid", "max_iter": 3}, {"solver": "lse"}], ids=str
 )
 def test_every_way_of_training_ends_on_all_rows(few_are_many, full_passes, settings):
     X, y = noisy_surface()

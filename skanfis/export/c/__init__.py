@@ -5,11 +5,10 @@ from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
-from .._numbers import Numbers
 from ..folding import fold
 from ._source import CCost, Source
 from .builder import header
-from .dialect import Dialect, check_arguments, read_limits, write_files
+from .dialect import Dialect, check_arguments, write_files
 from .self_test import known_answers, self_test
 
 __all__ = ["CCode", "CCost", "export_c"]
@@ -109,20 +108,8 @@ def export_c(
     (26, 419)
     """
     stem, name = check_arguments(path, name, dtype, std, min_coverage)
-    model = fold(estimator)
-    if model.support is None:
-        # Rules that come from elsewhere: no data to be near to or far from.
-        min_coverage = None
-    dialect = Dialect(name, dtype, std)
-    numbers = Numbers(model, dialect.dtype)
-    limits = read_limits(saturate, numbers)
-    source = Source(numbers, dialect, model.out_of_bounds, min_coverage, limits)
-    test = self_test(known_answers(numbers, min_coverage, limits), dialect)
-    code = CCode(
-        name,
-        header(numbers, dialect, source.cost(), min_coverage, limits, units, notes),
-        source.text(f"{stem}.h") + test,
-        source.cost(),
-    )
+    source = Source(fold(estimator), Dialect(name, dtype, std), min_coverage, saturate)
+    text = source.file(f"{stem}.h") + self_test(known_answers(source), source.dialect)
+    code = CCode(name, header(source, units, notes), text, source.cost)
     write_files(code, path)
     return code

@@ -7,16 +7,16 @@ worked out only outside the box, by the derivative along the way back.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from ...policies import SILENT
+from .._numbers import Numbers
 from . import templates
-from ._expressions import body_of, cost_of
-from .dialect import index_type, kept_lines
-
-# What there is nearly everywhere.
-_INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
+from ._expressions import Body
+from .dialect import INDEX_BYTES, index_type, kept_lines, read_limits
 
 
 @dataclass(frozen=True)
@@ -58,10 +58,17 @@ class CCost:
 class Source:
     """The functions and tables of a .c file; ``is_part`` for others in the same file."""
 
-    def __init__(self, numbers, dialect, policy, min_coverage, limits=None, is_part=False):
-        self.numbers, self.dialect, self.policy = numbers, dialect, policy
-        self.min_coverage, self.limits, self.is_part = min_coverage, limits, is_part
-        self.model, self.n_terms = numbers.model, numbers.model.antecedent.n_terms
+    def __init__(self, model, dialect, min_coverage, saturate=None, is_part=False):
+        self.dialect, self.is_part, self.policy = dialect, is_part, model.out_of_bounds
+        numbers: Any = Numbers(model, dialect.dtype)
+        self.numbers, self.model, self.n_terms = numbers, numbers.model, model.antecedent.n_terms
+        # Rules that come from elsewhere have no data to be near to or far from.
+        self.min_coverage = None if model.support is None else min_coverage
+        self.limits = read_limits(saturate, numbers)
+        # What outputs are held within in the end, (2, n_outputs) or None.
+        self.held = numbers.output_limits
+        if self.limits is not None:
+            self.held = self.limits.T if self.held is None else np.clip(self.held, *self.limits.T)
         self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
         self.is_tree = numbers.nodes is not None
         # Logarithms of terms, and the zero of "none".
@@ -91,11 +98,14 @@ class Source:
             "plain": linear and not moves,
             "moves": moves,
             "beyond": linear or (covers and answers),
-            "held": numbers.output_limits is not None,
+            "held": self.held is not None,
+            # Limits that were asked for hold what is no number, too.
             "saturates": self.limits is not None,
+            "clips": self.limits is None and self.held is not None,
         }
         return {fact for fact, holds in facts.items() if holds}
 
+    @cached_property
     def cost(self):
         """CCost of the row that takes most."""
         numbers, itemsize, facts = self.numbers, self.numbers.dtype.itemsize, self.facts
@@ -127,8 +137,9 @@ class Source:
             multiply_adds=multiply_adds,
             divisions=divisions,
             table_bytes=sum(
-                values.size * _INDEX_BYTES.get(kind, itemsize)
-                for values, kind in self.tables().values()
+                values.size
+                * (itemsize if values.dtype.kind == "f" else INDEX_BYTES[index_type(values)])
+                for values in self.tables().values()
             ),
             stack_bytes=n_held * itemsize,
         )
@@ -141,7 +152,8 @@ class Source:
             return self.n_terms // 2 * np.array([1, 0, 4 + is_slope, 1])
         operations = np.zeros(4, dtype=int)
         for terms in numbers.terms:
-            operations += len(terms.constants) * np.array(cost_of(terms.family, is_slope))
+            of_term = Body(terms.family, self.dialect, is_slope).cost
+            operations += len(terms.constants) * np.array(of_term)
         n_shares = self.n_terms if self.is_grid else self.model.n_rules
         if is_slope:
             # Along e, and less their mean.
@@ -153,7 +165,7 @@ class Source:
         operations += [n_shares, 0, n_shares + products, n_sums]
         return operations
 
-    def text(self, include):
+    def file(self, include):
         """All of it; ``include`` is the name of the header."""
         return f'#include "{include}"\n\n#include <float.h>\n#include <math.h>\n\n{self.body()}'
 
@@ -190,11 +202,11 @@ class Source:
         # int has 16 bits at least.
         is_long = max(self.model.n_rules, self.n_terms) > 32767
         functions = dialect.write(text, int="long" if is_long else "int")
-        tables = [dialect.table(name, *table) for name, table in self.tables().items()]
+        tables = [dialect.table(name, values) for name, values in self.tables().items()]
         return "\n".join([dialect.functions() + "\n", *tables, *self._memberships(), functions])
 
     def tables(self):
-        """Constant tables by their names: an array, and the type where it is one of positions."""
+        """Constant tables by their names: numbers of the type, or positions."""
         numbers, facts = self.numbers, self.facts
         found = {"low": numbers.low, "high": numbers.high, "reference": numbers.reference}
         if "beyond" in facts:
@@ -205,15 +217,13 @@ class Source:
             found["tangent_at"] = numbers.tangent_at
             found["tangent_group"] = numbers.tangent_group
         if "held" in facts:
-            found["output_low"], found["output_high"] = numbers.output_limits
+            found["output_low"], found["output_high"] = self.held
         if self.is_tree:
             found["nodes"], found["node_input"], found["node_ends"] = numbers.nodes
         else:
             found |= {f"terms{k}": terms.constants for k, terms in enumerate(numbers.terms)}
         if "covers" in facts:
             found["support"] = numbers.support
-        if "saturates" in facts:
-            found["limits"] = self.limits
         found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
         if self.n_terms and not self.is_tree:
             found["term_input"] = numbers.term_inputs
@@ -221,10 +231,7 @@ class Source:
             found["rule_terms"] = numbers.rule_terms
         if 0 < self.n_slopes < self.model.n_inputs:
             found["slope_input"] = numbers.slope_inputs
-        return {
-            name: (values, None if values.dtype.kind == "f" else index_type(values))
-            for name, values in found.items()
-        }
+        return found
 
     def arrays(self):
         """Arrays on the stack and their lengths: of the main function, and of the tangent."""
@@ -251,7 +258,7 @@ class Source:
                 what = "Derivative of the logarithm" if suffix else "Logarithm"
                 head = f"/* {what} of a membership: {family.name}. */\n"
                 head += f"static $real $name_{family.name}{suffix}($real x, const $real *p)\n{{\n"
-                body = _indented(body_of(family, self.dialect, bool(suffix)))
+                body = _indented(Body(family, self.dialect, bool(suffix)).lines)
                 yield f"{self.dialect.write(head)}{body}\n}}\n"
 
     def _strengths(self, logarithms, rules, slope):

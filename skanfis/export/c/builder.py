@@ -8,9 +8,8 @@ import textwrap
 import numpy as np
 
 from ...policies import policy_in_words
-from .._numbers import Numbers
 from ._source import Source
-from .dialect import STATUS, Dialect, comment, read_limits, remark, status_lines
+from .dialect import STATUS, Dialect, comment, remark, status_lines
 
 _SILENT = {
     "raise": "there is no output: y stays as it is",
@@ -58,28 +57,28 @@ int $name_self_test(void);
 """
 
 
-def header(numbers, dialect, cost, min_coverage, limits, units=None, notes=()):
+def header(source, units, notes):
     """The header, whose first comment says what the model is and what it costs."""
-    model = numbers.model
+    model, numbers, dialect = source.model, source.numbers, source.dialect
     lowest, highest = model.output_limits
     lines = [
         *map(remark, notes),
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
-        *cost_lines(cost),
+        *cost_lines(source.cost),
         "",
         *input_lines(model.input_names, numbers.low, numbers.high, units),
         "Outputs y, and what they are held within:",
         *_ranges(model.output_names, lowest, highest, units),
     ]
-    if limits is not None:
-        ends = zip(model.output_names, limits, strict=True)
+    if source.limits is not None:
+        ends = zip(model.output_names, source.limits, strict=True)
         told = ", ".join(f"{comment(name)} from {a:.7g} to {b:.7g}" for name, (a, b) in ends)
         lines += ["", f"Outputs are saturated beyond limits that were asked for: {told}."]
     lines += _precision_lines(numbers)
     lines += ["", policy_line(model, "Outside this range")]
     lines.append("A row that is not finite gets no output either way.")
-    if min_coverage is not None:
-        lines.append(f"A row is uncovered where its coverage is below {min_coverage:g}.")
+    if source.min_coverage is not None:
+        lines.append(f"A row is uncovered where its coverage is below {source.min_coverage:g}.")
     title = "A Takagi-Sugeno-Kang fuzzy model"
     return header_of(title, lines, dialect, model.n_inputs, model.n_outputs)
 
@@ -150,30 +149,23 @@ def header_of(title, lines, dialect, n_inputs, n_outputs, include=""):
     )
 
 
-class RulesPart:
+class RulesPart(Source):
     """The rules of a model as static functions of a larger C file, which share its status word.
 
-    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is :attr:`name`: the
-    prefix of the file and ``suffix``. ``min_coverage`` and ``saturate`` are those of
-    :func:`skanfis.export.export_c`. ``model``, ``low``, ``high`` and ``limits`` are the model, its
-    box and ``saturate`` in the type of the file.
+    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is the prefix of the
+    file and ``suffix``. ``model``, ``low`` and ``high`` are the model and its box in the type of
+    the file.
     """
 
-    def __init__(self, model, dialect: Dialect, suffix: str, min_coverage, saturate=None) -> None:
-        numbers = Numbers(model, dialect.dtype)
-        self.name = dialect.name + suffix
-        self.min_coverage = None if model.support is None else min_coverage
-        self.limits = read_limits(saturate, numbers)
-        self.model, self.low, self.high = numbers.model, numbers.low, numbers.high
-        own = Dialect(self.name, dialect.real, dialect.std)
-        given = (numbers, own, model.out_of_bounds, self.min_coverage, self.limits)
-        self._source, self._outer = Source(*given, is_part=True), dialect.name.upper()
-        self.cost = self._source.cost()
+    def __init__(self, model, dialect: Dialect, suffix: str, min_coverage) -> None:
+        own = Dialect(dialect.name + suffix, dialect.real, dialect.std)
+        super().__init__(model, own, min_coverage, is_part=True)
+        self.low, self.high, self._outer = self.numbers.low, self.numbers.high, dialect.name.upper()
 
     def text(self) -> str:
         """The C code, for after the lines that include other files."""
-        prefix = self.name.upper()
+        prefix = self.dialect.name.upper()
         sizes = {"N_INPUTS": self.model.n_inputs, "N_OUTPUTS": self.model.n_outputs}
         macros = [f"#define {prefix}_{key} {value}\n" for key, value in sizes.items()]
         macros += [f"#define {prefix}_{key} {self._outer}_{key}\n" for key in STATUS]
-        return f"\n/* Of the rules. */\n{''.join(macros)}\n{self._source.body()}"
+        return f"\n/* Of the rules. */\n{''.join(macros)}\n{self.body()}"

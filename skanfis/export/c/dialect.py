@@ -22,15 +22,17 @@ _NUMBER_IN_TEMPLATE = re.compile(r"(\d+\.\d+)R\b")
 _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
 # A name in a comment stays on its line.
 _LONGEST_COMMENT = 60
-# The status word, also of Python that flags rows as generated C does.
-STATUS = {"IN_RANGE": 0, "OUT_OF_RANGE": 1, "NOT_FINITE": 2, "UNCOVERED": 4, "NO_OUTPUT": 8}
-
-_MEANING = {
-    "OUT_OF_RANGE": "an input lies outside the range of the training data",
-    "NOT_FINITE": "an input is infinite or not a number",
-    "UNCOVERED": "hardly any training data lie near the inputs",
-    "NO_OUTPUT": "y holds no answer",
+# Unsigned types of positions, and the bytes that they take nearly everywhere.
+INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
+_BITS = {
+    "IN_RANGE": (0, ""),
+    "OUT_OF_RANGE": (1, " /* an input lies outside the range of the training data */"),
+    "NOT_FINITE": (2, " /* an input is infinite or not a number */"),
+    "UNCOVERED": (4, " /* hardly any training data lie near the inputs */"),
+    "NO_OUTPUT": (8, " /* y holds no answer */"),
 }
+# The status word, also of Python that flags rows as generated C does.
+STATUS = {name: bit for name, (bit, _) in _BITS.items()}
 
 
 @dataclass(frozen=True)
@@ -80,18 +82,16 @@ class Dialect:
         )
 
     def table(self, name, values, kind=None):
-        """A constant array, of the type where no other kind is given."""
+        """A constant array: of the kind that is given, of the type, or of positions."""
+        kind = kind or (self.real if values.dtype == self.dtype else index_type(values))
         shape = "".join(f"[{n}]" for n in values.shape)
-        head = self.write(f"static const {kind or self.real} $name_{name}{shape} =\n")
+        head = self.write(f"static const {kind} $name_{name}{shape} =\n")
         return f"{head}{literals(values)};\n"
 
 
 def status_lines() -> str:
     """Macros of a header, one for each bit; ``$NAME`` is the prefix."""
-    return "\n".join(
-        f"#define $NAME_{name} {bit}" + (f" /* {_MEANING[name]} */" if bit else "")
-        for name, bit in STATUS.items()
-    )
+    return "\n".join(f"#define $NAME_{name} {bit}{says}" for name, (bit, says) in _BITS.items())
 
 
 def kept_lines(template, facts):
@@ -103,8 +103,7 @@ def kept_lines(template, facts):
 def index_type(values):
     """The smallest unsigned type that holds these positions whatever the width of a char is."""
     largest = max(map(int, np.ravel(values)), default=0)
-    limits = [(255, "unsigned char"), (65535, "unsigned short")]
-    return next((kind for limit, kind in limits if largest <= limit), "unsigned long")
+    return next(kind for kind, n_bytes in INDEX_BYTES.items() if largest < 256**n_bytes)
 
 
 def _literal(value):

@@ -70,15 +70,15 @@ def self_test(answers, dialect):
     return dialect.write(_CODE, n=len(X), **texts)
 
 
-def known_answers(numbers, min_coverage, limits=None):
-    """Rows, outputs, status and the tolerance of every output, of the model of the numbers.
+def known_answers(source):
+    """Rows, outputs, status and the tolerance of every output, of the model of a source.
 
     Half of the rows lie in the box, the others up to half its width beyond. Rows are left out where
     rounding decides: on the coverage, or, in a gap between all terms, on the strongest rule.
     """
-    model = numbers.model
+    numbers, model, min_coverage = source.numbers, source.model, source.min_coverage
     policy = "linear" if model.out_of_bounds == "linear" else "clip"
-    held = (-np.inf, np.inf) if limits is None else limits.T.astype(float)
+    held = (-np.inf, np.inf) if source.limits is None else source.limits.T.astype(float)
 
     def outputs(rows):
         return np.clip(model.with_out_of_bounds(policy).predict(rows), *held)

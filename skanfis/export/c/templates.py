@@ -194,19 +194,14 @@ linear        |
               |    /* Last, so that y may be x. */
               |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
               |        y[o] = $name_offset[o] + sum[o];
- held         |        if (y[o] < $name_output_low[o]) {
+ saturates    |        /* Not (y < low): NaN, of a fault, fails every comparison. */
+ saturates    |        if (!(y[o] >= $name_output_low[o])) {
+ clips        |        if (y[o] < $name_output_low[o]) {
  held         |            y[o] = $name_output_low[o];
  held         |        }
  held         |        if (y[o] > $name_output_high[o]) {
  held         |            y[o] = $name_output_high[o];
  held         |        }
- saturates    |        /* Not (y < low): NaN, of a fault, fails every comparison. */
- saturates    |        if (!(y[o] >= $name_limits[o][0])) {
- saturates    |            y[o] = $name_limits[o][0];
- saturates    |        }
- saturates    |        if (y[o] > $name_limits[o][1]) {
- saturates    |            y[o] = $name_limits[o][1];
- saturates    |        }
               |    }
               |    return status;
               |}
