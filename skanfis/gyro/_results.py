@@ -81,7 +81,7 @@ class Picture(NamedTuple):
         """The figure painted, and its tables as files."""
         file = io.BytesIO()
         # Software and date would make two reports on the same log differ.
-        figure.savefig(file, format="png", dpi=_DOTS_PER_INCH, metadata={"Software": None})
+        figure.canvas.print_png(file, metadata={"Software": None})
         files = {}
         for name, table in tables.items():
             # What a spreadsheet would take for a formula has an apostrophe in front.
@@ -235,9 +235,12 @@ class Results:
 
 def _figure(**options):
     """A figure that is not pyplot's, which would look for a screen."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    return Figure(layout="constrained", **options)
+    figure = Figure(layout="constrained", dpi=_DOTS_PER_INCH, **options)
+    FigureCanvasAgg(figure)  # which draws it once, and savefig twice
+    return figure
 
 
 def _base64(data):
