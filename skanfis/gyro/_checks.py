@@ -91,7 +91,8 @@ def check_log(
     if len(log) < (_FEWEST_ROWS if len(inputs) else 1):
         rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
         raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
-    check_rows(log, units, [log["run"]] if "run" in log else [])
+    runs = log["run"] if "run" in log else np.zeros(len(log))
+    check_rows(log, units, pd.factorize(runs, use_na_sentinel=False)[0])
     n_runs = log["run"].nunique() if "run" in log and len(inputs) else 1
     if n_runs * _FEWEST_ROWS_PER_RUN > len(log):
         raise LogError(
@@ -114,7 +115,7 @@ def check_log(
 
 
 def check_rows(log, units, runs):
-    """LogError for the first bad row; ``runs`` are the columns that tell runs apart."""
+    """LogError for the first bad row; ``runs`` are the numbers of each row's run."""
     for part in QUANTITIES:
         if part not in log:
             continue
@@ -132,19 +133,20 @@ def check_rows(log, units, runs):
 
 
 def _check_time(log, unit, runs):
-    by_run = log.groupby(runs or np.zeros(len(log)), sort=False, observed=True)
-    time, before = log["time"].to_numpy(), by_run["time"].shift().to_numpy()
-    bad = time <= before
-    if bad.any():
-        row = int(bad.argmax())
+    order = np.argsort(runs, kind="stable")
+    time, is_first = log["time"].to_numpy()[order], np.diff(runs[order], prepend=-1) != 0
+    bad = np.flatnonzero((np.diff(time, prepend=-np.inf) <= 0.0) & ~is_first)
+    if bad.size:
+        place = bad[order[bad].argmin()]
         raise LogError(
-            f"time does not increase within a run: {time[row]:.10g} s after {before[row]:.10g} "
-            f"s ({bad.sum()} such rows). Rows must be in the order of time; if several runs "
-            "follow each other, say which column tells them apart (run=NAME).",
+            f"time does not increase within a run: {time[place]:.10g} s after "
+            f"{time[place - 1]:.10g} s ({bad.size} such rows). Rows must be in the order of time; "
+            "if several runs follow each other, say which column tells them apart (run=NAME).",
             "time",
-            row,
+            int(order[place]),
         )
-    duration = (by_run["time"].last() - by_run["time"].first()).to_numpy()
+    starts = np.flatnonzero(is_first)
+    duration = time[np.append(starts[1:], time.size) - 1] - time[starts]
     if duration.max() > _LONGEST_RUN:
         raise LogError(
             f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a "
@@ -153,7 +155,8 @@ def _check_time(log, unit, runs):
         )
     if "temperature" not in log:
         return
-    heating = (by_run["temperature"].max() - by_run["temperature"].min()).to_numpy()
+    heat = log["temperature"].to_numpy()[order]
+    heating = np.maximum.reduceat(heat, starts) - np.minimum.reduceat(heat, starts)
     fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
     if fast.any():
         first = int(np.argmax(fast))

@@ -79,9 +79,12 @@ class Picture(NamedTuple):
     @classmethod
     def of(cls, subject, figure, tables, caption):
         """The figure painted, and its tables as files."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
         file = io.BytesIO()
-        # Software and date would make two reports on the same log differ.
-        figure.savefig(file, format="png", dpi=_DOTS_PER_INCH, metadata={"Software": None})
+        # Software and date would make two reports on the same log differ. A figure's own savefig
+        # draws it twice.
+        FigureCanvasAgg(figure).print_png(file, metadata={"Software": None})
         files = {}
         for name, table in tables.items():
             # What a spreadsheet would take for a formula has an apostrophe in front.
@@ -237,7 +240,7 @@ def _figure(**options):
     """A figure that is not pyplot's, which would look for a screen."""
     from matplotlib.figure import Figure
 
-    return Figure(layout="constrained", **options)
+    return Figure(layout="constrained", dpi=_DOTS_PER_INCH, **options)
 
 
 def _base64(data):

@@ -22,6 +22,7 @@ from ._guess import Request, checked_request, settle
 from ._source import NO_VALUE, Clock, as_numbers, open_source
 from ._units import settle_by_all
 from .errors import LogError, shortened
+from .metrics import rows_by_run
 
 _ROWS = 100_000  # of a piece, which is all that is held of a file's texts
 # A rest without power is longer than what a logger drops, and than a few of its steps.
@@ -138,9 +139,12 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     digests = digests_of(paths)
     files: list[LogFile] = []
     tables: list[pd.DataFrame] = []
+    n_runs = 0
     for number, path in enumerate(paths):
         files.append(LogFile(path, request, files[0] if files else None))
         tables.append(files[-1].read().assign(file=np.int32(number)))
+        tables[-1]["run"] += np.int32(n_runs)
+        n_runs += len(files[-1].runs)
         if len(paths) > 1:
             tell(f"read {number + 1:,} of {len(paths):,}: {path}, {files[-1].n_rows:,} rows")
     table = pd.concat(tables) if len(tables) > 1 else tables[0]
@@ -148,25 +152,23 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
-    keys = ["file", "device", "run"]
-    by_run = table.groupby(keys, sort=False, observed=True)
-    code, runs = by_run.ngroup().to_numpy(np.int32), by_run.size().index.to_frame(index=False)
     n_rows, every = len(table), 1
     while len(table) > most_rows * every:
         every *= 2
     if every > 1:
-        held = by_run.cumcount().to_numpy() % every == 0
-        table, code = table[held], code[held]
+        held = [rows[::every] for rows in rows_by_run(table["run"], n_rows)]
+        table = table.iloc[np.sort(np.concatenate(held))]
         notes.append(f"of {n_rows:,} rows {len(table):,} are used, one in {every} of each run")
-    file, row = table["file"].to_numpy(), table.index.to_numpy()
-    log = table.drop(columns=keys).set_axis(pd.RangeIndex(len(table)))
-    del table, by_run
+    file, code, row = table["file"].to_numpy(), table["run"].to_numpy(), table.index.to_numpy()
+    log = table.drop(columns=["file", "run"]).set_axis(pd.RangeIndex(len(table)))
+    del table
     if layout.assumed and request.assumed is None:
         found = settle_by_all(log, layout)
         if not found.items() <= layout.units.items():
             # All rows tell otherwise than the first ones.
             retold = replace(request, assumed=layout.units | found)
             return read(paths, retold, tell=tell, most_rows=most_rows)
+    runs = pd.concat([each.runs.assign(file=k) for k, each in enumerate(files)], ignore_index=True)
     names = _names_of_runs(runs, paths)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
@@ -188,6 +190,7 @@ class LogFile:
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
         self.n_rows = 0
+        self.runs = pd.DataFrame()  # labels of device and run, of each run that was read
         self._clock: Clock | None = None
         if first is None:
             return
@@ -202,7 +205,7 @@ class LogFile:
             )
 
     def read(self):
-        """The parts as a table in the units of a log, with labels of device and run.
+        """The parts as a table in the units of a log, with the number of each row's run.
 
         The index is the row's position in the file. The command leaves out rows that lack a value,
         tells runs by the clock, and checks every row.
@@ -214,7 +217,7 @@ class LogFile:
         # A gap in one column is none in the clock.
         log = log[~missing[[part for part in ("time", *LABELS) if part in log]].any(axis=1)]
         for part in LABELS:
-            log[part] = log[part].astype("category") if part in log else ""
+            log[part] = log[part].astype("category") if part in log else self._unlabelled(log)
         if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
             runs = self._told_by_clock(log["time"].to_numpy())
             log = log[: len(runs)].assign(run=runs)
@@ -222,12 +225,24 @@ class LogFile:
         if not is_whole.all():
             self._note_gaps(missing)
             log = log[is_whole[log.index]]
+        log = log.drop(columns="device").assign(run=self._number_runs(log))
         if self._is_command:
             try:
-                check_rows(log, self.layout.units, [log["device"], log["run"]])
+                check_rows(log, self.layout.units, log["run"].to_numpy())
             except LogError as error:
                 raise self.located(error, log.index) from error
         return log
+
+    @staticmethod
+    def _unlabelled(rows):
+        """One label for all rows, in little memory."""
+        return pd.Categorical.from_codes(np.zeros(len(rows), dtype=np.int8), [""])
+
+    def _number_runs(self, log):
+        """Number of each row's run, whose labels are kept."""
+        by_run = log.groupby(list(LABELS), sort=False, observed=True)
+        self.runs = by_run.size().index.to_frame(index=False)
+        return by_run.ngroup().to_numpy(np.int32)
 
     def _converted(self):
         """All rows, in the units of a log."""
@@ -303,7 +318,7 @@ class LogFile:
             )
             code = code[:-n_last]
         if not code[-1]:
-            return [""] * code.size
+            return self._unlabelled(code)
         self.notes.append(
             f"{self.path}: is split into {code[-1] + 1} runs, where the time begins anew or steps "
             f"by more than {longest:.4g} s"
