@@ -57,7 +57,7 @@ _SMALLEST_FREEDOM = 1e-6
 # more takes as long, and memory.
 _MOST_INVERTED = 512
 # Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
-# a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it (benchmarks/one_pass.py).
+# a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it.
 _BLOCK_BYTES = 2**22
 _FEWEST_ROWS = 128
 
