@@ -29,6 +29,8 @@ class Judged:
     Parameters
     ----------
     candidate : Candidate
+    in_folds : list of Candidate
+        Its like in every fold.
     squares : ndarray of shape (n_judged,)
         Squared errors, summed over outputs.
     squared_error : float
@@ -40,6 +42,7 @@ class Judged:
     """
 
     candidate: Candidate
+    in_folds: list[Candidate]
     squares: np.ndarray
     squared_error: float
     cost: int

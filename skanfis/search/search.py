@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..learning.data import StandardisedData
-from .candidates import KINDS, Candidate
+from .candidates import KINDS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, splits
 from .start import Start, started
@@ -44,7 +44,6 @@ class StructureSearch:
         self.trials = self.folds[0] if len(found) == 1 else Trials(sample, plan)
         self.judges = Judges.of(self.rest)
         self.judged: list[Judged] = []
-        self.in_folds: dict[Candidate, list[Candidate]] = {}
 
     def run(self, kinds: Sequence[str] = KINDS) -> Start:
         """A start from the structure that is chosen."""
@@ -84,7 +83,7 @@ class StructureSearch:
 
     def _judge_sparse_slopes(self, one, variance):
         """Judge a candidate with fewer slopes; it counts if there are, and its rules hold alone."""
-        in_folds = [replace(like, has_sparse_slopes=True) for like in self.in_folds[one.candidate]]
+        in_folds = [replace(like, has_sparse_slopes=True) for like in one.in_folds]
         simpler = self._judge(replace(one.candidate, has_sparse_slopes=True), in_folds)
         most = tolerated(one.squared_error_of_rules, variance, self.simplicity)
         if simpler.cost == one.cost or simpler.squared_error_of_rules > max(most, variance):
@@ -92,7 +91,6 @@ class StructureSearch:
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""
-        self.in_folds[candidate] = in_folds
         squares = np.concatenate(
             [
                 fold.squared_errors(fold.tuned(one), rest)
@@ -103,7 +101,8 @@ class StructureSearch:
         squares *= factor
         error = self.judges.mean(squares)
         tuned = self.trials.tuned(candidate)
-        judged = Judged(candidate, squares, error, cost_of(tuned), error + tuned.disagreement)
+        of_rules = error + tuned.disagreement
+        judged = Judged(candidate, in_folds, squares, error, cost_of(tuned), of_rules)
         self.judged.append(judged)
         return judged
 
