@@ -18,11 +18,12 @@ from .terms import (
     Shares,
     enclosed,
     largest_mean,
+    mean_range,
     product,
     size,
-    smallest_mean,
     square,
     term_ranges,
+    widened,
 )
 
 
@@ -35,19 +36,19 @@ def reach_of(model):
 
 @dataclass(frozen=True, eq=False)
 class _Parts:
-    """What one batch of boxes is made of."""
+    """What one batch of boxes is made of; ranges have both ends along their first axis."""
 
-    shares: list[Shares]
-    value: tuple[np.ndarray, np.ndarray]  # range of f, of shape (*counts, n_boxes)
-    middle: np.ndarray  # f at the middle of the box, likewise
+    box: np.ndarray  # the part in the range, (2, n_inputs, n_boxes)
+    way: np.ndarray  # range of h, likewise
     half: np.ndarray  # half the widths of the boxes in the range, (n_inputs, n_boxes)
-    departure: dict[int, tuple[np.ndarray, np.ndarray]]  # of D, broadcast to the shape of f
-    curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 log w / dx_j^2, likewise
-    way: tuple[np.ndarray, np.ndarray]  # of h, (n_inputs, n_boxes)
-    box: tuple[np.ndarray, np.ndarray]  # the part in the range, likewise
+    shares: list[Shares]
+    middle: np.ndarray  # f at the middle of the box, of shape (*counts, n_boxes)
+    value: np.ndarray  # range of f
+    departure: dict[int, np.ndarray]  # range of D, broadcast to the shape of f
+    curvature: dict[int, np.ndarray]  # range of d^2 log w / dx_j^2, likewise
+    known: dict = field(default_factory=dict)  # what has been found of them
     slack: np.ndarray | None = None  # (n_boxes,), what values are off by
     slope_slack: np.ndarray | None = None  # (n_inputs, n_boxes)
-    known: dict = field(default_factory=dict)  # what ``centred`` has found
 
 
 class Enclosure:
@@ -89,41 +90,41 @@ class Enclosure:
         """
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
-            natural = largest_mean(self._continued(parts), parts.shares) + parts.slack
-            down, up = self._slopes(parts, low, high, range(low.shape[0]))
-            points, rise = _best_centres(down, up, low, high)
+            natural = largest_mean(self._continued(parts)[1], parts.shares) + parts.slack
+            slopes = np.stack([self._slope(parts, low, high, i) for i in range(len(low))], axis=1)
+            points, rise = _best_centres(slopes, low, high)
             attained = self.say(points.T)
             by_slopes = attained + rise + 2.0 * parts.slack
             bound = np.fmin(np.where(np.isnan(natural), np.inf, natural), by_slopes)
-            gain = (up - down) * (high - low)
+            gain = (slopes[1] - slopes[0]) * (high - low)
         return self.hold(bound), points, self.hold(attained), gain
 
     def slope(self, low, high, j):
         """As :meth:`values` of dP/dx_j; what is attained is so in the limit where it jumps."""
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
-            natural = self._slopes(parts, low, high, [j])[1][0]
-            bends = [self._mixed(parts, i, j) for i in range(len(low))]
-            down, up = np.stack([b[0] for b in bends]), np.stack([b[1] for b in bends])
-            points, rise = _best_centres(down, up, low, high)
-            least, most = self._slopes(self._parts(points, points), points, points, [j])
+            natural = self._slope(parts, low, high, j)[1]
+            bends = np.stack([self._mixed(parts, i, j) for i in range(len(low))], axis=1)
+            points, rise = _best_centres(bends, low, high)
+            least, most = self._slope(self._parts(points, points), points, points, j)
             # Beyond the range the tangent's own slope changes by what is not enclosed here.
             inside = (low >= self.model.minimum[:, None]) & (high <= self.model.maximum[:, None])
-            by_bends = np.where(inside.all(axis=0), most[0] + rise, np.inf)
-            gain = np.where(np.isfinite(by_bends), up - down, self._gain_of_slope(parts, j))
+            by_bends = np.where(inside.all(axis=0), most + rise, np.inf)
+            gain = np.where(
+                np.isfinite(by_bends), bends[1] - bends[0], self._gain_of_slope(parts, j)
+            )
             bound = np.fmin(natural, by_bends)
             # Where the output may be held its slope may be zero.
             bound = np.where(self._may_be_held(parts), np.maximum(bound, 0.0), bound)
             said = self.say(points.T)
-            attained = np.where(said == self.hold(said), least[0], 0.0)
+            attained = np.where(said == self.hold(said), least, 0.0)
         return bound, points, attained, gain * (high - low)
 
     def _may_be_held(self, parts):
         """Where what the rules say may pass the limits, (n_boxes,)."""
         if np.isinf([self.lowest, self.highest]).all():
             return np.zeros(parts.slack.size, dtype=bool)
-        most = largest_mean(self._continued(parts), parts.shares) + parts.slack
-        least = smallest_mean(self._continued(parts, end=0), parts.shares) - parts.slack
+        least, most = widened(mean_range(self._continued(parts), parts.shares), parts.slack)
         return ~((most <= self.highest) & (least >= self.lowest))
 
     def _gain_of_slope(self, parts, j):
@@ -135,39 +136,36 @@ class Enclosure:
         return gain
 
     def _largest_strengths(self, parts):
-        strength = np.ones(parts.middle.shape)
-        for place, one in enumerate(parts.shares):
-            strength = strength * self._placed(one.high, place)
-        return strength
+        return prod(self._placed(one.high, place) for place, one in enumerate(parts.shares))
 
     def _parts(self, low, high):
-        model = self.model
-        edges, reach = (model.minimum[:, None], model.maximum[:, None]), self.reach[:, None]
-        near, far = np.clip(low, *edges), np.clip(high, *edges)
-        way = np.clip(low - near, -reach, reach), np.clip(high - far, -reach, reach)
-        middle, half = 0.5 * (near + far), 0.5 * (far - near) * (1.0 + 4.0 * EPS)
-        terms = term_ranges(model.antecedent, near, far)
+        model, ends = self.model, np.stack([low, high])
+        box = np.clip(ends, model.minimum[:, None], model.maximum[:, None])
+        way = np.clip(ends - box, -self.reach[:, None], self.reach[:, None])
+        middle, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0]) * (1.0 + 4.0 * EPS)
         log_mu = model.antecedent.log_memberships(middle)
         log_mu = np.concatenate([log_mu, np.zeros((1, low.shape[1]))])
-        given = terms, term_ranges(model.antecedent, middle, middle), log_mu, half
-        shares = [enclosed(factor, *given) for factor in self.factors]
+        terms = term_ranges(model.antecedent, *box)
+        at_middle = term_ranges(model.antecedent, middle, middle)
+        shares = [enclosed(one, terms, at_middle, log_mu, half) for one in self.factors]
+        departure, curvature = (
+            {
+                j: self._placed(ends, place)
+                for place, one in enumerate(shares)
+                for j, ends in getattr(one, name).items()
+            }
+            for name in ("departure", "curvature")
+        )
         centre = self.height + self.slopes @ (middle - model.reference[:, None])
         radius = np.abs(self.slopes) @ half
-        value = self._shaped(centre - radius), self._shaped(centre + radius)
-        departure: dict = {}
-        curvature: dict = {}
-        for place, one in enumerate(shares):
-            for found, of_factor in ((departure, one.departure), (curvature, one.curvature)):
-                for j, ends in of_factor.items():
-                    found[j] = tuple(self._placed(end, place) for end in ends)
-        middle = self._shaped(centre)
-        parts = _Parts(shares, value, middle, half, departure, curvature, way, (near, far))
-        slack, slope_slack = self._slacks(parts, near, far)
+        value = self._shaped(np.stack([centre - radius, centre + radius]))
+        parts = _Parts(box, way, half, shares, self._shaped(centre), value, departure, curvature)
+        slack, slope_slack = self._slacks(parts)
         return replace(parts, slack=slack, slope_slack=slope_slack)
 
-    def _slacks(self, parts, near, far):
+    def _slacks(self, parts):
         """What values (n_boxes,), and slopes (n_inputs, n_boxes), are off by at the most."""
-        far_off = size((near, far)) + np.abs(self.model.reference)[:, None]
+        far_off = size(parts.box) + np.abs(self.model.reference)[:, None]
         largest = (np.abs(self.height) + np.abs(self.slopes) @ far_off).max(axis=0)
         part = EPS * (ROUNDINGS + self.model.n_rules + self.model.n_inputs)
         strength = self._largest_strengths(parts)
@@ -188,21 +186,21 @@ class Enclosure:
         return moved.sum(axis=self.axes) + part * largest + beyond, slopes
 
     def _shaped(self, by_rule):
-        return by_rule.reshape(*self.counts, by_rule.shape[1])
+        """Values by rule along the axes of all factors."""
+        return by_rule.reshape(*by_rule.shape[:-2], *self.counts, by_rule.shape[-1])
 
     def _placed(self, by_share, place):
-        """Values of a factor's shares along their own axis."""
+        """Values of a factor's shares along its own axis."""
         shape = [1] * len(self.counts)
-        shape[place] = by_share.shape[0]
-        return by_share.reshape(*shape, by_share.shape[1])
+        shape[place] = by_share.shape[-2]
+        return by_share.reshape(*by_share.shape[:-2], *shape, by_share.shape[-1])
 
     def _tangent(self, parts, j):
         """Range of b_j + D_j (f - phi) by rule."""
         own = self._shaped(self.slopes[:, j, None])
         if j not in parts.departure:
-            return own, own
-        low, high = product(parts.departure[j], self._centred(parts, self.place[j]))
-        return own + low, own + high
+            return np.stack([own, own])
+        return own + product(parts.departure[j], self._centred(parts, self.place[j]))
 
     def _centred(self, parts, *places):
         """Range of f less its means along the axes of these factors, at the middle's shares."""
@@ -211,7 +209,7 @@ class Enclosure:
             for i in np.flatnonzero(self.slopes.any(axis=0)):
                 own = self._less_means(parts, self._shaped(self.slopes[:, i, None]), places)
                 radius = radius + np.abs(own) * parts.half[i]
-            parts.known[places] = middle - radius, middle + radius
+            parts.known[places] = np.stack([middle - radius, middle + radius])
         return parts.known[places]
 
     def _less_means(self, parts, values, places):
@@ -223,20 +221,21 @@ class Enclosure:
 
     def _off_mean(self, parts, place):
         """Range of f less its mean along the axis of a factor, whatever the shares."""
-        low, high = self._centred(parts, place)
-        axis, shares = place - len(self.counts) - 1, [parts.shares[place]]
-        least = smallest_mean(np.moveaxis(low, axis, -2), shares)
-        most = largest_mean(np.moveaxis(high, axis, -2), shares)
-        return low - np.expand_dims(most, axis), high - np.expand_dims(least, axis)
+        ends, axis = self._centred(parts, place), place - len(self.counts) - 1
+        mean = mean_range(np.moveaxis(ends, axis, -2), [parts.shares[place]])
+        return ends - np.expand_dims(mean[::-1], axis)
 
-    def _continued(self, parts, end=1):
-        """Largest f + sum_j h_j (b_j + D_j (f - phi)) by rule; with end=0 the smallest."""
-        furthest = parts.value[end]
+    def _continued(self, parts):
+        """Range of f + sum_j h_j (b_j + D_j (f - phi)) by rule."""
+        found = parts.value
         for j in self._ways_out(parts):
-            ahead, there = (parts.way[0][j], parts.way[1][j]), self._there(parts, j)
-            tangent = self._tangent(parts, j) if there is parts else self._steepness(there, j)
-            furthest = furthest + product(ahead, tangent)[end]
-        return furthest
+            there = self._there(parts, j)
+            if there is parts:
+                tangent = self._tangent(parts, j)
+            else:
+                tangent = np.expand_dims(self._steepness(there, j), tuple(1 + i for i in self.axes))
+            found = found + product(parts.way[:, j], tangent)
+        return found
 
     def _there(self, parts, j):
         """Parts of where the tangent along j is found: other inputs may be held elsewhere."""
@@ -246,76 +245,64 @@ class Enclosure:
         if not is_held.any():
             return parts
         if ("there", g) not in parts.known:
-            ends = (np.where(is_held, at[g][:, None], end) for end in parts.box)
-            parts.known["there", g] = self._parts(*ends)
+            parts.known["there", g] = self._parts(*np.where(is_held, at[g][:, None], parts.box))
         return parts.known["there", g]
 
     def _steepness(self, parts, j):
         """Range of the slope by x_j where the model is that of its rules."""
-        down, up = self._tangent(parts, j)
-        slack = parts.slope_slack[j]
-        return smallest_mean(down, parts.shares) - slack, largest_mean(up, parts.shares) + slack
+        return widened(mean_range(self._tangent(parts, j), parts.shares), parts.slope_slack[j])
 
     def _ways_out(self, parts):
         """Inputs along which some box leaves the range."""
-        return np.flatnonzero((parts.way[0] < 0.0).any(axis=1) | (parts.way[1] > 0.0).any(axis=1))
+        return np.flatnonzero(parts.way.any(axis=(0, 2)))
 
-    def _slopes(self, parts, low, high, wanted):
-        """Range of dP/dx_i for the inputs wanted, (n_wanted, n_boxes) each."""
-        model, outside = self.model, self._ways_out(parts)
-        downs, ups = [], []
-        for i in wanted:
-            down, up = beyond_down, beyond_up = self._steepness(parts, i)
-            if i in outside:
-                beyond_down, beyond_up = self._steepness(self._there(parts, i), i)
-            own, at = self.tangents
-            # A tangent that is found elsewhere along i does not change with x_i.
-            moves = np.isnan(at[own[:, outside].argmax(axis=0), i])
-            for j in outside[(outside != i) & moves]:
-                ahead = parts.way[0][j], parts.way[1][j]
-                least, most = product(ahead, self._mixed(self._there(parts, j), i, j))
-                down, up = down + least, up + most
-            goes_in = (low[i] <= model.maximum[i]) & (high[i] >= model.minimum[i])
-            goes_out = (low[i] < model.minimum[i]) | (high[i] > model.maximum[i])
-            down, up = np.where(goes_in, down, np.inf), np.where(goes_in, up, -np.inf)
-            down = np.where(goes_out, np.minimum(down, beyond_down), down)
-            up = np.where(goes_out, np.maximum(up, beyond_up), up)
-            first, last = model.minimum[i] - self.reach[i], model.maximum[i] + self.reach[i]
-            ends_here = (low[i] < first) | (high[i] > last)
-            is_held = (high[i] < first) | (low[i] > last)
-            down = np.where(is_held, 0.0, np.where(ends_here, np.minimum(down, 0.0), down))
-            up = np.where(is_held, 0.0, np.where(ends_here, np.maximum(up, 0.0), up))
-            downs.append(np.where(np.isnan(down), -np.inf, down))
-            ups.append(np.where(np.isnan(up), np.inf, up))
-        return np.stack(downs), np.stack(ups)
+    def _slope(self, parts, low, high, i):
+        """Range of dP/dx_i, (2, n_boxes)."""
+        model, outside, (own, at) = self.model, self._ways_out(parts), self.tangents
+        inside = beyond = self._steepness(parts, i)
+        if i in outside:
+            beyond = self._steepness(self._there(parts, i), i)
+        # A tangent that is found elsewhere along i does not change with x_i.
+        moves = np.isnan(at[own[:, outside].argmax(axis=0), i])
+        for j in outside[(outside != i) & moves]:
+            inside = inside + product(parts.way[:, j], self._mixed(self._there(parts, j), i, j))
+        first, last = model.minimum[i], model.maximum[i]
+        furthest = first - self.reach[i], last + self.reach[i]
+        down, up = np.full(inside.shape[1:], np.inf), np.full(inside.shape[1:], -np.inf)
+        for is_there, ends in (
+            ((low[i] <= last) & (high[i] >= first), inside),
+            ((low[i] < first) & (high[i] >= furthest[0]), beyond),
+            ((high[i] > last) & (low[i] <= furthest[1]), beyond),
+            ((low[i] < furthest[0]) | (high[i] > furthest[1]), np.zeros((2, 1))),
+        ):
+            down = np.where(is_there, np.minimum(down, ends[0]), down)
+            up = np.where(is_there, np.maximum(up, ends[1]), up)
+        # What is not known has no bounds.
+        return np.where(np.isnan([down, up]), [[-np.inf], [np.inf]], [down, up])
 
     def _mixed(self, parts, i, j):
         """Range of the second derivative by two inputs, or twice by one."""
-        low, high = np.zeros((2, *parts.value[0].shape))
+        found = np.zeros_like(parts.value)
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:
                 own = self._shaped(self.slopes[:, other, None])
                 own = self._less_means(parts, own, [self.place[one]])
-                least, most = product(parts.departure[one], (own, own))
-                low, high = low + least, high + most
+                found = found + product(parts.departure[one], (own, own))
         if i in parts.departure and j in parts.departure:
             places = self.place[i], self.place[j]
             same = places[0] == places[1]
             off = self._off_mean(parts, places[0]) if same else self._centred(parts, *places)
             both = product(parts.departure[i], parts.departure[j])
             if i == j:
-                both = square(parts.departure[i])
-                both = tuple(a + c for a, c in zip(both, parts.curvature[i], strict=True))
-            least, most = product(both, off)
-            low, high = low + least, high + most
-        largest = size((low, high)).max(axis=self.axes)
-        slack = EPS * ROUNDINGS * prod(self.counts) * largest
-        low, high = smallest_mean(low, parts.shares), largest_mean(high, parts.shares)
-        return low - slack, high + slack
+                both = square(parts.departure[i]) + parts.curvature[i]
+            found = found + product(both, off)
+        slack = EPS * ROUNDINGS * prod(self.counts) * size(found).max(axis=self.axes)
+        return widened(mean_range(found, parts.shares), slack)
 
 
-def _best_centres(down, up, low, high):
+def _best_centres(slopes, low, high):
     """The points from which slopes give the least upper bound, and how far this is above them."""
+    down, up = slopes
     between = (up * high - down * low) / (up - down)
     points = np.where(down >= 0.0, high, np.where(up <= 0.0, low, between))
     points = np.where(np.isfinite(points), points, 0.5 * (low + high))

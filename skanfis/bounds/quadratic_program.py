@@ -16,7 +16,7 @@ _ZERO = 1e-10
 # Equalities of which one follows from others.
 _DEPENDENT = 1e-10
 # Rounds in which inequalities are found.
-_MOST_ROUNDS = 100
+_MOST_ROUNDS = 1000
 
 
 class InfeasibleError(Exception):

@@ -51,14 +51,11 @@ def is_known(family):
 
 
 class TermRanges(NamedTuple):
-    """Of every term in every box, (n_terms, n_boxes) each."""
+    """Of every term in every box: both ends, (2, n_terms, n_boxes), and an error."""
 
-    low: np.ndarray  # of log mu
-    high: np.ndarray
-    slope_low: np.ndarray
-    slope_high: np.ndarray
-    curve_low: np.ndarray  # of d^2 log mu / dx^2; NaN where it has no bound
-    curve_high: np.ndarray
+    log_mu: np.ndarray
+    slope: np.ndarray
+    curve: np.ndarray  # d^2 log mu / dx^2; NaN where it has no bound
     error: np.ndarray  # of log mu as it is computed, at most
 
 
@@ -73,7 +70,7 @@ def ranges(group: TermGroup, low, high):
     at_lo, by_lo = family.log_value_and_gradient(lo, theta)
     at_hi, by_hi = family.log_value_and_gradient(hi, theta)
     # Memberships depend on x - location: the slope is minus the derivative by the location.
-    slope = -by_hi[0], -by_lo[0]
+    slope = np.stack([-by_hi[0], -by_lo[0]])
     if family in _PRODUCTS:
         # Its top is not at its place: it lies below its tangents at the ends.
         rising, falling = np.maximum(slope[1], 0.0), np.maximum(-slope[0], 0.0)
@@ -84,13 +81,11 @@ def ranges(group: TermGroup, low, high):
         top = family.log_value(np.clip(place, lo, hi), theta)
     if family in _BY_SIDES:
         slope = _slope_by_sides(group, lo, hi)
-    bottom, top = widened(np.minimum(at_lo, at_hi), top)
-    bottom, top = bottom - ROUNDINGS * EPS, top + ROUNDINGS * EPS
-    slope = widened(*slope)
+    log_mu = widened([np.minimum(at_lo, at_hi), top], ROUNDINGS * EPS)
+    slope, curve = widened(slope), widened(_curvature(group, lo, hi))
     with np.errstate(invalid="ignore"):
-        error = reach * size(slope) + ROUNDINGS * EPS * np.abs(bottom)
-    curve_low, curve_high = widened(*_curvature(group, lo, hi))
-    return TermRanges(bottom, top, slope[0], slope[1], curve_low, curve_high, error)
+        error = reach * size(slope) + ROUNDINGS * EPS * np.abs(log_mu[0])
+    return TermRanges(log_mu, slope, np.broadcast_to(curve, slope.shape), error)
 
 
 def _plateau(group):
@@ -114,17 +109,16 @@ def _slope_by_sides(group, lo, hi):
     touches_top = np.full(lo.shape, True)
     for side, flank in flanks.items():
         begin = theta[0] + side * _plateau(group)
-        ends = side * (lo - begin) / flank, side * (hi - begin) / flank
-        near, far = np.minimum(*ends), np.maximum(*ends)
+        near, far = np.sort([side * (lo - begin) / flank, side * (hi - begin) / flank], axis=0)
         t = np.maximum(near, 0.0), np.maximum(far, 0.0)
-        size_low, size_high = _fall_of_bell(theta, *t) if family is Bell else _fall(family, *t)
-        found = -side * size_low / flank, -side * size_high / flank
-        low = np.where(far > 0.0, np.minimum(low, np.minimum(*found)), low)
-        high = np.where(far > 0.0, np.maximum(high, np.maximum(*found)), high)
+        sizes = _fall_of_bell(theta, *t) if family is Bell else _fall(family, *t)
+        found = np.sort([-side * one / flank for one in sizes], axis=0)
+        low = np.where(far > 0.0, np.minimum(low, found[0]), low)
+        high = np.where(far > 0.0, np.maximum(high, found[1]), high)
         touches_top &= near <= 0.0
     touches_top |= low > high
-    low = np.where(touches_top, np.minimum(low, 0.0), low)
-    return low, np.where(touches_top, np.maximum(high, 0.0), high)
+    low, high = np.where(touches_top, [np.minimum(low, 0.0), np.maximum(high, 0.0)], [low, high])
+    return np.stack([low, high])
 
 
 def _fall_of_bell(theta, near, far):
@@ -160,33 +154,31 @@ def _fall(family, near, far):
 
 
 def _curvature(group, lo, hi):
-    """Range of d^2 log mu / dx^2; NaN for flanks with a foot, whose slope jumps or nearly so."""
+    """Range of d^2 log mu / dx^2; NaN where it has no bound.
+
+    That is of flanks with a foot, whose slope jumps or nearly so, and of pointed bells, b < 1. Of
+    families but sigmoids it is the range wherever x is.
+    """
     family, theta = group.family, group.theta[:, :, None]
+    per_width, nothing = np.exp(-theta[1:]), np.full(theta[0].shape, np.nan)
     if family is Gaussian:
-        curve = np.broadcast_to(-np.exp(-2.0 * theta[1]), lo.shape)
-        return curve, curve
+        return -(per_width[0] ** 2), -(per_width[0] ** 2)
     if family is TwoSidedGaussian:
-        half = 0.5 * np.exp(theta[3])
-        on_left, on_right = lo < theta[0] - half, hi > theta[0] + half
-        on_top = (hi >= theta[0] - half) & (lo <= theta[0] + half)
-        left, right = (np.broadcast_to(-np.exp(-2.0 * log), lo.shape) for log in theta[1:3])
-        low = np.minimum(np.where(on_left, left, 0.0), np.where(on_right, right, 0.0))
-        high = np.maximum(np.where(on_left, left, -np.inf), np.where(on_right, right, -np.inf))
-        return low, np.where(on_top, 0.0, high)
+        return -(per_width[:2].max(axis=0) ** 2), 0.0
+    if family in _SIDES:
+        bend = _sigmoid_curve((lo - theta[0]) * per_width[0], (hi - theta[0]) * per_width[0])
+        return tuple(-one * per_width[0] ** 2 for one in bend)
     if family in (SigmoidDifference, *_PRODUCTS):
-        left = np.exp(-theta[2])
-        right = np.exp(-theta[3]) if family in _PRODUCTS else left
+        left, right = per_width[1], per_width[-1]
         width = np.exp(theta[1])
         rise = _sigmoid_curve((lo - theta[0] + width) * left, (hi - theta[0] + width) * left)
         fall = _sigmoid_curve((theta[0] + width - hi) * right, (theta[0] + width - lo) * right)
         return tuple(-a * left**2 - b * right**2 for a, b in zip(rise, fall, strict=True))
-    if family in _SIDES:
-        per_width = np.exp(-theta[1])
-        bend = _sigmoid_curve((lo - theta[0]) * per_width, (hi - theta[0]) * per_width)
-        return tuple(-a * per_width**2 for a in bend)
     if family is Bell:
-        return _bell_curve(theta, lo, hi)
-    nothing = np.full(lo.shape, np.nan)
+        # With p = t^(2b) it is -(2b / w^2) p^(1 - 1/b) (2b - 1 - p) / (1 + p)^2.
+        b = np.exp(theta[2])
+        most = np.where(b >= 1.0, 2.0 * b * (2.0 * b - 1.0) * per_width[0] ** 2, np.nan)
+        return -most, most
     return nothing, nothing
 
 
@@ -200,30 +192,9 @@ def _sigmoid_curve(lo, hi):
     return bend(np.clip(0.0, lo, hi)), np.minimum(bend(lo), bend(hi))
 
 
-def _bell_curve(theta, lo, hi):
-    r"""Of l = -log(1 + p), p = t^(2b): l'' = -(2b / w^2) t^(2b - 2) (2b - 1 - p) / (1 + p)^2."""
-    center, b, width = theta[0], np.exp(theta[2]), np.exp(theta[1])
-    ends = np.abs(lo - center) / width, np.abs(hi - center) / width
-    far = np.maximum(*ends)
-    near = np.where((lo <= center) & (center <= hi), 0.0, np.minimum(*ends))
-
-    def bend(p):
-        return (2.0 * b - 1.0 - p) / (1.0 + p) ** 2
-
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        power = near ** (2.0 * b - 2.0), far ** (2.0 * b - 2.0)
-        # The bend falls up to p = 4b - 1, and rises to zero from there on.
-        p = near ** (2.0 * b), far ** (2.0 * b)
-        at_ends = bend(p[0]), bend(p[1])
-        low = np.minimum(bend(np.clip(4.0 * b - 1.0, *p)), np.minimum(*at_ends))
-        high = np.maximum(*at_ends)
-        corners = [-2.0 * b / width**2 * f * g for f in power for g in (low, high)]
-    return np.minimum.reduce(corners), np.maximum.reduce(corners)
-
-
 def _along(factor, by_term):
-    """Along each input, sums over each share's terms, (n_shares, n_boxes)."""
-    return {j: by_term[places].sum(axis=1) for j, places in factor.items()}
+    """Along each input, sums over each share's terms, (..., n_shares, n_boxes)."""
+    return {j: by_term[..., places, :].sum(axis=-2) for j, places in factor.items()}
 
 
 def _total(factor, by_term):
@@ -233,22 +204,23 @@ def _total(factor, by_term):
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """The shares of one factor in every box, (n_shares, n_boxes) each."""
+    """The shares of one factor in every box, (n_shares, n_boxes); ranges are (2, ...)."""
 
     middle: np.ndarray  # at the middle of the box
     low: np.ndarray
     high: np.ndarray
     error: np.ndarray  # of the logarithm of a share as it is computed, at most
     steepness: dict[int, np.ndarray]  # size of d l / dx_j
-    departure: dict[int, tuple[np.ndarray, np.ndarray]]  # range of D along each input
-    curvature: dict[int, tuple[np.ndarray, np.ndarray]]  # of d^2 l / dx_j^2
+    curvature: dict[int, np.ndarray]  # range of d^2 l / dx_j^2
+    departure: dict[int, np.ndarray]  # range of D along each input
 
 
 def term_ranges(antecedent: Antecedent, low, high):
     """Ranges of all terms over boxes (n_inputs, n_boxes), with a row of zeros at the end."""
     parts = [ranges(group, low, high) for group in antecedent.groups]
-    parts.append(TermRanges(*[np.zeros((1, low.shape[1]))] * len(TermRanges._fields)))
-    return TermRanges(*map(np.concatenate, zip(*parts, strict=True)))
+    nothing = np.zeros((2, 1, low.shape[1]))
+    parts.append(TermRanges(nothing, nothing, nothing, nothing[0]))
+    return TermRanges(*(np.concatenate(one, axis=-2) for one in zip(*parts, strict=True)))
 
 
 def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, log_mu, half):
@@ -259,20 +231,19 @@ def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, log_mu, hal
     middle = _total(factor, log_mu)
     middle = np.exp(middle - middle.max(axis=0))
     middle /= middle.sum(axis=0)
-    least, most = _by_range(_total(factor, terms.low), _total(factor, terms.high))
+    least, most = _by_range(*_total(factor, terms.log_mu))
     error = _total(factor, terms.error)
     # The mean error of all counts for each: the sum of the softmax.
     common = np.minimum((most * error).sum(axis=0), error.max(axis=0))
     error = error + common + EPS * (ROUNDINGS + least.shape[0])
-    curve_low, curve_high = _along(factor, terms.curve_low), _along(factor, terms.curve_high)
-    curvature = {j: (curve_low[j], high) for j, high in curve_high.items()}
-    slopes = _along(factor, terms.slope_low), _along(factor, terms.slope_high)
-    steepness = {j: size((low, slopes[1][j])) for j, low in slopes[0].items()}
-    shares = Shares(middle, least, most, error, steepness, {}, curvature)
-    departure = _departures(shares, *slopes)
-    slopes = _along(factor, at_middle.slope_low), _along(factor, at_middle.slope_high)
+    slopes, curvature = _along(factor, terms.slope), _along(factor, terms.curve)
+    steepness = {j: size(ends) for j, ends in slopes.items()}
+    shares = Shares(middle, least, most, error, steepness, curvature, {})
+    departure = _departures(shares, slopes)
     away = np.exp(4.0 * error)
-    there = _departures(replace(shares, low=middle / away, high=middle * away), *slopes)
+    there = _departures(
+        replace(shares, low=middle / away, high=middle * away), _along(factor, at_middle.slope)
+    )
     for _ in range(2):
         departure = _by_mean_value(departure, there, shares, half)
         away = np.exp(sum(size(ends) * half[j] for j, ends in departure.items()) + 4.0 * error)
@@ -296,16 +267,14 @@ def _by_range(low, high):
     return np.nan_to_num(least * (1.0 - slack), nan=0.0), np.nan_to_num(most, nan=1.0)
 
 
-def _departures(shares, slopes_low, slopes_high):
+def _departures(shares, slopes):
     found = {}
-    for j, high in slopes_high.items():
-        low = slopes_low[j]
-        mean_low, mean_high = smallest_mean(low, [shares]), largest_mean(high, [shares])
-        slack = 4.0 * ROUNDINGS * EPS * size((low, high))
+    for j, ends in slopes.items():
+        slack = 4.0 * ROUNDINGS * EPS * size(ends)
         common = slack.max(axis=0, initial=0.0, where=shares.high > EPS)
-        total = (shares.high * size((low, high))).sum(axis=0)
-        common = common + EPS * (ROUNDINGS + low.shape[0]) * total
-        found[j] = low - mean_high - slack - common, high - mean_low + slack + common
+        total = (shares.high * size(ends)).sum(axis=0)
+        common = common + EPS * (ROUNDINGS + ends.shape[1]) * total
+        found[j] = widened(ends - mean_range(ends, [shares])[::-1, None], slack + common)
     return found
 
 
@@ -316,16 +285,19 @@ def _by_mean_value(departure, at_middle, shares, half):
         change = 0.0
         for i, others in departure.items():
             both = square(ends) if i == j else product(ends, others)
-            curve = shares.curvature[j] if i == j else (0.0, 0.0)
-            least = smallest_mean(both[0] + curve[0], [shares])
-            most = largest_mean(both[1] + curve[1], [shares])
-            slack = EPS * (ROUNDINGS + len(ends[0])) * (size(both) + size(curve)).max(axis=0)
-            rate = size((curve[0] - most, curve[1] - least)) + 2.0 * slack
+            curve = shares.curvature[j] if i == j else np.zeros((2, 1, 1))
+            slack = EPS * (ROUNDINGS + ends.shape[1]) * (size(both) + size(curve)).max(axis=0)
+            rate = size(curve - mean_range(both + curve, [shares])[::-1, None]) + 2.0 * slack
             change = change + half[i] * rate
-        low, high = widened(at_middle[j][0] - change, at_middle[j][1] + change)
+        low, high = widened(at_middle[j], change)
         # Where the curvature is not known neither is a change: NaN.
-        found[j] = np.fmax(ends[0], low), np.fmin(ends[1], high)
+        found[j] = np.stack([np.fmax(ends[0], low), np.fmin(ends[1], high)])
     return found
+
+
+def mean_range(ends, every):
+    """Range of the mean, under all factors' shares, of values (n_shares, ..., n_boxes)."""
+    return np.stack([-largest_mean(-ends[0], every), largest_mean(ends[1], every)])
 
 
 def largest_mean(values, every):
@@ -337,23 +309,17 @@ def largest_mean(values, every):
     return values if every else values[0]
 
 
-def smallest_mean(values, every):
-    """Lower bound of the same."""
-    return -largest_mean(-values, every)
-
-
 def product(one, other):
     """Range of a product from the ranges of both; NaN, for unknown, of zero times infinity."""
-    corners = [a * b for a in one for b in other]
-    low = np.minimum(np.minimum(corners[0], corners[1]), np.minimum(corners[2], corners[3]))
-    high = np.maximum(np.maximum(corners[0], corners[1]), np.maximum(corners[2], corners[3]))
-    return low, high
+    corners = np.stack([a * b for a in one for b in other])
+    return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
 
 def square(ends):
     """Range of a square from that of its root."""
-    low, high = np.minimum(*np.abs(ends)), np.maximum(*np.abs(ends))
-    return np.where((ends[0] <= 0.0) & (ends[1] >= 0.0), 0.0, low**2), high**2
+    sides = np.abs(ends)
+    least = np.where((ends[0] <= 0.0) & (ends[1] >= 0.0), 0.0, sides.min(axis=0))
+    return np.stack([least, sides.max(axis=0)]) ** 2
 
 
 def size(ends):
@@ -361,7 +327,7 @@ def size(ends):
     return np.maximum(np.abs(ends[0]), np.abs(ends[1]))
 
 
-def widened(low, high):
-    """The interval, wider by rounding errors of its ends."""
-    slack = ROUNDINGS * EPS * size((low, high))
-    return low - slack, high + slack
+def widened(ends, by=0.0):
+    """The interval, wider to either side, and by rounding errors of its ends."""
+    slack = ROUNDINGS * EPS * size(ends) + by
+    return np.stack([ends[0] - slack, ends[1] + slack])

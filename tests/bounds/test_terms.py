@@ -47,10 +47,10 @@ def test_ranges_hold(family, rng):
     )
     for x in np.minimum(places, high):
         log_mu, gradient = family.log_value_and_gradient(np.tile(x, (N_TERMS, 1)), group.theta)
-        assert (found.low <= log_mu).all()
-        assert (log_mu <= found.high).all()
-        assert (found.slope_low <= -gradient[0]).all()
-        assert (-gradient[0] <= found.slope_high).all()
+        assert (found.log_mu[0] <= log_mu).all()
+        assert (log_mu <= found.log_mu[1]).all()
+        assert (found.slope[0] <= -gradient[0]).all()
+        assert (-gradient[0] <= found.slope[1]).all()
 
 
 @pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=MEMBERSHIPS)
@@ -58,7 +58,7 @@ def test_ranges_of_curvature_hold(family, rng):
     group = a_group(rng, family)
     low, high = boxes(rng, group)
     found = ranges(group, low, high)
-    is_bounded = np.isfinite(found.curve_low)
+    is_bounded = np.isfinite(found.curve[0])
     assert is_bounded.any() or family.name not in ("gaussian", "bell", "two_sided_gaussian")
 
     def slope(x):
@@ -72,5 +72,5 @@ def test_ranges_of_curvature_hold(family, rng):
         curve = (after - before) / width
         slack = 1e-6 * np.abs(curve) + 1e-12 * np.abs(after) / width + 1e-9
         # 2b < 1: the slope jumps at the centre.
-        assert ((found.curve_low <= curve + slack) | ~is_bounded).all()
-        assert ((curve - slack <= found.curve_high) | ~is_bounded).all()
+        assert ((found.curve[0] <= curve + slack) | ~is_bounded).all()
+        assert ((curve - slack <= found.curve[1]) | ~is_bounded).all()
