@@ -209,17 +209,18 @@ class _ConstrainedFit:
 
     def _refused(self, by_equalities):
         n_points, n_rules = len(self.constraints.points), self.model.n_rules
+        rules = "1 rule" if n_rules == 1 else f"{n_rules} rules"
         if by_equalities:
             names = " and ".join(map(repr, self.model.output_names))
             return InfeasibleConstraintsError(
-                f"constraints fixes {names} at {n_points} points, which {n_rules} rules cannot "
+                f"constraints fixes {names} at {n_points} points, which {rules} cannot "
                 "all meet: two are the same, or there are more than consequents. Give fewer "
                 "points, or use more rules."
             )
         names = " and ".join(one.name for one in self.inequalities)
         with_points = f", with the {n_points} fixed points of constraints," if n_points else ""
         return InfeasibleConstraintsError(
-            f"No consequents of these {n_rules} rules keep {names}{with_points} all at once. Drop "
+            f"No consequents of {rules} keep {names}{with_points} all at once. Drop "
             "one of them, or use order=1 or more rules."
         )
 

@@ -289,7 +289,7 @@ def test_what_the_rules_cannot_keep_is_named(rng):
     known = {"constraints": [FixedPoint([-0.5, 0.0], -1.0), FixedPoint([0.0, 0.0], 0.5)]}
     known["constraints"].append(OutputLimits(upper=1.0))
     with pytest.raises(
-        ValueError, match="1 rules keep the limit 1 of 'y', with the 2 fixed points"
+        ValueError, match="of 1 rule keep the limit 1 of 'y', with the 2 fixed points"
     ):
         ANFISRegressor(n_mfs=1, **known).fit(X, y)
     # Of order zero with one rule: a constant.
