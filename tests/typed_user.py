@@ -23,7 +23,6 @@ from skanfis.gyro import (
     OpenLoopArcsineRegressor,
     ResidualRegressor,
     ThermalRate,
-    allan_deviation,
     export_c_physics,
     group_by_rate_level,
     gyro_report,
@@ -95,11 +94,10 @@ compensator = GyroCompensator(composed, ("output", "temperature"), predicts="rat
 compensator.write_json("compensator.json")
 applied: pd.DataFrame = GyroCompensator.read_json("compensator.json").apply(read_log("a.csv"))
 report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(log))
-curve: pd.DataFrame = allan_deviation(log["error"], 1.0)
 dwells: np.ndarray = log["rate"].to_numpy()
 picture: ErrorDisplay = ErrorDisplay.from_predictions(dwells, dwells, dwells, position=dwells)
 AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()
-wrong_phase: str = law.fit(log, log["rate"]).phase(log)  # type: ignore[assignment]
+wrong_rate: str = law.fit(log, log["rate"]).predict(log)  # type: ignore[assignment]
 
 # What the parameters take: arrays, lists, frames and files; and what they do not.
 frame = pd.DataFrame(X, columns=["x0", "x1"])

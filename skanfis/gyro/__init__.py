@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from .errors import LogError
     from .features import ThermalRate
     from .log import read_log
-    from .metrics import allan_deviation
     from .physics import OpenLoopArcsineRegressor
     from .report import gyro_report
     from .thermal_displays import (
@@ -36,7 +35,6 @@ __all__ = [
     "ResidualSurfaceDisplay",
     "ScaleFactorErrorDisplay",
     "ThermalRate",
-    "allan_deviation",
     "check_log",
     "export_c_physics",
     "group_by_rate_level",
@@ -44,7 +42,7 @@ __all__ = [
     "read_log",
 ]
 _HOMES = (
-    "_checks _split c_code compensator compose displays errors features log metrics physics report "
+    "_checks _split c_code compensator compose displays errors features log physics report "
     "thermal_displays"
 )
 

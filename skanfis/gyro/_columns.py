@@ -4,7 +4,6 @@ A log is in s, degC and deg/s. A raw signal (counts, volts) keeps its unit.
 """
 
 import math
-from numbers import Real
 
 import numpy as np
 
@@ -109,22 +108,14 @@ def in_rate_unit(unit, wanted):
     return wanted + unit.removeprefix(own), RATE_UNITS[wanted] / RATE_UNITS[own]
 
 
-def check_number(value, name):
-    """Return a finite positive number as a float, or raise ValueError."""
-    number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
-    if not 0.0 < number < math.inf:
-        raise ValueError(f"{name}={value!r} must be a positive number.")
-    return number
-
-
-def check_column(values, name, n_rows=None) -> np.ndarray:
-    """``values`` as a float array of shape (n_rows,), or ValueError."""
+def check_column(values, name, n_rows=None, *, may_lack=False) -> np.ndarray:
+    """``values`` as a float array of shape (n_rows,), or ValueError; NaN where some may lack."""
     try:
         column = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name} must hold numbers: {error}.") from error
     _check_shape(column, name, n_rows)
-    bad = ~np.isfinite(column)
+    bad = np.isinf(column) if may_lack else ~np.isfinite(column)
     if bad.any():
         raise ValueError(
             f"{name} must be finite; {bad.sum()} of its {column.size} values are not, the first at "

@@ -232,12 +232,10 @@ def _check(part, counts):
 
 def _levels(log):
     """Number of each row's level of |rate|; None where the rate changes continuously."""
-    try:
-        levels = group_by_rate_level(log["rate"].to_numpy())
-    except ValueError:
-        return None
+    levels = _level_numbers(np.abs(log["rate"].to_numpy()))
     # A level for nearly every row is none: holding it out would hold out single rows.
-    return levels if np.unique(levels).size * _ROWS_PER_LEVEL <= levels.size else None
+    is_row_by_row = levels is not None and np.unique(levels).size * _ROWS_PER_LEVEL > levels.size
+    return None if is_row_by_row else levels
 
 
 def _fold_numbers(part, groups, n_parts):

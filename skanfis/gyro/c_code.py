@@ -32,7 +32,7 @@ from ..export.c.templates import FINITE_INPUT, rejection
 from ..export.folding import found_by_search
 from ..policies import SILENT
 from .compose import FrozenRules, Polynomial, ResidualRegressor, law_and_rules
-from .physics import past_phase
+from .physics import past_phase, phase_of
 
 _SUFFIX = "_r"
 SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
@@ -406,7 +406,7 @@ def _known_answers(whole):
         X[:, output] = np.where(kind == 3, swing, X[:, output])
     X = np.vstack([low, high, X]).astype(whole.dtype).astype(float)
     # NaN past the amplitude.
-    phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (law.phase(X), law.max_phase)
+    phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (phase_of(law, X), law.max_phase)
     phase, coverage = np.abs(phase), rules.coverage(X)
     sure = ~(np.abs(phase - limit) < 1e-3)
     if part.min_coverage is not None:

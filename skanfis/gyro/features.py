@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, OneToOneFeatureMixin, TransformerMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from ._columns import check_column, check_number, column_position
+from ._columns import check_column, column_position
 
 
 class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
@@ -85,7 +85,9 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         ValueError
             If X is not finite or lacks a column named, or time does not increase within a run.
         """
-        check_number(self.time_constant, "time_constant")
+        constant = self.time_constant
+        if not (isinstance(constant, int | float | np.number) and 0.0 < constant < np.inf):
+            raise ValueError(f"time_constant={constant!r} must be a positive number.")
         names, columns = self._columns_of(X, reset=True)
         self._time, self._run = (
             None if given is None else column_position(names, role, given)

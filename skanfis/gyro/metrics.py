@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
 
 from ._columns import PER_HOUR, check_column, check_labels
 
@@ -121,13 +120,8 @@ def table_of(columns, labels=(), gaps=()):
             continue
         if name in labels:
             found[name] = check_labels(values, name, n_rows)
-        elif name in gaps:
-            numbers = np.asarray(values, dtype=object)
-            is_gap = pd.isna(numbers)
-            filled = check_column(np.where(is_gap, 0.0, numbers), name, n_rows)
-            found[name] = np.where(is_gap, np.nan, filled)
         else:
-            found[name] = check_column(values, name, n_rows)
+            found[name] = check_column(values, name, n_rows, may_lack=name in gaps)
         n_rows = found[name].size
     return pd.DataFrame(found)
 
@@ -178,40 +172,11 @@ def hysteresis(error, temperature, temperature_rate) -> float:
     return float(PER_HOUR * np.nanmax(gaps))
 
 
-def allan_deviation(
-    error: ArrayLike, sampling_interval: float, *, run: ArrayLike | None = None
-) -> pd.DataFrame:
+def allan_deviation(error, sampling_interval, run=None):
     """Overlapping Allan deviation, by allantools, in octaves up to a tenth of the run.
 
-    Parameters
-    ----------
-    error : array-like of shape (n_rows,)
-        Error at the input, evenly sampled within each run [deg/s].
-    sampling_interval : float
-        Time between rows, positive [s].
-    run : array-like of shape (n_rows,), default=None
-        Labels of the runs, whose variances are averaged; None is one run.
-
-    Returns
-    -------
-    curve : DataFrame of shape (n_times, 4)
-        averaging_time [s]; deviation [deg/h]; its standard error [deg/h]; n, the differences.
-
-    Raises
-    ------
-    ImportError
-        If allantools is not installed.
-    ValueError
-        If ``sampling_interval`` is not positive, or no run has ten rows.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from skanfis.gyro import allan_deviation
-    >>> white = np.random.default_rng(0).normal(scale=1 / 3600, size=4096)  # deg/s
-    >>> curve = allan_deviation(white, 1.0)  # doctest: +SKIP
-    >>> curve["deviation"].iloc[0].round(1)  # doctest: +SKIP
-    1.0
+    Of an error that is evenly sampled within each run [deg/s]; the variances of runs are averaged.
+    A table: averaging_time [s], deviation and its standard error [deg/h], n, the differences.
     """
     try:
         from allantools import oadev

@@ -205,21 +205,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         difference = self._difference(used)
         return phase / polyval(difference, self.sagnac_factor_) - polyval(difference, self.bias_)
 
-    def phase(self, X: ArrayLike) -> np.ndarray:
-        """Sagnac phase of each row, bias included.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        phase : ndarray of shape (n_samples,)
-            From -pi/2 to pi/2 [rad]; NaN where the output is larger than the amplitude.
-        """
-        with np.errstate(invalid="ignore"):
-            return np.arcsin(self._sine(self._used(X)))
-
     def in_bounds(self, X: ArrayLike) -> np.ndarray:
         """Tell which rows lie in the range of the training data and within ``max_phase``.
 
@@ -306,6 +291,12 @@ def check_parameters(law):
         raise ValueError(
             f"out_of_bounds={law.out_of_bounds!r} must be one of {', '.join(OUT_OF_BOUNDS)}."
         )
+
+
+def phase_of(law, X):
+    """Sagnac phase of each row, bias included; NaN where the output is beyond the amplitude."""
+    with np.errstate(invalid="ignore"):
+        return np.arcsin(law._sine(law._used(X)))
 
 
 def past_phase(policy, what):

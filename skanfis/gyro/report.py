@@ -204,7 +204,7 @@ def _allan_cells(part, side, is_answered):
         found = metrics.allan_figures(*curve[["averaging_time", "deviation"]].to_numpy().T)
     except ValueError as reason:
         return [(np.nan, np.nan, np.nan, str(reason))] * len(metrics.ALLAN_FIGURES)
-    usual = "no interval: see the standard errors of allan_deviation"
+    usual = "no interval: see the standard errors of AllanDisplay"
     return [(value, np.nan, np.nan, note or usual) for value, note in found.values()]
 
 

@@ -29,6 +29,7 @@ from skanfis.gyro._columns import ask
 from skanfis.gyro.c_code import export_c_compensator
 from skanfis.gyro.compensator import features
 from skanfis.gyro.compose import law_and_rules
+from skanfis.gyro.physics import phase_of
 
 from ..export.c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from ..quick import quick
@@ -130,7 +131,7 @@ def expected(model, X):
         if part.out_of_bounds in ("nan", "raise"):
             part.set_params(out_of_bounds="clip")
     rate = answering.predict(X)
-    phase = np.abs(model.base_.phase(X))
+    phase = np.abs(phase_of(model.base_, X))
     beyond = ~(phase <= model.base_.max_phase)
     beside = ~ask(model.residual_, "in_bounds", X)
     refused = np.zeros(len(rate), dtype=bool)
