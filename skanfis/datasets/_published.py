@@ -1,5 +1,7 @@
 """Data of papers: the benchmarks of Jang 1993 by their formulas, and Table 1 of Sun et al. 2009."""
 
+from importlib.resources import files
+
 import numpy as np
 import pandas as pd
 from sklearn.utils import Bunch
@@ -7,47 +9,6 @@ from sklearn.utils import Bunch
 from .._sklearn import StrOptions, validate_parameter_constraints
 
 _SUBSET = {"subset": [StrOptions({"train", "check", "all"})]}
-
-# Columns: time [s], temperature [degC], rate [deg/s], output [deg/s].
-_TABLE = (
-    (0, 20.55, 38.6839, 39.5906),
-    (20, 21.03, 37.6859, 39.9941),
-    (40, 20.56, 38.6894, 39.9914),
-    (60, 20.96, 38.6858, 39.9903),
-    (80, 21.22, 39.6885, 39.9928),
-    (100, 20.99, 39.6773, 39.9900),
-    (120, 20.65, 38.6969, 39.9812),
-    (140, 20.54, 37.6788, 39.9906),
-    (160, 20.47, 39.6916, 40.0014),
-    (180, 21.01, 38.6919, 39.9826),
-    (200, 21.32, 37.6808, 39.9964),
-    (220, 21.06, 38.6837, 39.8965),
-    (240, 20.93, 39.6786, 39.9924),
-    (260, 20.82, 38.6911, 39.9890),
-    (280, 20.64, 38.6887, 39.7843),
-    (300, 20.74, 38.6931, 39.9880),
-    (320, 20.98, 38.6858, 39.8967),
-    (340, 20.82, 38.6901, 39.9930),
-    (360, 20.59, 38.6930, 39.9820),
-)
-
-_DESCRIPTION = """\
-Open-loop fiber-optic gyro: time since power-on [s], temperature [degC], rate and output [deg/s].
-
-Source: Y. Liu, Y. Sun, Y. Lu, D. Li, L. Li, Y. Pan, "Study of ANFIS Modeling Algorithm for
-Eliminating the Fiber Optic Gyro Nonlinear Error", Chinese Journal of Lasers 36 (Supplement 2),
-2009, 27-29, doi:10.3788/CJL200936s2.0027, Table 1. The values are kept exactly as printed.
-
-Do not judge a model by its fit to this table:
-
-* The text speaks of 20 rows; 19 are printed.
-* The rate column is damaged: its fractional parts agree (standard deviation 0.005 deg/s), while
-  the digit before the point jumps between 7, 8 and 9, and the output stays at 39.99 deg/s.
-* The outputs 39.5906 (at 0 s) and 39.7843 (at 280 s) stand apart from all others.
-* All temperatures lie between 20.47 and 21.32 degC: one window of 1 degC.
-* The paper trains 36 rules, that is 108 linear parameters, on these rows, and tests only on
-  0 to 120 s of the same rows. No row is left to test a model on.
-"""
 
 
 def load_ofog() -> Bunch:
@@ -69,9 +30,12 @@ def load_ofog() -> Bunch:
     >>> load_ofog().data.shape
     (19, 3)
     """
-    frame = pd.DataFrame(_TABLE, columns=["time", "temperature", "rate", "output"], dtype=float)
+    folder = files("skanfis.datasets")
+    with folder.joinpath("sun_2009.csv").open(encoding="utf-8") as table:
+        frame = pd.read_csv(table, dtype=float)
     data, target = frame.drop(columns="output"), frame["output"]
-    return Bunch(data=data, target=target, frame=frame, DESCR=_DESCRIPTION)
+    description = folder.joinpath("sun_2009.txt").read_text(encoding="utf-8")
+    return Bunch(data=data, target=target, frame=frame, DESCR=description)
 
 
 def make_jang_sinc(*, midpoints: bool = False) -> tuple[np.ndarray, np.ndarray]:
