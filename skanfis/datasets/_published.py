@@ -90,11 +90,6 @@ def make_jang_three_input(subset: str = "train") -> tuple[np.ndarray, np.ndarray
         The third input changes fastest.
     y : ndarray of shape (216,), (125,) or (341,)
 
-    Raises
-    ------
-    ValueError
-        If ``subset`` is unknown.
-
     Examples
     --------
     >>> from skanfis.datasets import make_jang_three_input
@@ -126,11 +121,6 @@ def make_mackey_glass(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
         x(t - 18), x(t - 12), x(t - 6), x(t), in time's order.
     y : ndarray of shape (500,) or (1000,)
         x(t + 6).
-
-    Raises
-    ------
-    ValueError
-        If ``subset`` is unknown.
 
     Examples
     --------

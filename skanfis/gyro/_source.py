@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ._columns import unit_in
-from ._tables import EXCEL, MATLAB, excel_source, matlab_source
+from ._tables import EXCEL, MATLAB, PARQUET, excel_source, matlab_source, parquet_source
 from .errors import LogError
 
 # What loggers write where there is no value, beside what pandas knows.
@@ -47,12 +47,12 @@ _DAY, _HOUR = 86_400.0, 3_600.0  # s
 def open_source(path, *, head_only=False):
     """The table in a file; LogError where there is none, as far as its head tells if asked so."""
     name = str(path).lower()
-    if name.endswith((".parquet", ".pq")):
-        return _ParquetSource(path)
-    if name.endswith((*MATLAB, *EXCEL)):
+    if name.endswith((*PARQUET, *MATLAB, *EXCEL)):
         if head_only:
             return None
-        return excel_source(path, header_place) if name.endswith(EXCEL) else matlab_source(path)
+        if name.endswith(EXCEL):
+            return excel_source(path, header_place)
+        return parquet_source(path) if name.endswith(PARQUET) else matlab_source(path)
     source = _TextSource(path)
     if not head_only:
         source.check_lengths()
@@ -202,49 +202,6 @@ class _TextSource:
             raise LogError(f"{self.path}: is no table: {str(error).strip()}") from error
         except UnicodeError as error:
             raise _no_text(self.path) from error
-
-
-class _ParquetSource:
-    """As a text file, of Parquet."""
-
-    decimal = "."
-
-    def __init__(self, path):
-        try:
-            import pyarrow
-            from pyarrow import parquet
-        except ImportError as error:
-            message = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
-            raise ImportError(message) from error
-        self.path, self.notes = path, []
-        self._errors = (pyarrow.ArrowException, OSError)
-        with open(path, "rb"):
-            pass  # what cannot be opened is told as of any other file
-        try:
-            # Not buffered ahead: what was read would stay as long as the file is open.
-            self._file = parquet.ParquetFile(path, pre_buffer=False)
-            self.header = list(self._file.schema_arrow.names)
-        except (*self._errors, ValueError) as error:
-            raise self._damaged(error) from error
-        if len(set(self.header)) < len(self.header):
-            raise LogError(f"{path}: two columns have one name; rename one of them.")
-
-    def _damaged(self, error):
-        reason = str(error).strip().partition("\n")[0].removesuffix(".")
-        return LogError(f"{self.path}: is no Parquet that can be read: {reason}.")
-
-    def place_of(self, row):
-        return f"row {row}"
-
-    def pieces(self, places, n_rows, labels=()):
-        names, begin = [self.header[place] for place in places], 0
-        try:
-            for batch in self._file.iter_batches(n_rows, columns=names):
-                columns = {k: batch.column(self.header[k]).to_pandas() for k in places}
-                table = pd.DataFrame(columns).astype(dict.fromkeys(labels, "string"))
-                yield table.set_axis(pd.RangeIndex(begin, begin := begin + len(table)))
-        except self._errors as error:
-            raise self._damaged(error) from error
 
 
 def header_place(rows):

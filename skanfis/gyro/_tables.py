@@ -1,4 +1,4 @@
-"""Tables in MATLAB's and Excel's files, in the form of a source of a log."""
+"""Tables in files of Parquet, MATLAB and Excel, in the form of a source of a log."""
 
 from collections.abc import Mapping
 from contextlib import nullcontext
@@ -8,7 +8,7 @@ import pandas as pd
 
 from .errors import LogError
 
-MATLAB, EXCEL = (".mat",), (".xlsx", ".xlsm")
+PARQUET, MATLAB, EXCEL = (".parquet", ".pq"), (".mat",), (".xlsx", ".xlsm")
 _HDF5 = b"\x89HDF"
 _HEAD_ROWS = 60
 
@@ -29,6 +29,23 @@ class TableSource:
         for begin in range(0, len(self._table), n_rows):
             piece = self._table.iloc[begin : begin + n_rows][list(places)]
             yield piece.astype(dict.fromkeys(labels, "string"))
+
+
+def parquet_source(path):
+    """The table in a Parquet file, its index among the columns."""
+    try:
+        from pyarrow import ArrowException, parquet
+    except ImportError as error:
+        message = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
+        raise ImportError(message) from error
+    with open(path, "rb") as file:
+        try:
+            table = parquet.ParquetFile(file).read()
+            table = table.to_pandas(ignore_metadata=True, split_blocks=True)
+        except (ArrowException, OSError, ValueError) as error:
+            reason = str(error).strip().partition("\n")[0].removesuffix(".")
+            raise LogError(f"{path}: is no Parquet that can be read: {reason}.") from error
+    return TableSource(path, table, [])
 
 
 def matlab_source(path):
