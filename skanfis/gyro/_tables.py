@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from contextlib import nullcontext
+from importlib import import_module
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,8 @@ from .errors import LogError
 PARQUET, MATLAB, EXCEL = (".parquet", ".pq"), (".mat",), (".xlsx", ".xlsm")
 _HDF5 = b"\x89HDF"
 _HEAD_ROWS = 60
+# What the libraries raise of a file that is none of theirs.
+_DAMAGED = (ValueError, TypeError, NotImplementedError, OSError, KeyError)
 
 
 class TableSource:
@@ -33,16 +36,13 @@ class TableSource:
 
 def parquet_source(path):
     """The table in a Parquet file, its index among the columns."""
-    try:
-        from pyarrow import ArrowException, parquet
-    except ImportError as error:
-        message = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
-        raise ImportError(message) from error
+    told = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
+    parquet = _needed("pyarrow.parquet", told)
     with open(path, "rb") as file:
         try:
             table = parquet.ParquetFile(file).read()
             table = table.to_pandas(ignore_metadata=True, split_blocks=True)
-        except (ArrowException, OSError, ValueError) as error:
+        except _DAMAGED as error:
             reason = str(error).strip().partition("\n")[0].removesuffix(".")
             raise LogError(f"{path}: is no Parquet that can be read: {reason}.") from error
     return TableSource(path, table, [])
@@ -53,9 +53,9 @@ def matlab_source(path):
     with open(path, "rb") as file:
         is_hdf5 = _HDF5 in (file.read(4), file.seek(512) and file.read(4))
     try:
-        with (_hdf5 if is_hdf5 else _mat)(path) as tree:
+        with _tree(path, is_hdf5) as tree:
             found = dict(_vectors(tree))
-    except (ValueError, TypeError, NotImplementedError, OSError, KeyError) as error:
+    except _DAMAGED as error:
         raise LogError(f"{path}: is no MATLAB file that can be read: {error}") from error
     lengths = [len(values) for values in found.values() if len(values) > 1]
     if not lengths:
@@ -67,20 +67,21 @@ def matlab_source(path):
     return TableSource(path, pd.DataFrame(columns), notes)
 
 
-def _mat(path):
+def _tree(path, is_hdf5):
+    if is_hdf5:
+        told = "MATLAB 7.3 needs h5py: pip install 'skanfis[logs]'; or save it with -v7"
+        return _needed("h5py", f"{path}: {told}").File(path)
     from scipy.io import loadmat
 
     return nullcontext(loadmat(path, simplify_cells=True))
 
 
-def _hdf5(path):
+def _needed(module, told):
+    """A module that may not be installed; ``told`` then says what to do."""
     try:
-        import h5py
+        return import_module(module)
     except ImportError as error:
-        raise ImportError(
-            f"{path}: MATLAB 7.3 needs h5py: pip install 'skanfis[logs]'; or save it with -v7"
-        ) from error
-    return h5py.File(path)
+        raise ImportError(told) from error
 
 
 def _vectors(tree):
@@ -95,12 +96,8 @@ def _vectors(tree):
 
 def excel_source(path, header_place):
     """The first sheet that holds a table; ``header_place`` finds the header in its first rows."""
-    try:
-        import openpyxl  # noqa: F401
-    except ImportError as error:
-        raise ImportError(
-            f"{path}: Excel needs openpyxl: pip install 'skanfis[logs]'; or save it as CSV"
-        ) from error
+    told = f"{path}: Excel needs openpyxl: pip install 'skanfis[logs]'; or save it as CSV"
+    _needed("openpyxl", told)
     try:
         sheets = pd.read_excel(path, sheet_name=None, header=None, engine="openpyxl")
     except Exception as error:
