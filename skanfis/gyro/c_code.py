@@ -23,7 +23,7 @@ from ..export.c.dialect import (
     STATUS,
     Dialect,
     check_arguments,
-    index_type,
+    kept_lines,
     remark,
     write_files,
 )
@@ -49,100 +49,94 @@ _NOTES = {
     "h - temperature_rate); then previous = temperature.",
 }
 
-_POLYNOMIAL = """
-static $real $name_polynomial(const $real *c, int n, $real t)
-{
-    $real sum = c[n - 1];
-    int i;
-    for (i = n - 2; i >= 0; --i) {
-        sum = sum * t + c[i];
-    }
-    return sum;
-}
-
-"""
-
-_PREDICT = """int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
-{
-    $real z[$n_rules_inputs], left[1], $variables, rate$zero;
-    int i, $counters, status = $NAME_IN_RANGE;
-
-$finite_input
-    }
-$base
-    for (i = 0; i < $n_rules_inputs; ++i) {
-        z[i] = x[$name_rules_input[i]];
-    }
-    status |= $rules_predict(z, left);
-    if ((status & $NAME_NO_OUTPUT) != 0) {
-        return $NAME_REJECT(y, status);
-    }
-    rate += left[0];
-    /* Not (a and b): NaN fails every comparison. */
-    if (!(rate >= -$MAX && rate <= $MAX)) {
-        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
-    }
-    y[0] = rate;
-    return status;
-}
-"""
-_LAW = """    for (i = 0; i < $n_law; ++i) {
-        const $real v = x[$name_law_input[i]];
-        if (v < $name_law_low[i] || v > $name_law_high[i]) {
-            status = $NAME_OUT_OF_RANGE;
-        }
-    }
-
-    /* Temperature of the coil from the reference, and the coefficients there. */
-    t = $temperature;
-    amplitude = $name_polynomial($name_amplitude, $n_amplitude, t);
-    sagnac = $name_polynomial($name_sagnac, $n_sagnac, t);
-    sine = x[$output];
-    if (sagnac == 0.0R) {
-        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
-    }
-
-    /* The size of the sine, and its sign apart; no amplitude, no phase. */
-    if (sine < 0.0R) {
-        sine = -sine;
-        sign = -sign;
-    }
-    if (amplitude < 0.0R) {
-        amplitude = -amplitude;
-        sign = -sign;
-    }
-    sine = amplitude > 0.0R ? sine / amplitude : $MAX;
-    if (sine > $limit) {
-        status = $NAME_OUT_OF_RANGE;
-        $beyond
-$within    rate = (sign < 0 ? -phase : phase) / sagnac - $name_polynomial($name_bias, $n_bias, t);
-
-"""
-_CUBIC = """    for (i = 0; i < $NAME_N_INPUTS; ++i) {
-        /* Of the nearest point of the box. */
-        u[i] = x[i] < $name_law_low[i] ? $name_law_low[i] : x[i];
-        u[i] = u[i] > $name_law_high[i] ? $name_law_high[i] : u[i];
-        u[i] = (u[i] - $name_center[i]) / $name_scale[i];
-    }
-    for (k = 0; k < $n_terms; ++k) {
-        term = $name_coefficients[k];
-        for (i = 0; i < $NAME_N_INPUTS; ++i) {
-            for (j = 0; j < (int)$name_powers[k][i]; ++j) {
-                term *= u[i];
-            }
-        }
-        rate += term;
-    }
-"""
-_BEYOND = {
-    "clip": "phase = $max_phase;",
-    "linear": "phase = $max_phase + (sine - $limit) * $slope;",
-    "nan": "return $NAME_REJECT(y, status);",
-    "raise": "return $NAME_REJECT(y, status);",
-}
-_WITHIN = """    } else {
-        phase = $ASIN(sine);
-    }
+_CODE = """
+law   |static $real $name_polynomial(const $real *c, int n, $real t)
+law   |{
+law   |    $real sum = c[n - 1];
+law   |    int i;
+law   |    for (i = n - 2; i >= 0; --i) {
+law   |        sum = sum * t + c[i];
+law   |    }
+law   |    return sum;
+law   |}
+law   |
+      |int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
+      |{
+law   |    $real z[$n_rules_inputs], left[1], t, amplitude, sagnac, sine, phase, rate;
+law   |    int i, sign = 1, status = $NAME_IN_RANGE;
+cubic |    $real z[$n_rules_inputs], left[1], u[$NAME_N_INPUTS], term, rate = 0.0R;
+cubic |    int i, j, k, status = $NAME_IN_RANGE;
+      |
+      |$finite_input
+      |    }
+law   |    for (i = 0; i < $n_law; ++i) {
+law   |        const $real v = x[$name_law_input[i]];
+law   |        if (v < $name_law_low[i] || v > $name_law_high[i]) {
+law   |            status = $NAME_OUT_OF_RANGE;
+law   |        }
+law   |    }
+law   |
+law   |    /* Temperature of the coil from the reference, and the coefficients there. */
+law   |    t = $temperature;
+law   |    amplitude = $name_polynomial($name_amplitude, $n_amplitude, t);
+law   |    sagnac = $name_polynomial($name_sagnac, $n_sagnac, t);
+law   |    sine = x[$output];
+law   |    if (sagnac == 0.0R) {
+law   |        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
+law   |    }
+law   |
+law   |    /* The size of the sine, and its sign apart; no amplitude, no phase. */
+law   |    if (sine < 0.0R) {
+law   |        sine = -sine;
+law   |        sign = -sign;
+law   |    }
+law   |    if (amplitude < 0.0R) {
+law   |        amplitude = -amplitude;
+law   |        sign = -sign;
+law   |    }
+law   |    sine = amplitude > 0.0R ? sine / amplitude : $MAX;
+law   |    if (sine > $limit) {
+law   |        status = $NAME_OUT_OF_RANGE;
+silent|        return $NAME_REJECT(y, status);
+silent|    }
+silent|    phase = $ASIN(sine);
+clip  |        phase = $max_phase;
+linear|        phase = $max_phase + (sine - $limit) * $slope;
+answer|    } else {
+answer|        phase = $ASIN(sine);
+answer|    }
+law   |    rate = (sign < 0 ? -phase : phase) / sagnac - $name_polynomial($name_bias, $n_bias, t);
+law   |
+cubic |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+cubic |        /* Of the nearest point of the box. */
+cubic |        u[i] = x[i] < $name_law_low[i] ? $name_law_low[i] : x[i];
+cubic |        u[i] = u[i] > $name_law_high[i] ? $name_law_high[i] : u[i];
+cubic |        u[i] = (u[i] - $name_center[i]) / $name_scale[i];
+cubic |    }
+cubic |    for (k = 0; k < $n_terms; ++k) {
+cubic |        term = $name_coefficients[k];
+cubic |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
+cubic |            for (j = 0; j < (int)$name_powers[k][i]; ++j) {
+cubic |                term *= u[i];
+cubic |            }
+cubic |        }
+cubic |        rate += term;
+cubic |    }
+      |    for (i = 0; i < $n_rules_inputs; ++i) {
+      |        z[i] = x[$name_rules_input[i]];
+      |    }
+      |    status |= $rules_predict(z, left);
+      |    if ((status & $NAME_NO_OUTPUT) != 0) {
+      |        return $NAME_REJECT(y, status);
+      |    }
+      |    rate += left[0];
+      |    /* Not (a and b): NaN fails every comparison. */
+      |    if (!(rate >= -$MAX && rate <= $MAX)) {
+      |        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
+      |    }
+      |    y[0] = rate;
+      |    return status;
+      |}
 """
 
 
@@ -285,44 +279,39 @@ def _source_of(dialect, whole, silent):
     """Tables and functions of the law; ``silent`` is the policy of rows without an answer."""
     law, places = whole.law, whole.rules.positions
     tables = {"law_low": law.minimum_, "law_high": law.maximum_, **whole.tables}
-    parts = ["/* Of what the rules are added to: its range, coefficients, and columns of x. */\n"]
-    parts += [f"{dialect.table(key, values)}\n" for key, values in tables.items()]
-    columns, words = {"rules_input": places}, dict[str, Any]()
+    words: dict[str, Any] = {"rules": dialect.name + _SUFFIX, "n_rules_inputs": places.size}
     if whole.is_cubic:
-        parts.append(dialect.table("powers", law.powers, "unsigned char"))
-        base, words = _CUBIC, words | {"variables": "u[$NAME_N_INPUTS], term", "counters": "j, k"}
-        words |= {"zero": " = 0.0R", "n_terms": len(law.powers)}
+        facts, asin = {"cubic"}, ""
+        tables |= {"powers": law.powers}
+        words |= {"n_terms": len(law.powers)}
     else:
-        columns["law_input"] = law.columns_
-        base, words = _law_code(dialect, whole)
-        words |= {"variables": "t, amplitude, sagnac, sine, phase", "counters": "sign = 1"}
-        words["zero"] = ""
-    for key, values in columns.items():
-        parts.append(f"{dialect.table(key, values, index_type(values))}\n")
-    if not whole.is_cubic:
-        asin = dialect.write("$ASIN(")
-        parts += [f"{line}\n\n" for line in dialect.functions().splitlines() if asin in line]
-    parts += [dialect.write(rejection(silent, dialect.std)).lstrip() + "\n"]
-    parts += [] if whole.is_cubic else [dialect.write(_POLYNOMIAL).lstrip()]
-    template = _PREDICT.replace("$finite_input", FINITE_INPUT.strip("\n"))
-    for key in ("variables", "counters", "zero"):
-        template = template.replace(f"${key}", words.pop(key))
-    template = template.replace("$base", base)
-    words |= {"rules": dialect.name + _SUFFIX, "n_rules_inputs": places.size}
-    return "".join([*parts, dialect.write(template, **words)])
+        policy = law.out_of_bounds
+        facts = {"law", *(["silent"] if policy in SILENT else ["answer", policy])}
+        tables |= {"law_input": law.columns_}
+        words |= _words_of_law(dialect, whole)
+        called = dialect.write("$ASIN(")
+        asin = next(line for line in dialect.functions().splitlines() if called in line) + "\n\n"
+    tables |= {"rules_input": places}
+    code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
+    parts = [
+        "/* Of what the rules are added to: its range, coefficients, and columns of x. */\n",
+        *(f"{dialect.table(key, values)}\n" for key, values in tables.items()),
+        asin,
+        dialect.write(rejection(silent, dialect.std)).lstrip(),
+        f"\n{dialect.write(code, **words)}\n",
+    ]
+    return "".join(parts)
 
 
-def _law_code(dialect, whole):
-    """The template of the law, and its words."""
+def _words_of_law(dialect, whole):
+    """What its code is filled in with."""
     law, number, inputs = whole.law, dialect.number, whole.law.columns_
-    temperature = "0.0R"
+    temperature = number(0.0)
     if inputs.size > 1:
         lag = f" + {number(law.thermometer_lag_)} * x[{inputs[2]}]" if inputs.size > 2 else ""
         temperature = f"x[{inputs[1]}]{lag} - {number(whole.reference)}"
-    # Where there is no answer beyond, the function has returned.
-    within = "    }\n    phase = $ASIN(sine);\n" if law.out_of_bounds in SILENT else _WITHIN
-    code = _LAW.replace("$temperature", temperature).replace("$within", within)
-    words = {
+    return {
+        "temperature": temperature,
         "n_law": inputs.size,
         "output": inputs[0],
         "limit": number(np.sin(law.max_phase)),
@@ -330,7 +319,6 @@ def _law_code(dialect, whole):
         "slope": number(1.0 / np.cos(law.max_phase)),
         **{f"n_{key}": values.size for key, values in whole.tables.items()},
     }
-    return code.replace("$beyond", _BEYOND[law.out_of_bounds]), words
 
 
 def _header(whole, dialect, price, units, notes):
