@@ -57,7 +57,7 @@ _WORDS = {
 }
 
 
-def group_by_rate_level(rate: ArrayLike, *, signed: bool = False) -> np.ndarray:
+def group_by_rate_level(rate: ArrayLike) -> np.ndarray:
     """Groups that hold a level of the rate table together, found from the rates themselves.
 
     Rates are of one level where the gap between neighbours is smaller than the clearest jump of the
@@ -66,9 +66,7 @@ def group_by_rate_level(rate: ArrayLike, *, signed: bool = False) -> np.ndarray:
     Parameters
     ----------
     rate : array-like of shape (n_samples,)
-        True rate, in any unit.
-    signed : bool, default=False
-        Whether a rate and its opposite are two levels.
+        True rate, in any unit; a rate and its opposite are one level.
 
     Returns
     -------
@@ -83,16 +81,13 @@ def group_by_rate_level(rate: ArrayLike, *, signed: bool = False) -> np.ndarray:
 
     Examples
     --------
-    >>> from sklearn.model_selection import LeaveOneGroupOut
     >>> from skanfis.gyro import group_by_rate_level
     >>> rate = [-20.0, -10, 0, 10, 20, -20, -10, 0, 10, 20]
     >>> group_by_rate_level(rate).tolist()
     [2, 1, 0, 1, 2, 2, 1, 0, 1, 2]
-    >>> LeaveOneGroupOut().get_n_splits(groups=group_by_rate_level(rate, signed=True))
-    5
     """
     rate = check_column(rate, "rate")
-    labels = _level_numbers(rate if signed else np.abs(rate))
+    labels = level_numbers(np.abs(rate))
     if labels is None:
         raise ValueError(
             f"rate has no levels: it changes continuously between {rate.min():g} and "
@@ -102,7 +97,7 @@ def group_by_rate_level(rate: ArrayLike, *, signed: bool = False) -> np.ndarray:
     return labels
 
 
-def _level_numbers(rate):
+def level_numbers(rate):
     """Number of each row's level, lowest first; None where the rate changes continuously."""
     values, inverse, n_rows = np.unique(rate, return_inverse=True, return_counts=True)
     gaps = np.diff(values)
@@ -232,7 +227,7 @@ def _check(part, counts):
 
 def _levels(log):
     """Number of each row's level of |rate|; None where the rate changes continuously."""
-    levels = _level_numbers(np.abs(log["rate"].to_numpy()))
+    levels = level_numbers(np.abs(log["rate"].to_numpy()))
     # A level for nearly every row is none: holding it out would hold out single rows.
     is_row_by_row = levels is not None and np.unique(levels).size * _ROWS_PER_LEVEL > levels.size
     return None if is_row_by_row else levels

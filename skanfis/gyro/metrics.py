@@ -143,7 +143,7 @@ def rms(values) -> float:
 
 def scale_factor(rate, output) -> float:
     """Slope of the least-squares line of the output against the true rate."""
-    return _line(np.asarray(rate), np.asarray(output))[0]
+    return float(_line(np.asarray(rate), np.asarray(output))[0])
 
 
 def input_error(rate, output):
@@ -252,12 +252,9 @@ def rows_for_allan(time, run, answered):
 
 def _line(rate, output):
     """Slope and intercept of the least-squares line."""
-    mean, middle = rate.mean(), output.mean()
     if rate.min() == rate.max():
-        raise ValueError(f"No scale factor: the rate is {mean:g} deg/s in all rows.")
-    deviation = rate - mean
-    slope = float(deviation @ (output - middle) / (deviation @ deviation))
-    return slope, middle - slope * mean
+        raise ValueError(f"No scale factor: the rate is {rate[0]:g} deg/s in all rows.")
+    return np.polyfit(rate, output, 1)
 
 
 def _peak(values):

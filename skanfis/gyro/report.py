@@ -150,37 +150,31 @@ def _cells(answered, side, figures, units, kind, draws):
     """Value, ends of the interval, and a note, of each figure."""
     step = max(1, -(-answered["rate"].size // _MOST_ROWS))
     thinned = [unit[::step] for unit in units]
-    rows = _of_side(answered, side)
-    own = [figure for figure in figures if figure.combine is None]
-    spreads = []
+    places = [np.concatenate([thinned[i] for i in draw]) for draw in draws]
+    rows, cells = _of_side(answered, side), []
     with np.errstate(divide="ignore", invalid="ignore"):
-        for draw in draws:
-            places = np.concatenate([thinned[i] for i in draw])
-            sample = _of_side({name: each[places] for name, each in answered.items()}, side)
-            spreads.append([_or_nan(figure.of, sample)[0] for figure in own])
-        of_own = dict(zip((figure.name for figure in own), np.transpose(spreads), strict=False))
-        cells = []
+        samples = [_of_side({k: each[at] for k, each in answered.items()}, side) for at in places]
         for figure in figures:
             ends, (value, note) = (np.nan, np.nan), _or_nan(figure.value, rows)
             if draws and not note:
-                ends, note = _interval(figure, rows, of_own, draws, kind)
+                ends, note = _interval(figure, rows, samples, draws, kind)
             cells.append((value, *ends, note))
     return cells
 
 
-def _interval(figure, rows, spreads, draws, kind):
+def _interval(figure, rows, samples, draws, kind):
     """Ends of the interval, and why it has none."""
     nothing = (np.nan, np.nan)
     if figure.name in metrics.LARGEST_VALUES:
         return nothing, "largest value: no interval"
     if figure.combine is None:
-        spread = spreads[figure.name]
+        found = [_or_nan(figure.of, sample)[0] for sample in samples]
     elif kind != "runs":
         return nothing, f"no interval: fewer than {_FEWEST_RUNS} runs"
     else:
         by_run = figure.by_run(rows)
-        spread = np.array([_or_nan(figure.combine, by_run[draw])[0] for draw in draws])
-    spread = spread[np.isfinite(spread)]
+        found = [_or_nan(figure.combine, by_run[draw])[0] for draw in draws]
+    spread = np.array(found)[np.isfinite(found)]
     if spread.size < _FEWEST_DEFINED * len(draws):
         return nothing, "no interval: too many resamples do not have this figure"
     return np.percentile(spread, _PERCENTILES), ""

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError, group_by_rate_level
-from skanfis.gyro._split import choose_split, cut_legs, find_legs
+from skanfis.gyro._split import choose_split, cut_legs, find_legs, level_numbers
 
 GRID = np.linspace(-100.8, 100.8, 57)  # steps of 3.6 deg/s
 UNEVEN = np.array([-100.0, -30, -10, -3, -1, -0.3, 0, 0.3, 1, 3, 10, 30, 100])
@@ -19,7 +19,7 @@ LEVELS = np.linspace(-100, 100, 9)
 
 def levels_of(rate):
     """The median rate of each level."""
-    groups = group_by_rate_level(rate, signed=True)
+    groups = level_numbers(np.asarray(rate))
     return pd.Series(rate).groupby(groups).median().to_numpy()
 
 
@@ -31,7 +31,7 @@ def test_levels_are_found_whatever_their_spacing_noise_and_unit(levels, noise, u
     rate = unit * (true + rng.normal(scale=noise, size=true.size))
     found = levels_of(rate)
     assert_allclose(found, unit * levels, atol=unit * (0.7 * noise + 1e-9))
-    groups = group_by_rate_level(rate, signed=True)
+    groups = level_numbers(np.asarray(rate))
     assert_array_equal(groups, np.searchsorted(levels, true))
 
 
@@ -41,7 +41,7 @@ def test_rows_on_the_way_between_levels_count_to_the_nearest(rng):
     rate = np.concatenate([np.repeat(GRID, 100), way])
     assert_allclose(levels_of(rate), GRID, atol=0.01)
     expected = np.abs(rate[:, None] - GRID).argmin(axis=1)
-    assert_array_equal(group_by_rate_level(rate, signed=True), expected)
+    assert_array_equal(level_numbers(np.asarray(rate)), expected)
 
 
 def test_one_level_is_a_level():
