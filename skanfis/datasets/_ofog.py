@@ -205,7 +205,6 @@ def make_ofog(
 
 
 def _nominal_device(coefficients):
-    """Coefficients of the population but for those given, checked."""
     given = {} if coefficients is None else dict(coefficients)
     unknown = [name for name in given if name not in _POPULATION]
     if unknown:
@@ -266,7 +265,6 @@ def _check_phase(nominal, spread, ambient_range, largest):
 
 
 def _draw_devices(nominal, n_devices, spread, noise, random_state):
-    """Devices whose coefficients are uniform within ``spread`` times their tolerance."""
     tolerances = np.array(list(_tolerances(nominal).values()))
     draws = random_state.uniform(-spread, spread, size=(n_devices, tolerances.size))
     offsets = draws * tolerances

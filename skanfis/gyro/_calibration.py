@@ -80,12 +80,10 @@ class Verdict:
 
     @property
     def model(self):
-        """Name of the model that was judged."""
         return list(self.rms)[-1]
 
     @property
     def model_is_worth_it(self):
-        """Whether the model is the one to use."""
         return self.recommended == self.model
 
 
@@ -128,17 +126,14 @@ class Calibration:
 
     @property
     def writes_model(self):
-        """Whether law and rules are what is written."""
         return self.written == self.verdict.model
 
     @property
     def is_thinned(self):
-        """Whether the log has more rows than are held."""
         return self.n_rows > len(self.log)
 
     @property
     def rate(self):
-        """True rate of every row [deg/s]."""
         return self.log["rate"].to_numpy()
 
     @property
@@ -278,7 +273,6 @@ def _glitches(log, error, name_row, tell):
 
 
 def _to_write(recipe, verdict, simpler):
-    """Name of what is written: what is recommended, or asked for."""
     if recipe.write == "recommended":
         return verdict.recommended
     name = NAMES.get(recipe.write, verdict.model)

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from ._columns import CANONICAL, SIGNALS, convert, declared_units, units_of
+from ._columns import CANONICAL, SIGNALS, convert, convert_back, declared_units, units_of
 from .errors import LogError
 
 QUANTITIES = ("time", "temperature", "output", "rate")
@@ -40,8 +40,7 @@ _MOST_GLITCHES = 3
 _ALONE = 5.0
 # Their median is the row's surroundings, and stands one other glitch among them.
 _N_NEIGHBOURS = 8
-# The rows farthest off, and rows among which their neighbours are sought, at most.
-_MOST_CANDIDATES, _MOST_NEIGHBOURS = 2_000, 200_000
+_MOST_CANDIDATES = 2_000  # the rows farthest off
 # A temperature moves slowly: a part of its range is a lot from one row to the next.
 _SMOOTH = 0.2
 
@@ -228,8 +227,7 @@ def _check_plausible(values, part, unit):
     # More than half: the unit; few: glitches of the measurement.
     advice, others = "", []
     if bad.mean() > 0.5:
-        zero, one = convert(np.array([0.0, 1.0]), part, unit)
-        ends = (np.array([values.min(), values.max()]) - zero) / (one - zero)
+        ends = convert_back(np.array([values.min(), values.max()]), part, unit)
         for other in units_of(part):
             least, most = convert(ends, part, other)
             if other not in (unit, *SIGNALS) and low <= least and most <= high:
@@ -303,9 +301,8 @@ def find_glitches(log, error):
     scale = _spread(places)
     places /= np.where(scale > 0.0, scale, 1.0)
     # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
-    step = -(-len(log) // _MOST_NEIGHBOURS)
-    tree = cKDTree(places[::step], balanced_tree=False)
-    nearest = step * tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
+    tree = cKDTree(places, balanced_tree=False)
+    nearest = tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
     # Not itself, or else not the farthest.
     own = nearest == far[:, None]
     own[~own.any(axis=1), -1] = True

@@ -77,7 +77,6 @@ def convert(values, quantity, unit):
 
 
 def convert_back(values, quantity, unit):
-    """Values in a unit, from those in the canonical one."""
     return (values - _ZERO.get(unit, 0.0)) / _FACTORS[quantity][unit]
 
 

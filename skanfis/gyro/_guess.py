@@ -112,7 +112,6 @@ class Layout:
     assumed: dict = field(default_factory=dict)
 
     def name(self, part):
-        """The part's name in the file."""
         return self.header[self.places[part]] if part in self.places else part
 
 

@@ -152,7 +152,6 @@ class Proven(NamedTuple):
 
 
 def proven_bounds(calibration):
-    """Bounds in the range of the calibration."""
     compensator, X = calibration.compensator, calibration.X
     own, rules = 1.0 / compensator.scale_factor, compensator.estimator
     if isinstance(getattr(rules, "base_", None), Polynomial):

@@ -66,7 +66,6 @@ def _make_rules(recipe, terms):
 
 
 def _terms_of(anfis):
-    """Numbers of terms of a grid of rules."""
     counts = Counter(term["input"] for term in anfis.memberships_)
     return tuple(max(counts[name], 1) for name in anfis.model_.input_names)
 

@@ -65,7 +65,6 @@ exit codes:
 
 
 def make_parser():
-    """The parser of the command's arguments."""
     parser = argparse.ArgumentParser(
         prog=PROGRAM,
         usage=f"{PROGRAM} LOG [LOG ...] [options]\n"
@@ -145,7 +144,6 @@ def _pairs(texts, option):
 
 
 def check_once(option, names):
-    """UsageError where a name is given twice."""
     for name in names:
         if names.count(name) > 1:
             raise UsageError(f"{option}: {name} is given twice.")
@@ -197,7 +195,6 @@ class Limit(NamedTuple):
     text: str
 
     def keeps(self, value):
-        """Whether a value in the limit's unit keeps it."""
         return bool(value >= self.value if self.figure in _AT_LEAST else abs(value) <= self.value)
 
 

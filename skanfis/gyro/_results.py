@@ -111,7 +111,6 @@ class Results:
         self.in_range = calibration.in_range
         self.before = np.where(self.in_range, calibration.before, np.nan)
         self.after = np.where(self.in_range, calibration.after, np.nan)
-        self.error_after = (self.after - self.rate)[self.in_range]
         self.temperature = self.log["temperature"].to_numpy()
         self.temperature_rate = self.time = self.run = None
         if "temperature_rate" in calibration.X:
@@ -131,7 +130,6 @@ class Results:
 
     @cached_property
     def merit(self):
-        """Figures of merit of all rows in range."""
         return gyro_report(
             self.rate,
             self.calibration.before,
@@ -166,7 +164,6 @@ class Results:
 
     @cached_property
     def checks(self):
-        """The limits of the specification, and whether they are kept."""
         lines = self.merit.set_index("figure")
         return [check_limit(limit, lines) for limit in self.options.limits]
 

@@ -17,14 +17,7 @@ from ..export.folding import found_by_search
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask, declared_units
-from .compose import (
-    FrozenRules,
-    Polynomial,
-    ResidualRegressor,
-    cubic_powers,
-    joined,
-    law_and_rules,
-)
+from .compose import FrozenRules, Polynomial, ResidualRegressor, cubic_powers, joined, law_and_rules
 from .features import ThermalRate
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
 

@@ -10,12 +10,7 @@ from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import Pipeline, make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
-from sklearn.utils.validation import (
-    check_is_fitted,
-    check_scalar,
-    column_or_1d,
-    validate_data,
-)
+from sklearn.utils.validation import check_is_fitted, check_scalar, column_or_1d, validate_data
 
 from .. import ANFISRegressor
 from ..export import fold_with_rows
@@ -128,44 +123,16 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
-        """Predict the target, as the sum of both parts.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        y : ndarray of shape (n_samples,)
-        """
+        """Predict the target, as the sum of both parts."""
         check_is_fitted(self)
         return self.base_.predict(X) + self.residual_.predict(X)
 
     def in_bounds(self, X: ArrayLike) -> np.ndarray:
-        """Tell which rows lie in bounds of every part that has such; through Pipelines too.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        inside : ndarray of bool of shape (n_samples,)
-        """
+        """Tell which rows lie in bounds of every part that has such; through Pipelines too."""
         return np.logical_and.reduce(self._answers("in_bounds", X))
 
     def coverage(self, X: ArrayLike) -> np.ndarray:
-        """Tell how well the training data cover each row: the least that a part says.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        coverage : ndarray of shape (n_samples,)
-            From 0 to 1; see :meth:`skanfis.ANFISRegressor.coverage`.
-        """
+        """Tell how well the training data cover each row, 0 to 1: the least that a part says."""
         return np.minimum.reduce(self._answers("coverage", X))
 
     def _answers(self, method, X):

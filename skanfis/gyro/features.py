@@ -1,12 +1,6 @@
 """The rate of temperature change, by a recursion that runs on the gyro's processor too.
 
-docs/gyro_data.rst says what it is for. In C, with the state {rate, previous} of one run, on every
-sample after the first, h after the one before:
-
-    rate += (1.0 - exp(-h / tau)) * ((temperature - previous) / h - rate);
-    previous = temperature;
-
-A row more on the straight line between two others changes nothing.
+docs/gyro_data.rst says what it is for, and has the recursion in C.
 """
 
 from typing import Any, Self
@@ -102,7 +96,7 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         return self
 
     def transform(self, X: ArrayLike) -> np.ndarray:
-        """Compute the rates.
+        """Compute the rates of the columns filtered, those columns alone.
 
         Parameters
         ----------
@@ -112,29 +106,12 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         rates : ndarray of shape (n_samples, n_features_out)
-            Those of the columns filtered, alone.
-
-        Raises
-        ------
-        ValueError
-            As from ``fit``, or if X has other columns than there.
         """
         check_is_fitted(self)
         return self._rates(*self._columns_of(X, reset=False))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> np.ndarray:
-        """Names of the new columns.
-
-        Parameters
-        ----------
-        input_features : array-like of str or None, default=None
-            Names of the columns of X, where it had none in ``fit``.
-
-        Returns
-        -------
-        names : ndarray of str
-            Of the columns filtered, each with "_rate" behind it.
-        """
+        """Names of the columns filtered, each with "_rate" behind it."""
         names = super().get_feature_names_out(input_features)
         check_is_fitted(self)
         return np.array([f"{names[i]}_rate" for i in self._filtered], dtype=object)

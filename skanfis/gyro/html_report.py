@@ -229,7 +229,6 @@ def _check(results):
 
 
 def _merit(results):
-    """The figures of merit of all rows in range, and the limits."""
     table, lines = results.merit, []
     for _, line in table[table[["before", "after"]].notna().any(axis=1)].iterrows():
         cells = []
@@ -270,7 +269,6 @@ def _pictures(results):
 
 
 def _use(results):
-    """The box of the calibration, and what lies beyond."""
     calibration = results.calibration
     compensator = calibration.compensator
     rules = compensator.estimator
@@ -288,7 +286,6 @@ def _use(results):
 
 
 def _sure(results):
-    """What is proven in the range of the calibration."""
     calibration = results.calibration
     certain = proven_bounds(calibration)
     added = calibration.compensator.predicts == "rate"
@@ -334,7 +331,6 @@ def _on_board(calibration):
 
 
 def _log(results):
-    """The log: its size, ranges and scale factor."""
     calibration, rows = results.calibration, results.log
     counts = {"rows": calibration.n_rows}
     if calibration.is_thinned:
@@ -353,7 +349,6 @@ def _log(results):
 
 
 def _box(calibration, caption=""):
-    """The range of every input."""
     lines = [
         (_words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name))
         for name, low, high in calibration.X.agg(["min", "max"]).T.itertuples()

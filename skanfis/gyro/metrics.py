@@ -251,7 +251,6 @@ def rows_for_allan(time, run, answered):
 
 
 def _line(rate, output):
-    """Slope and intercept of the least-squares line."""
     if rate.min() == rate.max():
         raise ValueError(f"No scale factor: the rate is {rate[0]:g} deg/s in all rows.")
     return np.polyfit(rate, output, 1)

@@ -206,16 +206,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         return phase / polyval(difference, self.sagnac_factor_) - polyval(difference, self.bias_)
 
     def in_bounds(self, X: ArrayLike) -> np.ndarray:
-        """Tell which rows lie in the range of the training data and within ``max_phase``.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        inside : ndarray of bool of shape (n_samples,)
-        """
+        """Tell which rows lie in the range of the training data and within ``max_phase``."""
         used = self._used(X)
         return ~self._outside(used) & (np.abs(self._sine(used)) <= np.sin(self.max_phase))
 

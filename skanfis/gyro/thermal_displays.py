@@ -318,7 +318,6 @@ def _cell_numbers(columns, edges):
 
 
 def _edges(cells):
-    """Edges of the cells in both directions."""
     return [np.append(cells.iloc[:, k].unique(), cells.iloc[-1, k + 1]) for k in (0, 2)]
 
 
