@@ -53,13 +53,9 @@ _POPULATION = {
 }
 # What the factor on the noise multiplies.
 _RANDOM = [
-    "bias_repeatability",
-    "angle_random_walk",
-    "bias_instability",
-    "rate_random_walk",
-    "quantisation",
-    "thermometer_noise",
-]
+    "bias_repeatability", "angle_random_walk", "bias_instability", "rate_random_walk",
+    "quantisation", "thermometer_noise",
+]  # fmt: skip
 _CONSTRAINTS = {
     "profile": [StrOptions({"constant", "soaks", "ramps"})],
     "n_devices": [_AT_LEAST_ONE],
@@ -121,7 +117,8 @@ def make_ofog(
         Largest rate of the table [deg/s], 100 by default, at which the Sagnac phase of every device
         must be below pi/2. Every dwell has a rate of its own.
     rates : array-like of shape (n_rates,), default=None
-        The rates of the table [deg/s], which all runs share; ``[0]`` is a gyro at rest.
+        The rates of the table [deg/s], which all runs share, in place of ``max_rate``; ``[0]`` is a
+        gyro at rest.
     dwell_time : float, default=120.0
         Time at each rate [s], rounded to ``sampling_interval``.
     ambient_range : tuple of two floats, default=(-20.0, 50.0)
@@ -144,12 +141,6 @@ def make_ofog(
         rate without noise [degC/s]; ambient [degC]; true rate [deg/s]; counts; output, the
         indicated rate; error, output - rate; noise, which no compensation can foresee, at the
         input; run, power_up and device; then the parts of the error [deg/s], which sum to it.
-
-    Raises
-    ------
-    ValueError
-        If a parameter is of the wrong type or out of its range, or ``rates`` is given together with
-        ``max_rate``.
 
     Examples
     --------

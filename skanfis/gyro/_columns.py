@@ -110,10 +110,10 @@ def in_rate_unit(unit, wanted):
 def check_column(values, name, n_rows=None, *, may_lack=False) -> np.ndarray:
     """``values`` as a float array of shape (n_rows,), or ValueError; NaN where some may lack."""
     try:
-        column = np.asarray(values, dtype=float)
+        numbers = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise ValueError(f"{name} must hold numbers: {error}.") from error
-    _check_shape(column, name, n_rows)
+    column = check_labels(numbers, name, n_rows)
     bad = np.isinf(column) if may_lack else ~np.isfinite(column)
     if bad.any():
         raise ValueError(
@@ -124,18 +124,15 @@ def check_column(values, name, n_rows=None, *, may_lack=False) -> np.ndarray:
 
 
 def check_labels(values, name, n_rows) -> np.ndarray:
-    labels = np.asarray(values)
-    _check_shape(labels, name, n_rows)
-    return labels
-
-
-def _check_shape(column, name, n_rows):
+    """``values`` as an array of shape (n_rows,) of whatever type, or ValueError."""
+    column = np.asarray(values)
     if column.ndim != 1:
         raise ValueError(f"{name} must have one dimension; its shape is {column.shape}.")
     if column.size == 0:
         raise ValueError(f"{name} is empty.")
     if n_rows is not None and column.size != n_rows:
         raise ValueError(f"{name} has {column.size} rows where the other columns have {n_rows}.")
+    return column
 
 
 def column_position(names, role, given) -> int:

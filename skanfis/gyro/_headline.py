@@ -221,10 +221,9 @@ def law_text(law, recipe):
 
 def _in_powers(coefficients):
     """Of t, the lowest first."""
-    text = f"{coefficients[0]:.8g}"
-    for power, value in enumerate(coefficients[1:], start=1):
-        text += _term(value, " t" if power == 1 else f" t^{power}")
-    return text
+    powers = enumerate(coefficients[1:], start=1)
+    terms = [_term(value, " t" if power == 1 else f" t^{power}") for power, value in powers]
+    return f"{coefficients[0]:.8g}{''.join(terms)}"
 
 
 def _term(value, factor=""):

@@ -18,6 +18,7 @@ from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, figures,
 from .metrics import rms, rows_for_allan
 from .report import gyro_report
 from .thermal_displays import (
+    SLOWEST,
     CoverageDisplay,
     HysteresisDisplay,
     ResidualSurfaceDisplay,
@@ -26,7 +27,6 @@ from .thermal_displays import (
 
 _PER_MINUTE = 60.0
 _SMALL = 0.05  # deg/s
-_CLEARLY = 0.05  # degC/min, below which a temperature neither rises nor falls
 _DOTS_PER_INCH = 160  # sharp in print
 _FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
 _MOST_ROWS_SHOWN = 20_000  # rows beyond cover one another
@@ -182,7 +182,7 @@ class Results:
             found["error-by-time"] = {"position": time, "position_label": label}
         if np.ptp(self.rate):
             found["scale-factor-error"] = found["residual-surface"] = heat
-        if change is not None and change.min() < -_CLEARLY < _CLEARLY < change.max():
+        if change is not None and change.min() < -SLOWEST < SLOWEST < change.max():
             found["hysteresis"] = heat | {"temperature_rate": change}
         if isinstance(self.of_allan, dict):
             found["allan-deviation"] = self.of_allan

@@ -175,13 +175,8 @@ def choose_split(log, kind="auto", *, uses_output=True):
         _check(part, counts)
     numbers = np.column_stack([_fold_numbers(part, groups[part], len(parts)) for part in parts])
     # Rows of the same run, or of the same level, are neither trained on nor tested.
-    folds = [
-        (
-            np.flatnonzero((numbers != fold).all(axis=1)),
-            np.flatnonzero((numbers == fold).all(axis=1)),
-        )
-        for fold in np.unique(numbers, axis=0)
-    ]
+    sides = ((numbers != fold, numbers == fold) for fold in np.unique(numbers, axis=0))
+    folds = [tuple(np.flatnonzero(side.all(axis=1)) for side in pair) for pair in sides]
     what = " and ".join(_WORDS[part][0] for part in parts)
     counted = ", ".join(f"{counts[part]} {_WORDS[part][1]}" for part in parts)
     sentence = f"{what} held out ({counted}, {len(folds)} folds; {reason})"

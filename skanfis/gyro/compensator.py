@@ -141,10 +141,6 @@ class GyroCompensator:
         ----------
         path : str or path-like
 
-        Returns
-        -------
-        None
-
         Raises
         ------
         ValueError, TypeError

@@ -179,6 +179,12 @@ class FrozenRules:
         return cls(model, places[0].astype(int))
 
 
+@cache
+def cubic_powers(n_inputs):
+    """Of all terms up to the third degree, in the order of scikit-learn."""
+    return PolynomialFeatures(3).fit(np.zeros((1, n_inputs))).powers_
+
+
 @dataclass(frozen=True, eq=False)
 class Polynomial:
     """sum_k c_k prod_j z_j^p_kj with z = (x - center) / scale, x held in a box; a fitted base.
@@ -204,16 +210,8 @@ class Polynomial:
         low, high = box
         return cls(low, high, scaler.mean_, scaler.scale_, np.array(coefficients), names)
 
-    @property
-    def powers(self):
-        """Of shape (n_terms, n_inputs)."""
-        return cubic_powers(self.center.size)
-
-    @property
-    def columns_(self):
-        """All columns."""
-        return np.arange(self.center.size)
-
+    powers = property(lambda self: cubic_powers(self.center.size))  # (n_terms, n_inputs)
+    columns_ = property(lambda self: np.arange(self.center.size))
     n_features_in_ = property(lambda self: self.center.size)
 
     def predict(self, X):
@@ -223,12 +221,6 @@ class Polynomial:
         for column, powers in zip((z / self.scale).T, self.powers.T, strict=True):
             terms *= np.vander(column, 4, increasing=True)[:, powers]
         return terms.sum(axis=1)
-
-
-@cache
-def cubic_powers(n_inputs):
-    """Of all terms up to the third degree, in the order of scikit-learn."""
-    return PolynomialFeatures(3).fit(np.zeros((1, n_inputs))).powers_
 
 
 def law_and_rules(estimator):

@@ -42,27 +42,16 @@ class GyroDisplay:
     _draw: Callable[..., None]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """What is drawn.
-
-        Returns
-        -------
-        tables : dict of str to DataFrame
-            Columns carry their units.
-        """
+        """What is drawn, by name; columns carry their units."""
         return self._tables
 
     def plot(self, ax: Any = None) -> Self:
-        """Draw.
+        """Draw; returns the display itself.
 
         Parameters
         ----------
         ax : matplotlib Figure, axes or array of axes, default=None
             Where to draw: an empty figure, or axes, one for each panel. None makes a figure.
-
-        Returns
-        -------
-        display
-            Itself.
         """
         if ax is None:
             from matplotlib import pyplot
@@ -90,7 +79,7 @@ class GyroDisplay:
         ax: Any = None,
         **options: Any,
     ) -> Self:
-        """Compute from rates, and draw.
+        """Compute from rates, and draw; returns the display.
 
         Parameters
         ----------
@@ -102,11 +91,6 @@ class GyroDisplay:
             Where to draw, as for :meth:`plot`.
         **options
             What the class describes.
-
-        Returns
-        -------
-        display
-            The display, drawn.
         """
         unit = cls._UNITS[0] if unit is None else unit
         if unit not in cls._UNITS:

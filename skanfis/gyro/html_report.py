@@ -235,14 +235,8 @@ def _merit(results):
         for side in ("before", "after"):
             value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
             cells += [figures(value), _interval(low, high)]
-        lines.append(
-            (
-                _words(line["figure"]),
-                *cells,
-                signs(line["unit"]),
-                _TERMS.get(line["figure"], "none"),
-            )
-        )
+        name, unit = line["figure"], signs(line["unit"])
+        lines.append((_words(name), *cells, unit, _TERMS.get(name, "none")))
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit", "IEEE term"]
     resampled = results.merit.attrs["resampled"]
     blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]

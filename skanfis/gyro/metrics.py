@@ -355,8 +355,6 @@ def _level(tau, deviation, slope):
         window = slice(start, start + _POINTS_PER_SLOPE)
         if abs(np.polyfit(x[window], y[window], 1)[0] - slope) <= _SLOPE_TOLERANCE:
             levels.append(np.mean(y[window] - slope * x[window]))
-    return (
-        (np.exp(min(levels)), "")
-        if levels
-        else (np.nan, f"no slope of {'+' if slope > 0 else '-'}1/2")
-    )
+    if not levels:
+        return np.nan, f"no slope of {'+' if slope > 0 else '-'}1/2"
+    return np.exp(min(levels)), ""

@@ -65,13 +65,6 @@ def gyro_report(
         after; note, which says why a figure or an interval is missing. The attribute "resampled"
         is "runs" or "blocks of rows".
 
-    Raises
-    ------
-    ImportError
-        If ``allan=True`` and allantools is not installed.
-    ValueError
-        If a column is not as long as the others or not finite, or a parameter is out of its range.
-
     Examples
     --------
     >>> import numpy as np

@@ -12,7 +12,7 @@ from .displays import SIDES, TWO_ROWS, GyroDisplay, bins_of, dress, figures, mar
 _N_BANDS, _N_RATES, _SMALLEST_SHARE = 3, 41, 0.05
 # Enough to show a loop, and few enough that every bin has rows; fewer rows have no mean.
 _N_TEMPERATURES, _FEWEST_ROWS = 25, 3
-_SLOWEST = 0.05  # degC/min, below which a temperature neither rises nor falls
+SLOWEST = 0.05  # degC/min, below which a temperature neither rises nor falls
 _BRANCHES = {"warming": ("^-", "#c8443c"), "cooling": ("v-", "#3a6ea5")}
 # Odd ones: what an error of the scale factor adds changes its sign with the rate.
 _POWERS = (1, 3, 5, 7)
@@ -116,7 +116,7 @@ class HysteresisDisplay(GyroDisplay):
         bins, edges = bins_of(rows["temperature"], _N_TEMPERATURES)
         branch = np.where(rows["temperature_rate"] > 0, *_BRANCHES)
         rows = rows.assign(bin=bins, branch=branch)
-        moving = rows[rows["temperature_rate"].abs() >= _SLOWEST]
+        moving = rows[rows["temperature_rate"].abs() >= SLOWEST]
         table = pd.DataFrame({"temperature [degC]": 0.5 * (edges[:-1] + edges[1:])})
         for side in SIDES:
             biases = _bias_of_branches(moving.dropna(subset=side), side)
@@ -230,7 +230,7 @@ class CoverageDisplay(GyroDisplay):
         min_coverage: float = 0.1,
         ax: Any = None,
     ) -> Self:
-        """Compute from a fitted estimator, and draw.
+        """Compute from a fitted estimator, and draw; returns the display.
 
         Parameters
         ----------
@@ -244,10 +244,6 @@ class CoverageDisplay(GyroDisplay):
             Rows that are covered less are flagged.
         ax : matplotlib Figure or axes, default=None
             Where to draw, as for :meth:`plot`.
-
-        Returns
-        -------
-        display : CoverageDisplay
         """
         labels = {"temperature": "temperature [degC]", "output": f"output [{output_unit}]"}
         for name in labels:
