@@ -177,8 +177,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     glitches = _glitches(log, before - rate, name_row, tell)
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
-    found = _held_out(X, target, groups, split, recipe, tell, rng)
-    predicted, inside, folds, fold_models = found
+    predicted, inside, folds, fold_models = _held_out(X, target, groups, split, recipe, tell, rng)
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))

@@ -112,13 +112,11 @@ class Results:
         self.before = np.where(self.in_range, calibration.before, np.nan)
         self.after = np.where(self.in_range, calibration.after, np.nan)
         self.temperature = self.log["temperature"].to_numpy()
-        self.temperature_rate = self.time = self.run = None
+        self.time = self.log["time"].to_numpy() if "time" in self.log else None
+        self.run = label_texts(self.log["run"]) if "run" in self.log else None
+        self.temperature_rate = None
         if "temperature_rate" in calibration.X:
             self.temperature_rate = _PER_MINUTE * calibration.X["temperature_rate"].to_numpy()
-        if "time" in self.log:
-            self.time = self.log["time"].to_numpy()
-        if "run" in self.log:
-            self.run = label_texts(self.log["run"])
         # That in which errors are no long row of zeros.
         is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
         self.unit = "deg/s" if is_large else "deg/h"

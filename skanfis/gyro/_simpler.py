@@ -59,7 +59,8 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
         # What it is worth is measured.
         for category in (ConvergenceWarning, ConstantInputWarning, OutOfBoundsWarning):
             warnings.simplefilter("ignore", category)
-        zeros = [zero_rule(X.iloc[part], policy) for part in parts]
+        # Each has the box, coverage and policy of its rows.
+        zeros = [fitted_rule(X.iloc[part], np.zeros(part.size), 0, policy) for part in parts]
         for name, predicts, fit in kinds(list(X), policy):
             target, predicted = rate if predicts == "rate" else before - rate, np.full(len(X), 0.0)
             try:
@@ -82,13 +83,13 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
 
 
 def kinds(inputs, policy="linear"):
-    """Name, what it predicts, and what fits it to rows: to X, y, and their :func:`zero_rule`."""
+    """Name, what it predicts, and what fits it to rows: to X, y, and a rule that gives zero."""
 
     def law(X, y, zero):
         return joined(make_law(inputs, 1, policy).fit(X, y), zero)
 
     def law_and_line(X, y, zero):
-        both = make_law(inputs, 1, policy), _make_rule(1, policy)
+        both = make_law(inputs, 1, policy), _unfitted_rule(1, policy)
         return joined(*law_and_rules(ResidualRegressor(*both, n_rounds=ROUNDS).fit(X, y)))
 
     def cubic(X, y, zero):
@@ -99,24 +100,19 @@ def kinds(inputs, policy="linear"):
         )
 
     yield NOTHING, "error", lambda X, y, zero: zero
-    yield "constant", "error", lambda X, y, zero: _rule(X, y, 0, policy)
-    yield "straight line", "error", lambda X, y, zero: _rule(X, y, 1, policy)
+    yield "constant", "error", lambda X, y, zero: fitted_rule(X, y, 0, policy)
+    yield "straight line", "error", lambda X, y, zero: fitted_rule(X, y, 1, policy)
     if "output" in inputs:
         yield "arcsine law", "rate", law
         yield LAW_AND_LINE, "rate", law_and_line
     yield "cubic polynomial", "error", cubic
 
 
-def zero_rule(X, policy):
-    """Zero, with the box, coverage and policy of the rows."""
-    return _rule(X, np.zeros(len(X)), 0, policy)
-
-
-def _make_rule(order, policy):
+def _unfitted_rule(order, policy):
     """A single rule, which is a constant or a line, by plain least squares."""
     rule = ANFISRegressor(n_mfs=1, order=order, alpha=0.0, out_of_bounds=policy)
     return make_pipeline(StandardScaler(), rule)
 
 
-def _rule(X, y, order, policy):
-    return FrozenRules.of(_make_rule(order, policy).fit(X, y), X.shape[1])
+def fitted_rule(X, y, order, policy):
+    return FrozenRules.of(_unfitted_rule(order, policy).fit(X, y), X.shape[1])

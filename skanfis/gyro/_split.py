@@ -257,15 +257,11 @@ def _labels(log, part, groups):
 def find_legs(temperature, run=None):
     """Number of each row's leg, from one turning point of the temperature to the next, by runs."""
     least = max(_TURN * float(np.ptp(temperature)), _SMALLEST_TURN)
-    runs = np.zeros(temperature.size, dtype=int)
-    if run is not None:
-        runs = np.unique(run, return_inverse=True)[1]
-    legs = np.empty(temperature.size, dtype=int)
-    n_legs = 0
-    for number in range(runs.max() + 1):
-        rows = np.flatnonzero(runs == number)
-        turns = _turns(temperature[rows], least)
-        legs[rows] = n_legs + np.searchsorted(turns, np.arange(rows.size), side="right")
+    runs = np.zeros(temperature.size) if run is None else np.asarray(run)
+    legs, n_legs = np.empty(temperature.size, dtype=int), 0
+    for _, part in pd.Series(temperature).groupby(runs):
+        turns = _turns(part.to_numpy(), least)
+        legs[part.index] = n_legs + np.searchsorted(turns, np.arange(part.size), side="right")
         n_legs += len(turns) + 1
     return legs
 

@@ -6,7 +6,7 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import export_c_physics
-from skanfis.gyro._simpler import kinds, zero_rule
+from skanfis.gyro._simpler import fitted_rule, kinds
 
 from ..export.c_compiler import SANITIZE, UNTOUCHED, evaluate_all, needs_compiler
 
@@ -15,7 +15,9 @@ INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 def cubic_of(X, log, policy):
     *_, (_, _, fit) = kinds(list(X), policy)
-    return fit(X, (log["output"] - log["rate"]).to_numpy(), zero_rule(X, policy))
+    return fit(
+        X, (log["output"] - log["rate"]).to_numpy(), fitted_rule(X, np.zeros(len(X)), 0, policy)
+    )
 
 
 @needs_compiler

@@ -11,7 +11,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
 from skanfis.gyro._models import make_law
-from skanfis.gyro._simpler import kinds, zero_rule
+from skanfis.gyro._simpler import fitted_rule, kinds
 
 INPUTS = ("time", "temperature", "output")
 CUBIC = make_pipeline(StandardScaler(), PolynomialFeatures(3), LinearRegression())
@@ -28,7 +28,7 @@ def fitted(kind, log, policy="linear"):
     every = {name: (predicts, fit) for name, predicts, fit in kinds(INPUTS, policy)}
     predicts, fit = every[kind]
     target = rate if predicts == "rate" else log["output"].to_numpy() - rate
-    return fit(X, target, zero_rule(X, policy)), predicts
+    return fit(X, target, fitted_rule(X, np.zeros(len(X)), 0, policy)), predicts
 
 
 @pytest.fixture(scope="module", params=[name for name, *_ in kinds(INPUTS)])
