@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ._columns import unit_in
-from ._tables import EXCEL, MATLAB, PARQUET, excel_source, matlab_source, parquet_source
+from ._tables import EXCEL, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
 from .errors import LogError
 
 # What loggers write where there is no value, beside what pandas knows.
@@ -52,7 +52,7 @@ def open_source(path, *, head_only=False):
             return None
         if name.endswith(EXCEL):
             return excel_source(path, header_place)
-        return parquet_source(path) if name.endswith(PARQUET) else matlab_source(path)
+        return ParquetSource(path) if name.endswith(PARQUET) else matlab_source(path)
     source = _TextSource(path)
     if not head_only:
         source.check_lengths()

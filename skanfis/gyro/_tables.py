@@ -1,7 +1,7 @@
 """Tables in files of Parquet, MATLAB and Excel, in the form of a source of a log."""
 
 from collections.abc import Mapping
-from contextlib import nullcontext
+from contextlib import contextmanager, nullcontext
 from importlib import import_module
 
 import numpy as np
@@ -12,8 +12,6 @@ from .errors import LogError
 PARQUET, MATLAB, EXCEL = (".parquet", ".pq"), (".mat",), (".xlsx", ".xlsm")
 _HDF5 = b"\x89HDF"
 _HEAD_ROWS = 60
-# What the libraries raise of a file that is none of theirs.
-_DAMAGED = (ValueError, TypeError, NotImplementedError, OSError, KeyError)
 
 
 class TableSource:
@@ -34,29 +32,36 @@ class TableSource:
             yield piece.astype(dict.fromkeys(labels, "string"))
 
 
-def parquet_source(path):
-    """The table in a Parquet file, its index among the columns."""
-    told = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
-    parquet = _needed("pyarrow.parquet", told)
-    with open(path, "rb") as file:
-        try:
-            table = parquet.ParquetFile(file).read()
-            table = table.to_pandas(ignore_metadata=True, split_blocks=True)
-        except _DAMAGED as error:
-            reason = str(error).strip().partition("\n")[0].removesuffix(".")
-            raise LogError(f"{path}: is no Parquet that can be read: {reason}.") from error
-    return TableSource(path, table, [])
+class ParquetSource(TableSource):
+    """A table of which a piece is held at a time, and no columns but those asked for."""
+
+    def __init__(self, path):
+        told = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
+        parquet = _needed("pyarrow.parquet", told)
+        with open(path, "rb"):
+            pass  # what cannot be opened is told as of any other file
+        with _read_as("Parquet", path):
+            # Not buffered ahead: what was read would stay as long as the file is open.
+            self._file = parquet.ParquetFile(path, pre_buffer=False)
+        super().__init__(path, pd.DataFrame(columns=self._file.schema_arrow.names), [])
+        if len(set(self.header)) < len(self.header):
+            raise LogError(f"{path}: two columns have one name; rename one of them.")
+
+    def pieces(self, places, n_rows, labels=()):
+        names, begin = [self.header[place] for place in places], 0
+        with _read_as("Parquet", self.path):
+            for batch in self._file.iter_batches(n_rows, columns=names):
+                columns = {k: batch.column(self.header[k]).to_pandas() for k in places}
+                table = pd.DataFrame(columns).astype(dict.fromkeys(labels, "string"))
+                yield table.set_axis(pd.RangeIndex(begin, begin := begin + len(table)))
 
 
 def matlab_source(path):
     """The vectors of one length in a .mat file, of variables or of the fields of structs."""
     with open(path, "rb") as file:
         is_hdf5 = _HDF5 in (file.read(4), file.seek(512) and file.read(4))
-    try:
-        with _tree(path, is_hdf5) as tree:
-            found = dict(_vectors(tree))
-    except _DAMAGED as error:
-        raise LogError(f"{path}: is no MATLAB file that can be read: {error}") from error
+    with _read_as("MATLAB file", path), _tree(path, is_hdf5) as tree:
+        found = dict(_vectors(tree))
     lengths = [len(values) for values in found.values() if len(values) > 1]
     if not lengths:
         raise LogError(f"{path}: has no vectors of numbers; save them as variables or a struct.")
@@ -74,6 +79,16 @@ def _tree(path, is_hdf5):
     from scipy.io import loadmat
 
     return nullcontext(loadmat(path, simplify_cells=True))
+
+
+@contextmanager
+def _read_as(kind, path):
+    """LogError where a library finds that a file is none of its kind."""
+    try:
+        yield
+    except (ValueError, TypeError, NotImplementedError, OSError, KeyError) as error:
+        reason = str(error).strip().partition("\n")[0].removesuffix(".")
+        raise LogError(f"{path}: is no {kind} that can be read: {reason}.") from error
 
 
 def _needed(module, told):
