@@ -31,7 +31,8 @@ def fit_model(X, target, groups, recipe):
             left = target - make_law(recipe.inputs, _DEGREE, "linear").fit(X, target).predict(X)
         rules = _make_rules(recipe, terms)
         rules.fit(X.iloc[rows], left[rows], anfisregressor__groups=groups[rows])
-        terms = _terms_of(rules[-1])
+        counts = Counter(term["input"] for term in rules[-1].memberships_)
+        terms = tuple(max(counts[name], 1) for name in rules[-1].model_.input_names)
     if not recipe.physics:
         # What was found in all rows is fitted to them.
         is_done = rules is not None and rows.size == len(X)
@@ -63,11 +64,6 @@ def _make_rules(recipe, terms):
     return make_pipeline(
         StandardScaler(), ANFISRegressor(**structure, out_of_bounds=recipe.outside)
     )
-
-
-def _terms_of(anfis):
-    counts = Counter(term["input"] for term in anfis.memberships_)
-    return tuple(max(counts[name], 1) for name in anfis.model_.input_names)
 
 
 def some_rows(rows, n_rows, X, rng):

@@ -31,7 +31,7 @@ from ._split import choose_split
 from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
-from .html_report import check_installed, report_page, write_pdf
+from .html_report import check_installed, report_page
 from .log import find_logs, read
 from .metrics import rms
 from .targets.write import FILES, write_targets
@@ -215,7 +215,9 @@ def _write(calibration, options, files, folder):
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")
     if options.pdf:
-        write_pdf(page, folder / "report.pdf")
+        import weasyprint
+
+        weasyprint.HTML(string=page).write_pdf(folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
     # To the last bit the same, at the edge of its range too.
     same = GyroCompensator.read_json(folder / "compensator.json")

@@ -73,11 +73,6 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         Returns
         -------
         self : ThermalRate
-
-        Raises
-        ------
-        ValueError
-            If X is not finite or lacks a column named, or time does not increase within a run.
         """
         constant = self.time_constant
         if not (isinstance(constant, int | float | np.number) and 0.0 < constant < np.inf):

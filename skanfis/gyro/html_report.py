@@ -99,13 +99,6 @@ def report_page(calibration, title, options=None):
     )
 
 
-def write_pdf(page, path):
-    """The page on paper."""
-    import weasyprint
-
-    weasyprint.HTML(string=page).write_pdf(path)
-
-
 def check_installed(pdf=False):
     """ImportError where the report could not be made: at the end that would be found out late."""
     for name in ("matplotlib", "jinja2", *(["weasyprint"] if pdf else [])):

@@ -172,11 +172,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         -------
         rate : ndarray of shape (n_samples,)
             In the unit of the target.
-
-        Raises
-        ------
-        ValueError
-            If X is not finite; or, with ``out_of_bounds="raise"``, goes beyond ``max_phase``.
         """
         check_parameters(self)
         used = self._used(X)
