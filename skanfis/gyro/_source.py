@@ -47,12 +47,12 @@ _DAY, _HOUR = 86_400.0, 3_600.0  # s
 def open_source(path, *, head_only=False):
     """The table in a file; LogError where there is none, as far as its head tells if asked so."""
     name = str(path).lower()
-    if name.endswith((*PARQUET, *MATLAB, *EXCEL)):
+    if name.endswith(PARQUET):
+        return ParquetSource(path)
+    if name.endswith((*MATLAB, *EXCEL)):
         if head_only:
             return None
-        if name.endswith(EXCEL):
-            return excel_source(path, header_place)
-        return ParquetSource(path) if name.endswith(PARQUET) else matlab_source(path)
+        return excel_source(path, header_place) if name.endswith(EXCEL) else matlab_source(path)
     source = _TextSource(path)
     if not head_only:
         source.check_lengths()
