@@ -1,7 +1,7 @@
 """Where training starts: rules in standardised units, weights of the penalty, premises so far.
 
 Rules come from a search, or are given: by terms per input, by a clusterer, by a model. Of rules
-that are given the weights are found in the same way, on a sample. Their terms may leave their
+that are given the weights are found in the same way, on a sample. Terms in order may leave their
 bounds, as in classic ANFIS, where that leaves less than nine tenths of the expected squared error.
 """
 
@@ -90,7 +90,8 @@ def tuned_start(
     best = tune(problem, premise, free, n_sample, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
-    if turns and premise.size and has_rows and problem.n_columns <= MOST_COLUMNS:
+    is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
+    if is_bounded and has_rows and problem.n_columns <= MOST_COLUMNS:
         unbounded = Premise.of(antecedent, low, high, is_free=True)
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
