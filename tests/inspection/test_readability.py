@@ -47,24 +47,6 @@ def test_tables_hold_the_measures(model):
     assert_array_equal(found.summary, [measures.alone.max(), ratio])
 
 
-def test_the_numerals_of_the_sentences_are_counted():
-    # "IF time is low AND chip temperature is low AND rate is low THEN y = a + b t + c T + d rate".
-    assert found_of(A_GRID).reading_cost == 12 * (3 + 4)
-    assert found_of(MODELS["grid, order 1, 2 outputs"]).reading_cost == 12 * (3 + 2 * 4)
-    level = A_GRID.coefficients.copy()
-    level[:, 2] = 0.0
-    assert found_of(replace(A_GRID, coefficients=level)).reading_cost == 12 * (3 + 3)
-
-
-def test_what_is_common_counts_once():
-    common = A_GRID.coefficients.copy()
-    common[:, 2] = 3.0 / 15.0
-    common[1:, 1] = 2.0 / 600.0
-    # Twelve of the last slope, two and one of what is common.
-    found = found_of(replace(A_GRID, coefficients=common))
-    assert found.reading_cost == 12 * (3 + 1) + 12 + 2 + 1
-
-
 def test_nothing_is_found_at_the_limits():
     found = found_of(A_GRID, printed_errors=np.array([1.05]))
     assert found.findings == []
