@@ -36,15 +36,14 @@ def blobs(n_rows=200, n_columns=2):
     return X, y, np.random.default_rng(1).uniform(0.3, 3.0, n_rows)
 
 
-class TestMemberships:
-    @pytest.mark.parametrize("m", [1.0 + 1e-12, 2.0, 1e6])
-    def test_coincident_points_and_ties_are_shared(self, m):
-        D = np.array([[0.0, 1.0], [0.0, 0.0], [4.0, 4.0], [1e-320, 1.0]]).T
-        expected = np.array([[1.0, 0.0], [0.5, 0.5], [0.5, 0.5], [1.0, 0.0]])
-        found = fuzzy_cmeans.memberships(D, m).T
-        assert_array_equal(found[[0, 1, 2]], expected[[0, 1, 2]])
-        if m < 3:
-            assert_allclose(found[3], expected[3], atol=1e-15)
+@pytest.mark.parametrize("m", [1.0 + 1e-12, 2.0, 1e6])
+def test_coincident_points_and_ties_are_shared(m):
+    D = np.array([[0.0, 1.0], [0.0, 0.0], [4.0, 4.0], [1e-320, 1.0]]).T
+    expected = np.array([[1.0, 0.0], [0.5, 0.5], [0.5, 0.5], [1.0, 0.0]])
+    found = fuzzy_cmeans.memberships(D, m).T
+    assert_array_equal(found[[0, 1, 2]], expected[[0, 1, 2]])
+    if m < 3:
+        assert_allclose(found[3], expected[3], atol=1e-15)
 
 
 class TestIteration:
@@ -124,16 +123,15 @@ class TestCoincidentCenters:
         assert (np.ptp(model.cluster_centers_, axis=0).max() < 1e-3) == coincide
 
 
-class TestErrors:
-    @pytest.mark.parametrize(
-        ("setting", "message"),
-        [
-            ({"m": 1.0}, "'m' parameter"),
-            ({"init": np.zeros((2, 2))}, r"init has shape \(2, 2\), but n_clusters=3"),
-            ({"init": np.full((3, 2), np.nan)}, "init contains NaN"),
-            ({"n_clusters": 11}, "n_clusters=11 needs as many distinct rows .* there are 10"),
-        ],
-    )
-    def test_bad_parameters(self, rng, setting, message):
-        with pytest.raises(ValueError, match=message):
-            FuzzyCMeans(**setting).fit(rng.normal(size=(10, 2)))
+@pytest.mark.parametrize(
+    ("setting", "message"),
+    [
+        ({"m": 1.0}, "'m' parameter"),
+        ({"init": np.zeros((2, 2))}, r"init has shape \(2, 2\), but n_clusters=3"),
+        ({"init": np.full((3, 2), np.nan)}, "init contains NaN"),
+        ({"n_clusters": 11}, "n_clusters=11 needs as many distinct rows .* there are 10"),
+    ],
+)
+def test_bad_parameters_are_refused(rng, setting, message):
+    with pytest.raises(ValueError, match=message):
+        FuzzyCMeans(**setting).fit(rng.normal(size=(10, 2)))

@@ -30,26 +30,25 @@ def model(gradient, hessian, step):
     return step @ gradient + 0.5 * np.einsum("...i,ij,...j", step, hessian, step)
 
 
-class TestTrustRegionStep:
-    @pytest.mark.parametrize("rank", [1, 3, 6])
-    @pytest.mark.parametrize("radius", [1e-8, 1e-3, 0.3, 1.0, 1e3])
-    @pytest.mark.parametrize("damping", [0.0, 0.1])
-    def test_step_meets_the_optimality_conditions(self, rng, rank, radius, damping):
-        # (H + mu I) s = -g with mu >= 0, and mu = 0 unless s ends on the edge
-        for _ in range(10):
-            gradient, hessian = rng.normal(size=6), semidefinite(rng, 6, rank)
-            if damping == 0.0:
-                gradient = hessian @ gradient  # else the floor alone would decide the length
-            step = trust_region_step(gradient, hessian, radius, damping)
-            length = np.linalg.norm(step)
-            assert length <= 1.01 * radius * (1.0 + 1e-9)
-            seen = hessian + (damping + FLOOR * np.linalg.eigvalsh(hessian)[-1]) * np.eye(6)
-            force = -(gradient + seen @ step)
-            multiplier = force @ step / length**2
-            assert_allclose(force, multiplier * step, atol=1e-9 * np.linalg.norm(gradient))
-            assert multiplier >= -1e-9 * np.linalg.norm(seen)
-            if length < 0.99 * radius:
-                assert_allclose(multiplier, 0.0, atol=1e-9 * np.linalg.norm(seen))
+@pytest.mark.parametrize("rank", [1, 3, 6])
+@pytest.mark.parametrize("radius", [1e-8, 1e-3, 0.3, 1.0, 1e3])
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_step_meets_the_optimality_conditions(rng, rank, radius, damping):
+    # (H + mu I) s = -g with mu >= 0, and mu = 0 unless s ends on the edge
+    for _ in range(10):
+        gradient, hessian = rng.normal(size=6), semidefinite(rng, 6, rank)
+        if damping == 0.0:
+            gradient = hessian @ gradient  # else the floor alone would decide the length
+        step = trust_region_step(gradient, hessian, radius, damping)
+        length = np.linalg.norm(step)
+        assert length <= 1.01 * radius * (1.0 + 1e-9)
+        seen = hessian + (damping + FLOOR * np.linalg.eigvalsh(hessian)[-1]) * np.eye(6)
+        force = -(gradient + seen @ step)
+        multiplier = force @ step / length**2
+        assert_allclose(force, multiplier * step, atol=1e-9 * np.linalg.norm(gradient))
+        assert multiplier >= -1e-9 * np.linalg.norm(seen)
+        if length < 0.99 * radius:
+            assert_allclose(multiplier, 0.0, atol=1e-9 * np.linalg.norm(seen))
 
 
 @dataclass
