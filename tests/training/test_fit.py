@@ -48,9 +48,6 @@ def test_rules_hold_one_by_one_where_that_is_cheap():
     assert error < 1.15 * error_apart
 
 
-# --------------------------------------------------------------------------------------- clusterers
-
-
 class Remembers(ClusterMixin, BaseEstimator):
     """Two clusters by the sign of the first column; keeps what it was given."""
 
@@ -87,9 +84,6 @@ def test_pipeline_is_a_clusterer_too():
     # On standardised data a scaler does nothing, but for rounding.
     scaled = quick(partition=make_pipeline(StandardScaler(), kmeans)).fit(X, y)
     assert_allclose(scaled.predict(X), alone.predict(X), rtol=0, atol=1e-8)
-
-
-# ---------------------------------------------------------------------------- structure and weights
 
 
 WEIGHTS = ("agreement_", "alpha_", "slope_alpha_", "stiffness_")
