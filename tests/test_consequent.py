@@ -30,11 +30,6 @@ def gram_of(strengths, Z, weight, order):
     return (phi * weight) @ phi.T
 
 
-def positive_definite(rng, n=12, condition=1e4):
-    q, _ = np.linalg.qr(rng.normal(size=(n, n)))
-    return (q * np.geomspace(1.0, 1.0 / condition, n)) @ q.T
-
-
 def test_rule_that_fires_on_one_spot_has_a_spread(Z, weight, strengths):
     strengths[:, 0], strengths[0, 1:] = [1.0, 0.0, 0.0, 0.0], 0.0
     local = LocalBasis.from_gram(gram_of(strengths / strengths.sum(axis=0), Z, weight, 1), N_RULES)
@@ -59,7 +54,8 @@ def test_traces_of_large_matrices_are_exact_where_no_sign_matters(rng):
     assert_allclose(factor.trace(np.diag(diagonal)), 600.0, rtol=1e-9)
     rows = np.diag(rng.normal(size=600))
     assert_allclose(factor.squares(rows), np.diag(rows) ** 2 / diagonal, rtol=1e-9)
-    dense = positive_definite(rng, 600)
+    q, _ = np.linalg.qr(rng.normal(size=(600, 600)))
+    dense = (q * np.geomspace(1.0, 1e-4, 600)) @ q.T
     assert_allclose(NormalFactor(dense).trace(dense), 600.0, rtol=1e-6)
 
 

@@ -275,15 +275,12 @@ def test_outputs_share_the_premises_and_have_their_own_consequents():
 # ----------------------------------------------------------------------------------------- coverage
 
 
-def l_shaped(n_rows=1500):
-    """The unit square without its upper right quarter."""
-    data = np.random.default_rng(0).uniform(size=(n_rows, 2))
-    data = data[(data < 0.45).any(axis=1)]
-    return data, np.sin(3 * data[:, 0]) + data[:, 1] ** 2
-
-
 def test_coverage_is_near_one_amid_data_and_low_in_an_empty_cell():
-    model = ANFISRegressor(n_mfs=3, solver=VariableProjection(stiffness=1.0)).fit(*l_shaped())
+    data = np.random.default_rng(0).uniform(size=(1500, 2))
+    # Without the upper right quarter.
+    data = data[(data < 0.45).any(axis=1)]
+    model = ANFISRegressor(n_mfs=3, solver=VariableProjection(stiffness=1.0))
+    model.fit(data, np.sin(3 * data[:, 0]) + data[:, 1] ** 2)
     assert model.coverage([[0.2, 0.2], [0.2, 0.8], [0.8, 0.2]]).min() > 0.95
     axis = np.linspace(0.05, 0.95, 10)
     square = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)

@@ -47,9 +47,9 @@ def laplace_at(problem, evaluation, penalty, **premises):
     )
 
 
-def posterior(rows, antecedent, order, penalty, at=FIRST):
+def posterior(rows, antecedent, order, penalty):
     """The posterior at the start, from an evaluation at weights of its own."""
-    problem = SeparableProblem(rows, antecedent, order, at)
+    problem = SeparableProblem(rows, antecedent, order, FIRST)
     return laplace_at(problem, problem.evaluate(antecedent.parameters), penalty)
 
 

@@ -51,18 +51,11 @@ class TestJointGradient:
         assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
 
-AGREEING = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
-
-
-def problem_of(kind="grid", seed=0, penalty=AGREEING, order=1):
-    rows, premise, *_ = planted(kind, seed, displaced=0.5, noise=0.1)
-    return SeparableProblem(rows, premise.antecedent, order, penalty), premise
-
-
 def test_step_is_along_the_gradient_by_natural_premises_and_consequents():
-    problem, premise = problem_of("bells")
-    rows, antecedent = problem.rows, premise.antecedent
-    dense = oracles.DenseProblem(rows, antecedent, 1, problem.penalty)
+    rows, premise, *_ = planted("bells", 0, displaced=0.5, noise=0.1)
+    antecedent, penalty = premise.antecedent, Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
     (group,) = antecedent.groups
     solved = problem.evaluate(antecedent.parameters).coefficients
     numbers = group.family.natural(group.theta)
