@@ -44,10 +44,6 @@ def standardised_inputs(rng):
     return rng.normal(size=(3, 60))
 
 
-def no_terms():
-    return GridAntecedent((), counts=())
-
-
 @ALL
 def test_strengths_are_products_over_the_sum_of_products(antecedent, Z, rng):
     """Of its own parameters, and of others, which it takes to the last bit."""
@@ -78,7 +74,7 @@ def test_rule_terms_are_those_by_hand(antecedent):
 
 
 def test_without_terms_one_rule_always_fires(Z):
-    antecedent = no_terms()
+    antecedent = GridAntecedent((), counts=())
     assert_array_equal(antecedent.strengths(Z), np.ones((1, 60)))
     assert antecedent.n_rules == 1
     assert antecedent.n_terms == 0

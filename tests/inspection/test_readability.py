@@ -100,10 +100,6 @@ def test_rules_that_go_different_ways_beyond_chance():
     assert not [one for one in unsure.findings if "ways" in one]
 
 
-def target_of(X):
-    return 1e3 + np.sin(X["kelvin"] / 20) + 1e6 * X["rate"] ** 2
-
-
 def assert_same(found, expected, rtol=1e-9):
     # Digits go by powers of ten of the units: what is printed is another model.
     key = "strongest_alone"
@@ -114,7 +110,7 @@ def assert_same(found, expected, rtol=1e-9):
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_estimators_around_the_model_are_measured_in_their_own_units(fitted):
     pipe, X = fitted
-    y = target_of(X)
+    y = 1e3 + np.sin(X["kelvin"] / 20) + 1e6 * X["rate"] ** 2
     found = readability(pipe, X, y)
     assert_same(found, readability(pipe[-1], pipe[:-1].transform(X), y))
     assert found.rules["if"][0] == "kelvin is low AND rate is low"

@@ -118,12 +118,6 @@ def arrays(evaluation, linearisation):
     ]
 
 
-def many_small_chunks(monkeypatch):
-    monkeypatch.setattr(objective, "_FEWEST_ROWS", 8)
-    monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
-    monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
-
-
 def test_evaluation_is_that_of_the_dense_ridge_regression(case):
     found, dense = case.problem.evaluate(case.point), case.dense
     assert_allclose(found.cost, dense.cost(case.point), rtol=1e-11)
@@ -163,7 +157,9 @@ def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
 @pytest.mark.theory
 def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
     whole = arrays(*case.at_point())
-    many_small_chunks(monkeypatch)
+    monkeypatch.setattr(objective, "_FEWEST_ROWS", 8)
+    monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
+    monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
     split = Case(
         case.problem.antecedent,
         case.order,
