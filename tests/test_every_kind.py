@@ -188,14 +188,9 @@ def test_rules_without_one_can_be_trained_and_written(kind):
     again = ANFISRegressor(**GIVEN | {"partition": left}).fit(X, Y)
     assert again.score(X, Y) > 0.7
     for model in (left, again.model_):
-        assert_file_is(model)
-
-
-def assert_file_is(model):
-    """JSON gives the same back."""
-    read = parse_json(export_json(model))
-    assert type(read.antecedent) is type(model.antecedent)
-    assert_array_equal(read.predict(X), model.predict(X))
+        read = parse_json(export_json(model))
+        assert type(read.antecedent) is type(model.antecedent)
+        assert_array_equal(read.predict(X), model.predict(X))
 
 
 def test_json_and_pickles(kind, tmp_path):
