@@ -77,7 +77,8 @@ def violations(source, module):
     tree = ast.parse(source)
     lazy = {
         node
-        for function in functions(tree)
+        for function in ast.walk(tree)
+        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef)
         for node in ast.walk(function)
         if isinstance(node, ast.Import | ast.ImportFrom)
     }
@@ -161,11 +162,6 @@ def dotted(node):
         owner = dotted(node.value)
         return owner and f"{owner}.{node.attr}"
     return ""
-
-
-def functions(tree):
-    """Every function in the tree."""
-    return [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
 
 
 def module_name(path):

@@ -76,7 +76,10 @@ def test_entry_of_x_that_is_not_finite(value, kind, as_frame):
             getattr(line(as_frame), method)(bad)
 
 
+TIMES = pd.date_range("2020", periods=N_ROWS)
+LO_HI = ["lo", "hi"] * (N_ROWS // 2)
 COUNTS = pd.array([1, 2, None] * 20, dtype="Int64")
+ONES = np.ones(N_ROWS)
 NAN_IN_Y1 = with_entry(np.column_stack([Y, Y]), (4, 1), np.nan)
 # What is given to fit, and what is said of it.
 REFUSED = {
@@ -87,7 +90,23 @@ REFUSED = {
     "complex X": ({"X": X + 1j}, ["Complex data not supported"]),
     "complex y": ({"y": Y + 1j}, ["Complex data not supported"]),
     "text": ({"X": FRAME.assign(rate="warm")}, ["could not convert string to float", "'warm'"]),
+    "columns of text": (
+        {"X": FRAME.assign(kind="p", site="q")},
+        ["text in column 'kind', first at row 0", "the columns 'site'", "OneHot"],
+    ),
     "text as y": ({"y": np.array(["low", "high"] * 30)}, ["y holds text", "'low'"]),
+    "text in a list as y": ({"y": LO_HI}, ["y holds text, first at row 0", "must be a number"]),
+    "text in a series as y": (
+        {"y": pd.Series(LO_HI, name="error")},
+        ["y holds text in column 'error', first at row 0", "'lo'"],
+    ),
+    "times as y": ({"y": pd.Series(TIMES, name="end")}, ["y holds times in column 'end'"]),
+    "times alone": ({"X": pd.DataFrame({"start": TIMES})}, ["X holds times in column 'start'"]),
+    "array of times": ({"X": TIMES.to_numpy()[:, None]}, ["X holds times (datetime64"]),
+    "two y of one name": (
+        {"y": pd.DataFrame(np.ones((N_ROWS, 2)), columns=["e", "e"])},
+        ["y has 2 columns of the name 'e'"],
+    ),
     "no rows": ({"X": X[:0], "y": Y[:0]}, ["0 sample(s)", "minimum of 2", "ANFISRegressor"]),
     "one row": ({"X": X[:1], "y": Y[:1]}, ["1 sample(s)", "minimum of 2", "ANFISRegressor"]),
     "no columns": ({"X": X[:, :0]}, ["0 feature(s)", "minimum of 1", "ANFISRegressor"]),
@@ -106,6 +125,25 @@ REFUSED = {
         {"partition": AgglomerativeClustering(n_clusters=2), "sample_weight": np.ones(N_ROWS)},
         ["AgglomerativeClustering", "no sample_weight", "KMeans", "'grid'"],
     ),
+    "negative weight": (
+        {"sample_weight": with_entry(ONES, 4, -2.0)},
+        ["Negative", "sample_weight", "-2 at row 4"],
+    ),
+    "no weight": ({"sample_weight": 0.0 * ONES}, ["ample", "eight", "at least"]),
+    "weight of one row": (
+        {"sample_weight": with_entry(0.0 * ONES, 3, 1.0)},
+        ["sample_weight leaves 1 of 60 rows", "at least 2"],
+    ),
+    "NaN in weights": (
+        {"sample_weight": with_entry(ONES, 4, np.nan)},
+        ["sample_weight contains NaN"],
+    ),
+    "infinite weight": (
+        {"sample_weight": with_entry(ONES, 4, np.inf)},
+        ["sample_weight contains infinity"],
+    ),
+    "other weights": ({"sample_weight": ONES[:-1]}, ["sample_weight.shape == (59,)", "(60,)"]),
+    "2D weights": ({"sample_weight": np.ones((N_ROWS, 2))}, ["Sample weights must be 1D"]),
     "noise": ({"partition": DBSCAN(eps=1e-9)}, ["partition found no cluster", "noise"]),
     "no rules": ({"partition": ANFISRegressor()}, ["has no rules", "not been fitted", "model_"]),
     "a class": ({"partition": KMeans}, ["is a class", "KMeans(...)"]),
@@ -123,8 +161,6 @@ def test_what_fit_refuses(case):
         fit(**given)
 
 
-TIMES = pd.date_range("2020", periods=N_ROWS)
-LO_HI = ["lo", "hi"] * (N_ROWS // 2)
 TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "Drop the column, or encode"]
 
 
@@ -148,33 +184,6 @@ def test_column_that_is_no_number_is_named(rate, said):
         with pytest.raises((TypeError, ValueError)) as refusal:
             act(bad, Y)
         assert re.search(".*".join(map(re.escape, said)), str(refusal.value))
-
-
-def test_table_of_times_alone_is_no_table_of_nanoseconds():
-    with refused(ValueError, "X holds times in column 'start'"):
-        fit(pd.DataFrame({"start": TIMES}))
-    with refused(ValueError, "X holds times (datetime64"):
-        ANFISRegressor().fit(TIMES.to_numpy().reshape(-1, 1), Y)
-
-
-@pytest.mark.parametrize(
-    ("targets", "said"),
-    [
-        (
-            pd.Series(LO_HI, name="error"),
-            ["y holds text in column 'error', first at row 0", "'lo'"],
-        ),
-        (LO_HI, ["y holds text, first at row 0", "'lo'", "must be a number"]),
-        (pd.Series(TIMES, name="end"), ["y holds times in column 'end'"]),
-        (
-            pd.DataFrame(np.ones((N_ROWS, 2)), columns=["e", "e"]),
-            ["y has 2 columns of the name 'e'"],
-        ),
-    ],
-)
-def test_target_that_is_no_number_is_named(targets, said):
-    with refused(ValueError, *said):
-        ANFISRegressor().fit(X, targets)
 
 
 def test_two_columns_of_one_name():
@@ -423,14 +432,6 @@ def test_parameter_of_the_wrong_type_or_range(parameter, value, allowed):
     assert f"Got {value!r} instead" in str(refusal.value)
 
 
-def test_all_columns_of_text_are_named():
-    table = pd.DataFrame({"a": np.arange(9.0), "kind": ["p"] * 9, "site": ["q"] * 9})
-    with refused(
-        ValueError, "text in column 'kind', first at row 0", "the columns 'site'", "OneHot"
-    ):
-        ANFISRegressor().fit(table, Y[:9])
-
-
 def test_unknown_parameter():
     with refused(ValueError, "Invalid parameter 'mfs'", "n_mfs"):
         ANFISRegressor().set_params(mfs=3)
@@ -454,26 +455,6 @@ def test_setting_of_a_word(given, setting, advice):
     # The object may come with it, or be there.
     model.set_params(solver=Hybrid(), solver__step_size=0.5)
     assert model.set_params(solver__step_size=0.25).solver.step_size == 0.25
-
-
-# ------------------------------------------------------------------------------------ sample_weight
-
-
-@pytest.mark.parametrize(
-    ("sample_weight", "said"),
-    [
-        (with_entry(np.ones(N_ROWS), 4, -2.0), ["Negative", "sample_weight", "-2 at row 4"]),
-        (np.zeros(N_ROWS), ["ample", "eight", "at least"]),
-        (with_entry(np.zeros(N_ROWS), 3, 1.0), ["sample_weight leaves 1 of 60 rows", "at least 2"]),
-        (with_entry(np.ones(N_ROWS), 4, np.nan), ["sample_weight contains NaN"]),
-        (with_entry(np.ones(N_ROWS), 4, np.inf), ["sample_weight contains infinity"]),
-        (np.ones(N_ROWS - 1), ["sample_weight.shape == (59,)", "(60,)"]),
-        (np.ones((N_ROWS, 2)), ["Sample weights must be 1D"]),
-    ],
-)
-def test_weights_that_cannot_be(sample_weight, said):
-    with refused(ValueError, *said):
-        ANFISRegressor().fit(X, Y, sample_weight=sample_weight)
 
 
 # A second fit that fails

@@ -104,9 +104,6 @@ def case(request):
     return named_case(request.param)
 
 
-# -------------------------------------------------------------------------------------------- units
-
-
 def alternating(n_inputs, exponent):
     """Factors for inputs and target: every other one large, the rest small."""
     return 10.0 ** (exponent * (-1.0) ** np.arange(n_inputs + 1))
@@ -142,9 +139,6 @@ def test_direction_of_a_single_column(column):
     case.assert_same(found / factors[3])
 
 
-# -------------------------------------------------------------------------------------------- order
-
-
 @pytest.mark.parametrize("name", [n for n, (_, settings) in CASES.items() if "n_mfs" in settings])
 def test_order_of_the_inputs_of_a_grid(name):
     case = named_case(name)
@@ -152,9 +146,6 @@ def test_order_of_the_inputs_of_a_grid(name):
     n_mfs = case.settings["n_mfs"]
     n_mfs = [n_mfs[j] for j in order] if isinstance(n_mfs, list) else n_mfs
     case.assert_same(case.fit(case.X[:, order], case.y, n_mfs=n_mfs).predict(case.X[:, order]))
-
-
-# ------------------------------------------------------------------------------------------ weights
 
 
 def test_whole_weights_are_repeated_rows_in_any_order(case):
@@ -204,9 +195,6 @@ def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
     many, targets = np.repeat(X * units, weight, axis=0)[order], np.repeat(y, weight)[order]
     found = 1e6 * model.fit(many, 1e-6 * targets).predict(X * units)
     assert_allclose(found, weighted, rtol=0, atol=TOLERANCE * np.ptp(y))
-
-
-# ---------------------------------------------------------------------- every part of the estimator
 
 
 @pytest.mark.parametrize("name", ["gyro", "sinc"])

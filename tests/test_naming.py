@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
+from skanfis.antecedent import ScatteredAntecedent, TreeAntecedent
 from skanfis.antecedent.tree import CRISP
 from skanfis.membership import Gaussian
 from skanfis.naming import default_term_names, given_term_names
@@ -33,32 +33,33 @@ def scattered(centers):
     return ScatteredAntecedent.build(Gaussian, np.arange(centers.shape[1]), theta)
 
 
-def test_terms_of_a_grid_are_named_by_their_order():
-    assert default_term_names(grid(2, 3), *BOX) == ("low", "high", "low", "medium", "high")
-    assert default_term_names(grid(6), *BOX) == ("NL", "NM", "NS", "PS", "PM", "PL")
-    assert default_term_names(grid(9), *BOX)[:2] == ("level 1", "level 2")
-
-
-def test_other_terms_are_named_by_where_they_stand():
-    found = default_term_names(scattered([[21.34, 1e9 + 1], [-3.0, 1e9 + 2]]), *BOX)
-    assert found == ("near 21.3", "near 1000000001", "near -3", "near 1000000002")
+@pytest.mark.parametrize(
+    ("counts", "names"),
+    [
+        ([2, 3], ("low", "high", "low", "medium", "high")),
+        ([6], ("NL", "NM", "NS", "PS", "PM", "PL")),
+        ([9], tuple(f"level {k}" for k in range(1, 10))),
+        ([], ()),
+    ],
+)
+def test_terms_of_a_grid_are_named_by_their_order(counts, names):
+    assert default_term_names(grid(*counts), *BOX) == names
 
 
 @pytest.mark.parametrize(
-    ("place", "name"),
-    [(2213.4, "2210"), (-0.0123456, "-0.0123"), (0.0, "0"), (1e12, "1e+12"), (3e-7, "3e-07")],
+    ("places", "names"),
+    [
+        ([2213.4, -3.0], ["2210", "-3"]),
+        ([21.34, -0.0123456, 0.0], ["21.3", "-0.0123", "0"]),
+        ([1e12, 3e-7], ["1e+12", "3e-07"]),
+        # As many digits as tell them apart; those that differ by rounding have none.
+        ([1e9 + 1, 1e9 + 2], ["1000000001", "1000000002"]),
+        ([1.0, 1.0 + 1e-15, -1e-16], ["1", "1 (2)", "0"]),
+    ],
 )
-def test_places_are_written_as_a_person_would(place, name):
-    assert default_term_names(scattered([[place]]), *BOX) == (f"near {name}",)
-
-
-def test_terms_at_one_place_but_for_rounding_are_told_apart():
-    found = default_term_names(scattered([[1.0], [1.0 + 1e-15], [-1e-16]]), *BOX)
-    assert found == ("near 1", "near 1 (2)", "near 0")
-
-
-def test_without_terms_there_are_no_names():
-    assert default_term_names(GridAntecedent((), counts=()), *BOX) == ()
+def test_other_terms_are_named_by_where_they_stand(places, names):
+    found = default_term_names(scattered(np.transpose([places])), *BOX)
+    assert found == tuple(f"near {name}" for name in names)
 
 
 def test_given_names_replace_the_default():

@@ -26,18 +26,10 @@ from skanfis.learning.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS
 
 from . import oracles
-from .quick import with_few_candidates
+from .quick import quick, with_few_candidates
 
 NAMES = ["time", "temperature", "rate"]
 KMEANS = KMeans(n_clusters=4, n_init=1, random_state=0)
-# Where two fits are compared to the last bit, a few iterations show as much as many, and weights
-# that are given as much as those that are found: of these are the bits in test_reproducibility.py.
-SHORT = {
-    "n_mfs": 2,
-    "agreement": 0.1,
-    "alpha": 1e-6,
-    "solver": VariableProjection(tol=0.01, stiffness=1e-3),
-}
 
 
 def surface(n_rows=240, seed=0, noise=0.0):
@@ -180,7 +172,7 @@ def test_attributes_reproduce_the_predictions(place, settings):
     scale, offset = np.array([1e-6, 1e6, 1.0]), np.array([1.0, -3e6, 1e4])
     data = X / np.ptp(X, axis=0) * scale + offset
     targets = Y if n_outputs == 1 else np.column_stack([Y, 1e3 + np.cos(X[:, 1] / 40.0)])
-    model = ANFISRegressor(**SHORT | {"n_mfs": "auto"} | settings).fit(data, targets)
+    model = quick(**settings).fit(data, targets)
     # What the rules say, before it is held within the limits of the target.
     model.model_ = replace(model.model_, target=None)
     # p0 + p1 x1 + ... cancels where x is far from the origin, by 10^6 spans for the first column.
@@ -238,9 +230,9 @@ def test_loss_curve_goes_from_the_start_to_the_end():
 
 
 def test_max_iter_reached_is_said():
-    solver = VariableProjection(tol=1e-9, stiffness=1e-3)
+    solver = VariableProjection(tol=1e-9)
     with pytest.warns(ConvergenceWarning, match=r"max_iter=2: .* increase max_iter"):
-        model = ANFISRegressor(**SHORT | {"max_iter": 2, "solver": solver}).fit(X, Y)
+        model = quick(max_iter=2, solver=solver).fit(X, Y)
     assert model.n_iter_ == 2
     assert "max_iter" in model.status_
 
@@ -249,7 +241,7 @@ def test_max_iter_reached_is_said():
 
 
 def test_one_column_of_targets_is_the_vector_in_another_shape():
-    flat, column = (ANFISRegressor(**SHORT).fit(X, y) for y in (Y, Y[:, None]))
+    flat, column = (quick().fit(X, y) for y in (Y, Y[:, None]))
     assert_array_equal(column.predict(X), flat.predict(X)[:, None])
     assert_array_equal(column.consequents_, flat.consequents_[:, :, None])
 
@@ -276,22 +268,19 @@ def test_outputs_share_the_premises_and_have_their_own_consequents():
     expected = design.reshape(len(X), -1) @ solution
     error = (model.predict(X) - expected) / np.ptp(targets, axis=0)
     assert np.abs(error).max() < 1e-6
-    for found in (model, ANFISRegressor(**SHORT).fit(X, targets)):
+    for found in (model, quick().fit(X, targets)):
         assert_allclose(found.predict(X)[:, 1], -5e6 * found.predict(X)[:, 0] + 1.0, rtol=1e-9)
 
 
 # ----------------------------------------------------------------------------------------- coverage
 
 
-def l_shaped(n_rows=1500):
-    """The unit square without its upper right quarter."""
-    data = np.random.default_rng(0).uniform(size=(n_rows, 2))
-    data = data[(data < 0.45).any(axis=1)]
-    return data, np.sin(3 * data[:, 0]) + data[:, 1] ** 2
-
-
 def test_coverage_is_near_one_amid_data_and_low_in_an_empty_cell():
-    model = ANFISRegressor(n_mfs=3, solver=VariableProjection(stiffness=1.0)).fit(*l_shaped())
+    data = np.random.default_rng(0).uniform(size=(1500, 2))
+    # Without the upper right quarter.
+    data = data[(data < 0.45).any(axis=1)]
+    model = ANFISRegressor(n_mfs=3, solver=VariableProjection(stiffness=1.0))
+    model.fit(data, np.sin(3 * data[:, 0]) + data[:, 1] ** 2)
     assert model.coverage([[0.2, 0.2], [0.2, 0.8], [0.8, 0.2]]).min() > 0.95
     axis = np.linspace(0.05, 0.95, 10)
     square = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
@@ -342,7 +331,7 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
 
 
 def test_pickled_model_is_the_same_to_the_last_bit_and_small():
-    model = ANFISRegressor(**SHORT | {"n_mfs": 3}).fit(X, Y)
+    model = quick(3).fit(X, Y)
     pickled = pickle.dumps(model)
     same_bits(pickle.loads(pickled), model)
     # Most of it is the posterior that standard deviations need.
@@ -355,14 +344,14 @@ def test_pickled_model_is_the_same_to_the_last_bit_and_small():
 
 def test_whole_numbers_lists_and_order_of_memory():
     whole = np.round(X).astype(np.int32)
-    expected = ANFISRegressor(**SHORT).fit(whole.astype(float), Y)
+    expected = quick().fit(whole.astype(float), Y)
     for data in (
         whole,
         whole.tolist(),
         np.asfortranarray(whole, dtype=float),
         whole.astype(object),
     ):
-        model = ANFISRegressor(**SHORT).fit(data, Y.tolist())
+        model = quick().fit(data, Y.tolist())
         # Sums run along the memory: equal but for rounding.
         assert_allclose(model.predict(data), expected.predict(whole), rtol=0, atol=1e-10)
 
@@ -373,7 +362,7 @@ def test_memory_map_is_as_good_as_memory(tmp_path, dtype):
     np.save(tmp_path / "X.npy", data)
     np.save(tmp_path / "y.npy", Y)
     mapped, target = (np.load(tmp_path / f"{name}.npy", mmap_mode="r") for name in "Xy")
-    model, expected = (ANFISRegressor(**SHORT).fit(*both) for both in ((mapped, target), (data, Y)))
+    model, expected = (quick().fit(*both) for both in ((mapped, target), (data, Y)))
     same_bits(model, expected, data)
     # Single precision is trained in double.
     assert_array_equal(model.predict(mapped), expected.predict(data))
@@ -391,17 +380,17 @@ def frame_of(library, data, names):
 @LIBRARIES
 def test_data_frame_gives_names_to_the_terms(library):
     frame = frame_of(library, X, NAMES)
-    model = ANFISRegressor(**SHORT).fit(frame, frame_of(library, Y[:, None], ["error"])["error"])
+    model = quick().fit(frame, frame_of(library, Y[:, None], ["error"])["error"])
     assert_array_equal(model.feature_names_in_, NAMES)
     assert [term["input"] for term in model.memberships_] == [n for n in NAMES for _ in range(2)]
     # A frame's memory runs along its columns, and so do sums.
-    expected = ANFISRegressor(**SHORT).fit(X, Y).predict(X)
+    expected = quick().fit(X, Y).predict(X)
     assert_allclose(model.predict(frame), expected, rtol=0, atol=1e-10)
 
 
 @LIBRARIES
 def test_columns_in_another_order_are_refused(library):
-    model = ANFISRegressor(**SHORT).fit(frame_of(library, X, NAMES), Y)
+    model = quick().fit(frame_of(library, X, NAMES), Y)
     turned = frame_of(library, X[:, ::-1], NAMES[::-1])
     for method in (model.predict, model.coverage, model.strengths, model.in_bounds):
         with pytest.raises(ValueError, match="same order"):
@@ -411,18 +400,16 @@ def test_columns_in_another_order_are_refused(library):
 @LIBRARIES
 def test_names_pass_through_a_scaler(library):
     frame = frame_of(library, X, NAMES)
-    pipeline = make_pipeline(StandardScaler(), ANFISRegressor(**SHORT)).set_output(
-        transform=library
-    )
+    pipeline = make_pipeline(StandardScaler(), quick()).set_output(transform=library)
     pipeline.fit(frame, Y)
     assert pipeline[-1].memberships_[-1]["input"] == "rate"
     # Standardised before or not: the fit depends on no units.
-    plain = ANFISRegressor(**SHORT).fit(frame, Y).predict(frame)
+    plain = quick().fit(frame, Y).predict(frame)
     assert_allclose(pipeline.predict(frame), plain, rtol=0, atol=1e-8 * np.ptp(Y))
 
 
 def test_frame_without_names_that_are_text_is_an_array():
-    model = ANFISRegressor(**SHORT).fit(pd.DataFrame(X), Y)
+    model = quick().fit(pd.DataFrame(X), Y)
     assert not hasattr(model, "feature_names_in_")
     assert model.memberships_[0]["input"] == "x0"
     assert_array_equal(model.predict(pd.DataFrame(X)), model.predict(X))
@@ -461,7 +448,7 @@ def test_grid_search_over_runs_left_out():
     data = rng.uniform(size=(200, 2))
     target = np.sin(14.0 * data[:, 0]) + data[:, 1] + 0.1 * rng.normal(size=200)
     run = np.arange(200) % 4
-    estimator = ANFISRegressor(**SHORT)
+    estimator = quick()
     search = GridSearchCV(
         make_pipeline(StandardScaler(), estimator),
         {"anfisregressor__n_mfs": [2, 3, [4, 1]]},
@@ -478,7 +465,7 @@ def test_weights_are_routed_through_pipeline_and_search():
     weight = np.random.default_rng(0).uniform(size=len(X)) ** 4
     noisy = Y + 0.01 * np.random.default_rng(1).normal(size=len(X))
     with config_context(enable_metadata_routing=True):
-        inner = ANFISRegressor(**SHORT)
+        inner = quick()
         inner.set_fit_request(sample_weight=True).set_score_request(sample_weight=True)
         scaler = StandardScaler().set_fit_request(sample_weight=False)
         search = GridSearchCV(

@@ -25,11 +25,11 @@ def gbellmf(x, a, b, c):
 
 
 def trimf(x, a, b, c):
-    return np.maximum(np.minimum((x - a) / (b - a), (c - x) / (c - b)), 0)
+    return np.interp(x, [a, b, c], [0, 1, 0])
 
 
 def trapmf(x, a, b, c, d):
-    return np.maximum(np.minimum(np.minimum((x - a) / (b - a), 1), (d - x) / (d - c)), 0)
+    return np.interp(x, [a, b, c, d], [0, 1, 1, 0])
 
 
 def gauss2mf(x, sigma1, c1, sigma2, c2):
@@ -44,9 +44,7 @@ def smf(x, a, b):
 
 
 def zmf(x, a, b):
-    middle = (a + b) / 2
-    pieces = [0 * x + 1, 1 - 2 * ((x - a) / (b - a)) ** 2, 2 * ((x - b) / (b - a)) ** 2]
-    return np.select([x <= a, x <= middle, x <= b], pieces, 0.0)
+    return 1 - smf(x, a, b)
 
 
 def pimf(x, a, b, c, d):

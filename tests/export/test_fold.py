@@ -65,10 +65,6 @@ CASES = [
 ]
 
 
-def fresh(scaler):
-    return clone(SCALERS[scaler], safe=False)
-
-
 def data(n_outputs=1, n_rows=120):
     """Columns of very different units, one of them far from the origin."""
     g = np.random.default_rng(0)
@@ -99,7 +95,7 @@ def assert_same_predictions(estimator, X, full_scale):
 def test_folded_model_predicts_what_the_pipeline_does(kind, scaler, policy, n_outputs):
     X, y = data(n_outputs)
     last = regressor(**KINDS[kind], out_of_bounds=policy)
-    pipe = make_pipeline(fresh(scaler), last).fit(X, y)
+    pipe = make_pipeline(clone(SCALERS[scaler], safe=False), last).fit(X, y)
     assert_same_predictions(pipe, around(X), np.ptp(y, axis=0).max() * 20)
     assert fold(pipe).in_bounds(X).all()
     assert_array_equal(fold(pipe).predict(X).shape, (len(X), n_outputs))

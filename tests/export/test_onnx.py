@@ -42,14 +42,11 @@ def holding(model):
     return estimator
 
 
-def session_of(estimator, X, **options):
-    graph = skl2onnx.to_onnx(estimator, X[:1], **options).SerializeToString()
-    return onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
-
-
 def answers(estimator, X, **options):
     """Outputs of the converted estimator, (n_rows, n_outputs)."""
-    (y,) = session_of(estimator, X, **options).run(None, {"X": X})
+    graph = skl2onnx.to_onnx(estimator, X[:1], **options).SerializeToString()
+    session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+    (y,) = session.run(None, {"X": X})
     assert y.dtype == X.dtype
     return y
 

@@ -59,6 +59,7 @@ def variance_of(values, weight):
     return np.einsum("ijk,i,j,k->", (values - mean) ** 2, weight, weight, weight)
 
 
+# Of conditional means and of blocks of several inputs: test_effects and test_effects_display.
 @ALL
 def test_variances_are_those_of_the_full_product(model):
     X, blocks = rows_of(model, 1.0, 9), [(0,), (1,), (2,)]
@@ -74,33 +75,6 @@ def test_variances_are_those_of_the_full_product(model):
         assert_allclose(found, expected, rtol=0, atol=1e-10 * total)
         others = [variance_of(mean_over(y, v, weight), weight) for v in [(1, 2), (0, 2), (0, 1)]]
         assert_allclose(anova.totals(), total - others, rtol=0, atol=1e-10 * total)
-
-
-@ALL
-def test_conditionals_are_means_over_the_product(model):
-    X, blocks = rows_of(model, 1.0, 9), [(0,), (1,), (2,)]
-    weight, place = np.full(9, 1.0 / 9.0), np.arange(9)
-    for k in range(model.n_outputs):
-        y = on_the_product(model, X)[..., k]
-        anova = ProductAnova(model, k, blocks_of_rows(model, blocks, X))
-        expected = [mean_over(y, v, weight)[place, place, place] - y.mean() for v in SUBSETS]
-        assert_allclose(anova.conditionals(SUBSETS, X), expected, rtol=0, atol=1e-10 * np.ptp(y))
-        assert_allclose(anova.curve((0, 2), X), expected[4], rtol=0, atol=1e-10 * np.ptp(y))
-        found, variance = covariances(anova, SUBSETS, X)
-        centred = expected - np.mean(expected, axis=1, keepdims=True)
-        assert_allclose(found, centred @ expected[-1] / 9, rtol=0, atol=1e-10 * np.var(y))
-        assert_allclose(variance, np.var(expected[-1]), rtol=1e-9)
-
-
-@ALL
-def test_two_inputs_that_go_together_enter_as_one(model):
-    X, blocks = rows_of(model, 1.0, 9), [(0, 2), (1,)]
-    rows = np.stack([np.repeat(X[:, 0], 9), np.tile(X[:, 1], 9), np.repeat(X[:, 2], 9)], axis=1)
-    anova = ProductAnova(model, 0, blocks_of_rows(model, blocks, X))
-    y = replace(model, target=None).predict(rows)[:, 0].reshape(9, 9)
-    expected = [y.mean(axis=1).var(), y.mean(axis=0).var(), y.var()]
-    found = [anova.closed(v) for v in [(0,), (1,), (0, 1)]]
-    assert_allclose(found, expected, rtol=0, atol=1e-10 * y.var())
 
 
 @pytest.mark.parametrize("n_rows", [25, 3000])

@@ -47,24 +47,6 @@ def test_tables_hold_the_measures(model):
     assert_array_equal(found.summary, [measures.alone.max(), ratio])
 
 
-def test_the_numerals_of_the_sentences_are_counted():
-    # "IF time is low AND chip temperature is low AND rate is low THEN y = a + b t + c T + d rate".
-    assert found_of(A_GRID).reading_cost == 12 * (3 + 4)
-    assert found_of(MODELS["grid, order 1, 2 outputs"]).reading_cost == 12 * (3 + 2 * 4)
-    level = A_GRID.coefficients.copy()
-    level[:, 2] = 0.0
-    assert found_of(replace(A_GRID, coefficients=level)).reading_cost == 12 * (3 + 3)
-
-
-def test_what_is_common_counts_once():
-    common = A_GRID.coefficients.copy()
-    common[:, 2] = 3.0 / 15.0
-    common[1:, 1] = 2.0 / 600.0
-    # Twelve of the last slope, two and one of what is common.
-    found = found_of(replace(A_GRID, coefficients=common))
-    assert found.reading_cost == 12 * (3 + 1) + 12 + 2 + 1
-
-
 def test_nothing_is_found_at_the_limits():
     found = found_of(A_GRID, printed_errors=np.array([1.05]))
     assert found.findings == []
@@ -118,10 +100,6 @@ def test_rules_that_go_different_ways_beyond_chance():
     assert not [one for one in unsure.findings if "ways" in one]
 
 
-def target_of(X):
-    return 1e3 + np.sin(X["kelvin"] / 20) + 1e6 * X["rate"] ** 2
-
-
 def assert_same(found, expected, rtol=1e-9):
     # Digits go by powers of ten of the units: what is printed is another model.
     key = "strongest_alone"
@@ -132,7 +110,7 @@ def assert_same(found, expected, rtol=1e-9):
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_estimators_around_the_model_are_measured_in_their_own_units(fitted):
     pipe, X = fitted
-    y = target_of(X)
+    y = 1e3 + np.sin(X["kelvin"] / 20) + 1e6 * X["rate"] ** 2
     found = readability(pipe, X, y)
     assert_same(found, readability(pipe[-1], pipe[:-1].transform(X), y))
     assert found.rules["if"][0] == "kelvin is low AND rate is low"

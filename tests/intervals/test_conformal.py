@@ -24,13 +24,9 @@ from skanfis.intervals._scores import (
 )
 from skanfis.learning import VariableProjection
 
-QUICK = {
-    "n_mfs": 2,
-    "max_iter": 3,
-    "agreement": 0.1,
-    "alpha": 0.01,
-    "solver": VariableProjection(tol=0.1, stiffness=0.1),
-}
+from ..quick import quick
+
+SHORT = {"max_iter": 3, "solver": VariableProjection(tol=0.1)}
 
 
 def bent(rng, n_rows):
@@ -51,7 +47,7 @@ def test_split_is_that_of_crepes():
     rng = np.random.default_rng(0)
     X, y = bent(rng, 200)
     new = bent(rng, 50)[0]
-    fitted = ANFISRegressor(**QUICK).fit(*bent(rng, 100))
+    fitted = quick(**SHORT).fit(*bent(rng, 100))
     mean, std = fitted.predict(X, return_std=True)
     theirs = Crepes().fit(residuals=y - mean, sigmas=std)
     frozen = FrozenEstimator(fitted)
@@ -213,7 +209,7 @@ def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(me
     rng = np.random.default_rng(7)
     X, y = bent(rng, 300)
     y = np.column_stack([y, 100.0 * X[:, 0] + 3.0 * rng.normal(size=300)])
-    regressor = make_pipeline(StandardScaler(), ANFISRegressor(**QUICK))
+    regressor = make_pipeline(StandardScaler(), quick(**SHORT))
     model = ConformalRegressor(regressor, method=method, cv=4).fit(X, y)
     new, truth = bent(rng, 3000)
     lower, upper = model.predict_interval(new, 0.8)
@@ -227,16 +223,14 @@ def test_groups_and_weights_reach_a_regressor_in_a_pipeline(metadata_routing):
     rng = np.random.default_rng(9)
     X, y = bent(rng, 60)
     run, weight = np.arange(60) // 6, rng.integers(0, 3, size=60).astype(float)
-    rules = ANFISRegressor(**QUICK).set_fit_request(sample_weight=True, groups=True)
+    rules = quick(**SHORT).set_fit_request(sample_weight=True, groups=True)
     scaler = StandardScaler().set_fit_request(sample_weight=True)
     given = {"sample_weight": weight, "groups": run}
     model = ConformalRegressor(make_pipeline(scaler, rules), cv=5).fit(X, y, **given)
     folds = list(GroupKFold(5).split(X, y, run))
     for estimator, (train, _) in zip(model.estimators_, folds, strict=True):
         alone = StandardScaler().fit(X[train], sample_weight=weight[train])
-        fitted = ANFISRegressor(**QUICK).fit(
-            alone.transform(X[train]), y[train], weight[train], run[train]
-        )
+        fitted = quick(**SHORT).fit(alone.transform(X[train]), y[train], weight[train], run[train])
         assert_allclose(estimator.predict(X), fitted.predict(alone.transform(X)), rtol=1e-12)
 
 

@@ -1,16 +1,11 @@
-"""Scales against numpy in longer precision; reading, blocks, weights and memory maps."""
+"""Scales against numpy in longer precision; fingerprints of rows."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.blocks import BLOCK_ROWS
-from skanfis.learning.data import (
-    _BLOCKS_PER_CHUNK,
-    StandardisedData,
-    column_statistics,
-    fingerprint,
-)
+from skanfis.learning.data import StandardisedData, column_statistics, fingerprint
 
 # Enough rows for several reads.
 N_ROWS = 2 * BLOCK_ROWS + 17
@@ -69,32 +64,11 @@ def test_sums_that_overflow_on_either_side_are_taken_again():
     assert_allclose(found.scale / largest, np.sqrt(2 * n / (2 * n + 1)), rtol=1e-12)
 
 
-def test_part_of_the_rows_keeps_scales_weights_and_groups(rng):
-    values, weight = table(rng, 40), rng.uniform(0.5, 2.0, 40)
-    whole = StandardisedData.of(values, values[:, :2] ** 2, weight, groups=np.arange(40) // 4)
+def test_part_of_the_rows_keeps_the_scales_of_all(rng):
+    values = table(rng, 40)
+    whole = StandardisedData.of(values, values[:, :2] ** 2)
     some = np.array([31, 2, 7, 7])
-    part = whole.part(some)
-    assert_array_equal(part.table(slice(None)), whole.table(some))
-    assert_array_equal(part.sample_weight, weight[some])
-    assert_array_equal(part.groups, some // 4)
-    plain = StandardisedData.of(values, values).part(some)
-    assert plain.sample_weight is None
-    assert plain.groups is None
-
-
-def test_read_standardises_and_transposes(rng):
-    X, y, weight = table(rng, 100), rng.normal(size=(100, 2)) * 5 + 3, rng.uniform(0.1, 2.0, 100)
-    data = StandardisedData.of(X, y, weight)
-    part = slice(10, 40)
-    Z, target, read_weight = data.read(part)
-    z = (X[part] - data.inputs.offset) / data.inputs.scale
-    t = (y[part] - data.targets.offset) / data.targets.scale
-    assert_array_equal(Z, z.T)
-    assert_array_equal(target, t.T)
-    assert_array_equal(read_weight, weight[part])
-    assert Z.flags.c_contiguous
-    assert_array_equal(data.table(part), np.hstack([z, t]))
-    assert StandardisedData.of(X, y).read(part)[2] is None
+    assert_array_equal(whole.part(some).table(slice(None)), whole.table(some))
 
 
 @pytest.mark.parametrize("n_columns", [1, 4])
@@ -106,14 +80,3 @@ def test_fingerprints_tell_rows_apart_and_know_them_again(rng, n_columns):
     assert_array_equal(numbers, fingerprint(few)[repeated])
     assert np.unique(fingerprint(few)).size == 300
     assert_array_equal(numbers[:7], fingerprint(np.asfortranarray(few[:, repeated[:7]])))
-
-
-@pytest.mark.parametrize("n_rows", [1, 127, 128, 129, 5000])
-@pytest.mark.parametrize("block_rows", [1, 128, 10_000])
-def test_chunks_cover_every_row_once_in_order(n_rows, block_rows):
-    data = StandardisedData.of(np.zeros((n_rows, 1)), np.zeros((n_rows, 1)))
-    chunks = data.chunks(block_rows)
-    parts = [part for chunk in chunks for part in chunk]
-    assert_array_equal(np.concatenate([np.arange(n_rows)[p] for p in parts]), np.arange(n_rows))
-    assert max(p.stop - p.start for p in parts) <= block_rows
-    assert max(map(len, chunks)) <= _BLOCKS_PER_CHUNK

@@ -34,18 +34,23 @@ def rules(rng, n_rules):
     return oracles.random_grid(rng, [Gaussian], [n_rules]) if n_rules > 1 else ONE_RULE
 
 
-def posterior(rows, antecedent, order, penalty, at=FIRST, n_rows=None):
-    """The posterior at the start, from an evaluation at weights of its own."""
-    problem = SeparableProblem(rows, antecedent, order, at)
-    evaluation = problem.evaluate(antecedent.parameters)
+def laplace_at(problem, evaluation, penalty, **premises):
+    """The posterior of the problem's rows, at an evaluation of it."""
     return laplace(
         evaluation.normal,
         problem.common_line,
         evaluation.mean_squared_error,
         penalty,
-        rows.total_weight if n_rows is None else n_rows,
-        antecedent.n_rules,
+        problem.rows.total_weight,
+        problem.antecedent.n_rules,
+        **premises,
     )
+
+
+def posterior(rows, antecedent, order, penalty):
+    """The posterior at the start, from an evaluation at weights of its own."""
+    problem = SeparableProblem(rows, antecedent, order, FIRST)
+    return laplace_at(problem, problem.evaluate(antecedent.parameters), penalty)
 
 
 def n_effective(found):
@@ -195,15 +200,7 @@ def at_fixed_premises(seed):
     evaluation = problem.evaluate(antecedent.parameters)
 
     def at(penalty, **premises):
-        return laplace(
-            evaluation.normal,
-            problem.common_line,
-            evaluation.mean_squared_error,
-            penalty,
-            rows.total_weight,
-            antecedent.n_rules,
-            **premises,
-        )
+        return laplace_at(problem, evaluation, penalty, **premises)
 
     penalty = Penalty(*10.0 ** g.uniform(-6.0, 0.0, 3))
     return at, with_pulls(penalty, problem.common_line, g)
@@ -325,16 +322,8 @@ class OneWidth:
         _, hessian = self.premise.pull_back(x * self.unit, raw.gradient, raw.gauss_newton)
         costs = [problem.evaluate(self.premise.parameters((x + h) * self.unit)).cost for h in STEPS]
         for curvature in (hessian[4, 4], np.diff(costs, 2)[0] / STEPS[-1] ** 2):
-            yield laplace(
-                evaluation.normal,
-                problem.common_line,
-                evaluation.mean_squared_error,
-                penalty,
-                self.rows.total_weight,
-                self.antecedent.n_rules,
-                np.array([x]),
-                np.array([curvature]),
-            )
+            premises = {"displacement": np.array([x]), "curvature": np.array([curvature])}
+            yield laplace_at(problem, evaluation, penalty, **premises)
 
     def by_quadrature(self, penalty, variance):
         """The integral over the displacement of what is left of the consequents'."""

@@ -38,6 +38,8 @@ class TestJointGradient:
         residual = case.dense.y - case.dense.design(case.point) @ coefficients
         error = np.sum(case.dense.weight[:, None] * residual**2)
         assert_allclose(joint.evaluation.mean_squared_error, error, rtol=1e-11)
+        firing = oracles.strengths(case.problem.antecedent, case.point, case.dense.Z)
+        assert_allclose(joint.evaluation.masses, firing @ case.dense.weight, rtol=1e-10, atol=1e-14)
         assert joint.evaluation.coefficients is coefficients
         assert_array_equal(joint.evaluation.antecedent.parameters, case.point)
 
@@ -48,28 +50,12 @@ class TestJointGradient:
         expected = oracles.complex_step(lambda p: case.dense.cost_at(p, coefficients), case.point)
         assert_allclose(found, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
-    def test_at_solved_coefficients_it_is_the_reduced_gradient(self, case):
-        evaluation, linearisation = case.at_point()
-        joint = case.problem.joint(case.point, evaluation.coefficients)
-        size = np.abs(linearisation.gradient).max()
-        assert_allclose(joint.premises, linearisation.gradient, rtol=0, atol=1e-10 * size)
-        assert_allclose(joint.coefficients, 0.0, atol=1e-10)
-        assert_allclose(joint.evaluation.cost, evaluation.cost, rtol=1e-10)
-        assert_allclose(joint.evaluation.masses, evaluation.masses, rtol=1e-10, atol=1e-14)
-
-
-AGREEING = Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
-
-
-def problem_of(kind="grid", seed=0, penalty=AGREEING, order=1):
-    rows, premise, *_ = planted(kind, seed, displaced=0.5, noise=0.1)
-    return SeparableProblem(rows, premise.antecedent, order, penalty), premise
-
 
 def test_step_is_along_the_gradient_by_natural_premises_and_consequents():
-    problem, premise = problem_of("bells")
-    rows, antecedent = problem.rows, premise.antecedent
-    dense = oracles.DenseProblem(rows, antecedent, 1, problem.penalty)
+    rows, premise, *_ = planted("bells", 0, displaced=0.5, noise=0.1)
+    antecedent, penalty = premise.antecedent, Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
     (group,) = antecedent.groups
     solved = problem.evaluate(antecedent.parameters).coefficients
     numbers = group.family.natural(group.theta)

@@ -6,7 +6,7 @@ dense cost, with beta eliminated inside it: nothing is left out of the derivativ
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
 from skanfis.learning import data as rows
@@ -118,12 +118,6 @@ def arrays(evaluation, linearisation):
     ]
 
 
-def many_small_chunks(monkeypatch):
-    monkeypatch.setattr(objective, "_FEWEST_ROWS", 8)
-    monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
-    monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
-
-
 def test_evaluation_is_that_of_the_dense_ridge_regression(case):
     found, dense = case.problem.evaluate(case.point), case.dense
     assert_allclose(found.cost, dense.cost(case.point), rtol=1e-11)
@@ -163,7 +157,9 @@ def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
 @pytest.mark.theory
 def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
     whole = arrays(*case.at_point())
-    many_small_chunks(monkeypatch)
+    monkeypatch.setattr(objective, "_FEWEST_ROWS", 8)
+    monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
+    monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
     split = Case(
         case.problem.antecedent,
         case.order,
@@ -218,17 +214,6 @@ def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
     least = np.mean(residual**2)
     assert_allclose(seeing.mean_squared_error, least, rtol=0.02)
     assert abs(blind.mean_squared_error - least) > 0.1 * least
-
-
-def test_residuals_are_those_of_the_dense_design(case):
-    evaluation = case.problem.evaluate(case.point)
-    expected = case.dense.y - case.dense.design(case.point) @ evaluation.coefficients
-    found = np.empty_like(expected)
-    for part, residual, weight in case.problem.residuals(evaluation):
-        found[part] = residual.T
-        if weight is not None:
-            assert_array_equal(weight, case.rows.sample_weight[part])
-    assert_allclose(found, expected, atol=1e-10)
 
 
 @pytest.mark.parametrize("name", ["grid of both", "scattered bells", "grid, order 0, outputs"])

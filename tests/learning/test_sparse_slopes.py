@@ -12,10 +12,11 @@ from sklearn.exceptions import ConvergenceWarning
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, TreeAntecedent
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.evidence import laplace
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.sparse_slopes import _given, _loss, sparse_slopes
+
+from .test_evidence import laplace_at
 
 pytestmark = pytest.mark.theory
 
@@ -42,15 +43,7 @@ def posterior_of(X, y, antecedent=TREE, penalty=PENALTY):
     rows = StandardisedData.of(X, y.reshape(len(X), -1))
     problem = SeparableProblem(rows, antecedent, 1, penalty)
     evaluation = problem.evaluate(antecedent.parameters)
-    posterior = laplace(
-        evaluation.normal,
-        problem.common_line,
-        evaluation.mean_squared_error,
-        penalty,
-        float(len(X)),
-        antecedent.n_rules,
-    )
-    return problem, evaluation, posterior
+    return problem, evaluation, laplace_at(problem, evaluation, penalty)
 
 
 @pytest.mark.parametrize("n_outputs", [1, 2])

@@ -81,40 +81,35 @@ def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
     assert_allclose(centers[0][order[0]], np.array(expected)[order[1]])
 
 
-class TestTermScores:
-    @pytest.mark.parametrize("count", [2, 3])
-    @pytest.mark.parametrize("n_outputs", [1, 2])
-    def test_they_are_the_formula_term_by_term(self, rng, count, n_outputs):
-        X = rng.uniform(-1.0, 1.0, (150, 4))
-        y = (
-            np.sin(3.0 * X[:, [0]])
-            + X[:, [2]] * X[:, [3]]
-            + 0.3 * rng.normal(size=(150, n_outputs))
-        )
-        # Weights that go with the inputs: the mean of a share is far from its plain mean.
-        rows = sample_of(X, y, np.ceil(np.exp(X.sum(axis=1))))
-        tuned, spacing = line_through(rows), Spacing(rows)
-        s, basis = rows.sample_weight, np.column_stack([np.ones(len(rows.X)), rows.X])
-        residual = rows.y - basis @ tuned.evaluation.coefficients
-        expected = []
-        for j in range(4):
-            centers = spacing.centers(j, count)
-            # Of neighbours that cross at 0.6 where they are equally far apart.
-            width = 0.5 * np.mean(np.diff(centers)) / np.sqrt(-2.0 * np.log(0.6))
-            mu = np.exp(-0.5 * ((rows.X[:, [j]] - centers) / width) ** 2)
-            share = mu / mu.sum(axis=1, keepdims=True)
-            share -= np.average(share, axis=0, weights=s)
-            total = 0.0
-            for k, b, o in np.ndindex(count, 5, n_outputs):
-                r = residual[:, o] - np.average(residual[:, o], weights=s)
-                function = share[:, k] * basis[:, b]
-                square = (s @ (function * r)) ** 2 / (s @ function**2)
-                total += square / np.average(r**2, weights=s)
-            n_free = (count - 1) * 5 * n_outputs
-            expected.append((total * (count - 1) / count - n_free) / np.sqrt(2 * n_free))
-        every = np.arange(4)
-        assert_allclose(term_scores(tuned, every, [count] * 4, spacing), expected, rtol=1e-6)
-        # A column that never changes has no part in it.
-        wide = sample_of(np.column_stack([X, np.ones(150)]), y, np.ceil(np.exp(X.sum(axis=1))))
-        found = term_scores(line_through(wide), every, [count] * 4, Spacing(wide))
-        assert_allclose(found, expected, rtol=1e-6)
+@pytest.mark.parametrize("count", [2, 3])
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_term_scores_are_the_formula_term_by_term(rng, count, n_outputs):
+    X = rng.uniform(-1.0, 1.0, (150, 4))
+    y = np.sin(3.0 * X[:, [0]]) + X[:, [2]] * X[:, [3]] + 0.3 * rng.normal(size=(150, n_outputs))
+    # Weights that go with the inputs: the mean of a share is far from its plain mean.
+    rows = sample_of(X, y, np.ceil(np.exp(X.sum(axis=1))))
+    tuned, spacing = line_through(rows), Spacing(rows)
+    s, basis = rows.sample_weight, np.column_stack([np.ones(len(rows.X)), rows.X])
+    residual = rows.y - basis @ tuned.evaluation.coefficients
+    expected = []
+    for j in range(4):
+        centers = spacing.centers(j, count)
+        # Of neighbours that cross at 0.6 where they are equally far apart.
+        width = 0.5 * np.mean(np.diff(centers)) / np.sqrt(-2.0 * np.log(0.6))
+        mu = np.exp(-0.5 * ((rows.X[:, [j]] - centers) / width) ** 2)
+        share = mu / mu.sum(axis=1, keepdims=True)
+        share -= np.average(share, axis=0, weights=s)
+        total = 0.0
+        for k, b, o in np.ndindex(count, 5, n_outputs):
+            r = residual[:, o] - np.average(residual[:, o], weights=s)
+            function = share[:, k] * basis[:, b]
+            square = (s @ (function * r)) ** 2 / (s @ function**2)
+            total += square / np.average(r**2, weights=s)
+        n_free = (count - 1) * 5 * n_outputs
+        expected.append((total * (count - 1) / count - n_free) / np.sqrt(2 * n_free))
+    every = np.arange(4)
+    assert_allclose(term_scores(tuned, every, [count] * 4, spacing), expected, rtol=1e-6)
+    # A column that never changes has no part in it.
+    wide = sample_of(np.column_stack([X, np.ones(150)]), y, np.ceil(np.exp(X.sum(axis=1))))
+    found = term_scores(line_through(wide), every, [count] * 4, Spacing(wide))
+    assert_allclose(found, expected, rtol=1e-6)

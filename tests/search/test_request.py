@@ -137,18 +137,13 @@ class TestImported:
             ANFISRegressor(n_mfs=3, partition=known).fit(*data)
 
 
-def friedman(n_rows):
-    X, y = make_friedman1(n_rows, n_features=5, noise=1.0, random_state=0)
-    return X, y
-
-
 @pytest.mark.theory
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
     "partition", ["scattered", SubtractiveClustering(0.8), FuzzyCMeans(3, random_state=0)]
 )
 def test_clusterings_find_rules_that_generalise(partition):
-    X, y = friedman(1000)
+    X, y = make_friedman1(1000, n_features=5, noise=1.0, random_state=0)
     model = ANFISRegressor(partition=partition).fit(X[:300], y[:300])
     assert model.n_rules_ > 1
     assert {one["kind"] for one in model.structures_} <= {"one rule", "scattered"}

@@ -23,11 +23,6 @@ def inputs(rng, n_rows=400, n_inputs=3):
     return rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
 
 
-def terms_per_input(model, n_inputs=3):
-    names = [term["input"] for term in model.memberships_]
-    return [max(names.count(f"x{j}"), 1) for j in range(n_inputs)]
-
-
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_linear_truth_gets_next_to_a_linear_model(rng):
     # A criterion by error lets a rule more pass where it does no harm; the plane stays a plane.
@@ -57,15 +52,6 @@ def test_of_a_plane_in_as_many_inputs_as_rows_no_term_is_learnt(seed):
     X = rng.standard_normal((60, 50))
     y = X[:, :3].sum(axis=1) + 1.7 * rng.standard_normal(60)
     assert ANFISRegressor().fit(X, y).n_rules_ == 1
-
-
-@pytest.mark.parametrize("which", [0, 2])
-def test_only_the_input_that_bends_the_surface_gets_terms(which, rng):
-    X = inputs(rng)
-    y = np.tanh(4.0 * X[:, which]) + X @ [0.3, 0.2, -0.4] + 0.05 * rng.standard_normal(400)
-    counts = terms_per_input(ANFISRegressor(partition="grid").fit(X, y))
-    assert counts[which] > 1
-    assert all(count == 1 for j, count in enumerate(counts) if j != which)
 
 
 def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
@@ -114,12 +100,11 @@ def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
     assert_allclose(errors[0], errors[1], rtol=0.05)
 
 
-def test_of_many_inputs_those_that_matter_are_found(rng):
+def test_of_many_inputs_only_those_that_bend_the_surface_get_terms(rng):
     X = inputs(rng, 300, 12)
-    y = np.sin(3.0 * X[:, 7]) + np.abs(X[:, 2]) + 0.05 * rng.standard_normal(300)
-    model = ANFISRegressor(partition="grid").fit(X, y)
-    counts = terms_per_input(model, 12)
-    assert [j for j, count in enumerate(counts) if count > 1] == [2, 7]
+    y = np.sin(3.0 * X[:, 7]) + np.abs(X[:, 2]) + X[:, [0, 7, 11]] @ [0.3, 0.2, -0.4]
+    model = ANFISRegressor(partition="grid").fit(X, y + 0.05 * rng.standard_normal(300))
+    assert {term["input"] for term in model.memberships_} == {"x2", "x7"}
 
 
 DRAWS = {

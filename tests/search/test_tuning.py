@@ -14,14 +14,29 @@ from skanfis.membership import Gaussian
 from skanfis.search import Spacing, grid_antecedent, tuning
 
 
+def problem_of(X, y, count):
+    """A problem with so many terms on every input, and its premise."""
+    rows, n_inputs = StandardisedData.of(X, y), X.shape[1]
+    antecedent = grid_antecedent(n_inputs * [Gaussian], n_inputs * [count], Spacing(rows), 0.6)
+    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    return problem, Premise.of(antecedent, *rows.inputs.box)
+
+
+def two_rules_of_a_sine(rng, noise):
+    x = rng.uniform(-1.0, 1.0, (100, 1))
+    return problem_of(x, np.sin(3.0 * x) + noise * rng.normal(size=(100, 1)), 2)
+
+
+@pytest.fixture
+def two_rules(rng):
+    return two_rules_of_a_sine(rng, 0.1)
+
+
 @pytest.mark.theory
 def test_weights_arrive_where_there_are_more_columns_than_rows(rng):
     """Of noise on 150 inputs, nothing is learnt from 100 rows."""
     X, y = rng.normal(size=(100, 150)), rng.normal(size=(100, 1))
-    rows = StandardisedData.of(X, y)
-    antecedent = grid_antecedent(150 * [Gaussian], 150 * [1], Spacing(rows), 0.6)
-    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
-    premise = Premise.of(antecedent, *rows.inputs.box)
+    problem, premise = problem_of(X, y, 1)
     found = tuning.tune(problem, premise, FREE, 100.0)
     scanned = [
         tuning.tune(
@@ -72,11 +87,7 @@ def with_agreement(tuned, agreement):
 class TestAgreement:
     @pytest.mark.parametrize("left", [1.05, 1.2, 2.0])
     def test_it_is_raised_as_far_as_the_error_allows(self, left, rng):
-        x = rng.uniform(-1.0, 1.0, (100, 1))
-        rows = StandardisedData.of(x, np.sin(3.0 * x) + 0.3 * rng.normal(size=(100, 1)))
-        antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
-        problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
-        premise = Premise.of(antecedent, *rows.inputs.box)
+        problem, premise = two_rules_of_a_sine(rng, 0.3)
         apart = tuning.tune(problem, premise, FREE, 100.0)
         found = tuning.with_most_agreement(apart, premise, FREE, 100.0, left)
         assert found.agreement_is_raised

@@ -11,8 +11,10 @@ from sklearn.base import clone
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
 from skanfis.exceptions import ForgottenRowsWarning
-from skanfis.learning import VariableProjection
 
+from ..quick import quick
+
+GIVEN = {"agreement": 1e-3, "alpha": 1e-4}
 # Of standard deviations of the target.
 EXACT = 1e-10
 CHUNKINGS = {
@@ -42,9 +44,7 @@ def surface(n_rows=300, n_outputs=1, seed=0):
 @pytest.fixture(scope="module")
 def premises():
     """A model that has seen other rows."""
-    return ANFISRegressor(
-        n_mfs=[3, 2], agreement=1e-3, alpha=1e-4, solver=VariableProjection(stiffness=0.1)
-    ).fit(*surface(seed=1))
+    return quick([3, 2], **GIVEN).fit(*surface(seed=1))
 
 
 def in_chunks(model, X, y, sizes, weight=None, **options):
@@ -136,19 +136,13 @@ def test_drift_of_inputs_costs_no_digits(premises):
 
 def test_first_call_is_a_fit_and_premises_stay():
     X, y = surface(600)
-    settings = {
-        "n_mfs": [3, 2],
-        "agreement": 1e-3,
-        "alpha": 1e-4,
-        "solver": VariableProjection(stiffness=0.1),
-    }
-    fitted = ANFISRegressor(**settings).fit(X[:200], y[:200])
-    model = ANFISRegressor(**settings).partial_fit(X[:200], y[:200])
+    fitted = quick([3, 2], **GIVEN).fit(X[:200], y[:200])
+    model = quick([3, 2], **GIVEN).partial_fit(X[:200], y[:200])
     assert np.array_equal(model.predict(X[:200]), fitted.predict(X[:200]))
     assert model.n_samples_seen_ == 200
     model.partial_fit(X[200:], y[200:])
     assert model.memberships_ == fitted.memberships_
-    held = chunk(fitted, agreement=1e-3, alpha=1e-4).partial_fit(X, y)
+    held = chunk(fitted, **GIVEN).partial_fit(X, y)
     assert difference(model, held, X) < EXACT
     # And what fit says afterwards is of its own rows.
     model.fit(X[:200], y[:200])
@@ -160,7 +154,7 @@ def test_after_fit_premises_stay_and_rows_are_new(premises):
     model = deepcopy(premises)
     with pytest.warns(ForgottenRowsWarning, match="no sums over its 300 rows"):
         model.partial_fit(X, y)
-    held = chunk(premises, agreement=1e-3, alpha=1e-4).partial_fit(X, y)
+    held = chunk(premises, **GIVEN).partial_fit(X, y)
     assert difference(model, held, X) < EXACT
     assert model.n_samples_seen_ == 300
 

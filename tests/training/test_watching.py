@@ -152,16 +152,15 @@ def interrupt_after(monkeypatch, n_iter):
     monkeypatch.setattr(watching.Printer, "__call__", interrupt)
 
 
-class TestInterrupt:
-    def test_estimator_is_as_before(self, monkeypatch):
-        model = quick(verbose=True).fit(X, Y)
-        before = model.predict(X)
-        interrupt_after(monkeypatch, 1)
-        with pytest.raises(KeyboardInterrupt):
-            model.set_params(n_mfs=3).fit(X, Y)
-        assert_array_equal(model.predict(X), before)
-        with pytest.raises(KeyboardInterrupt):
-            quick(n_mfs=3, verbose=True).fit(X, Y)
+def test_an_estimator_that_is_interrupted_is_as_before(monkeypatch):
+    model = quick(verbose=True).fit(X, Y)
+    before = model.predict(X)
+    interrupt_after(monkeypatch, 1)
+    with pytest.raises(KeyboardInterrupt):
+        model.set_params(n_mfs=3).fit(X, Y)
+    assert_array_equal(model.predict(X), before)
+    with pytest.raises(KeyboardInterrupt):
+        quick(n_mfs=3, verbose=True).fit(X, Y)
 
 
 @needs_callbacks
