@@ -225,12 +225,12 @@ def monotonicity(
     for k in range(model.n_outputs):
         for sign in (1, -1):
             own = sign * (np.arange(model.n_inputs) == j)
-            if is_promised and is_in_order(model, k, own):
-                signs[k] = sign
-                break
-            slope = partial(Enclosure(model, k, -float(sign)).slope, j=j)
-            found = largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0)
-            if found.bound <= 0.0:
+            is_proven = is_promised and is_in_order(model, k, own)
+            if not is_proven:
+                slope = partial(Enclosure(model, k, -float(sign)).slope, j=j)
+                found = largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0)
+                is_proven = found.bound <= 0.0
+            if is_proven:
                 signs[k] = sign
                 break
     return signs
@@ -289,7 +289,7 @@ def _checked(model, box, tol, max_boxes):
 
 def read_box(box, model: TSKModel):
     """The box as an array (n_inputs, 2); what is not given is the range of the training data."""
-    found = np.stack([model.minimum, model.maximum], axis=1)
+    found = cuts_of(model)
     if box is None:
         return found
     names = ", ".join(map(repr, model.input_names))

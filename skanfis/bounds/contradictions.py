@@ -58,9 +58,7 @@ def _speaks_against(one, free, X):
         after = before.copy()
         before[:, one.input], after[:, one.input] = low, high
         falls = -one.sign * (free.predict(after) - free.predict(before)).mean(axis=0)[one.output]
-        if (
-            falls
-            > _CERTAIN * free.posterior.of_mean(free, after.T.copy(), before.T.copy())[one.output]
-        ):
+        deviation = free.posterior.of_mean(free, after.T.copy(), before.T.copy())[one.output]
+        if falls > _CERTAIN * deviation:
             return True
     return False

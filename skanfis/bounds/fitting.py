@@ -258,11 +258,8 @@ class _ConstrainedFit:
 
         Points are the worst of a sample, then those at which branch and bound finds a violation.
         """
-        normal, model, columns = (
-            ordered.free.normal,
-            self.model,
-            self._columns(ordered.free.antecedent),
-        )
+        model, normal = self.model, ordered.free.normal
+        columns = self._columns(ordered.free.antecedent)
         equal, equal_to = self._fixed(columns)
         sample = spread_points(model.minimum, model.maximum, _SAMPLE, _CORNERS)
         local = normal.coefficients.copy()
