@@ -31,8 +31,8 @@ class Judged:
     candidate : Candidate
     in_folds : list of Candidate
         Its like in every fold.
-    squares : ndarray of shape (n_judged,)
-        Squared errors, summed over outputs.
+    squares, free_squares : ndarray of shape (n_judged,)
+        Squared errors, summed over outputs, and what they were if nothing had to rise or fall.
     squared_error : float
         Expected of new rows, once trained on all rows.
     cost : int
@@ -44,6 +44,7 @@ class Judged:
     candidate: Candidate
     in_folds: list[Candidate]
     squares: np.ndarray
+    free_squares: np.ndarray
     squared_error: float
     cost: int
     squared_error_of_rules: float
@@ -71,8 +72,12 @@ class Judges:
         return float(np.average(squares, weights=self.weight))
 
     def prefer(self, candidate: Judged, than: Judged) -> bool:
-        """Whether a larger candidate leaves less, by more than one standard error, or rounding."""
-        gain = than.squares - candidate.squares
+        """Whether a larger candidate leaves less."""
+        return self.are_less(candidate.squares, than.squares)
+
+    def are_less(self, squares, than) -> bool:
+        """Whether squared errors are, by more than one standard error, or rounding."""
+        gain = than - squares
         mean = self.mean(gain)
         excess = np.bincount(self.group, self.weight * (gain - mean))
         error = np.sqrt(np.sum(excess**2)) / np.sum(self.weight)

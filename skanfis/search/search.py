@@ -63,8 +63,12 @@ class StructureSearch:
         return started(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
 
     def _grow(self, kind, one_rule):
-        """Judge a kind from small to large, some steps further than the best."""
-        best, n_further = one_rule, 0
+        """Judge a kind from small to large, some steps further than the best.
+
+        Where outputs must rise or fall, a kind goes on while its rules gain either as they must or
+        as they would: what is held in order may gain a step later.
+        """
+        best, best_free, n_further = one_rule, one_rule, 0
         candidate, in_folds = self.trials.one_rule, [self.trials.one_rule] * len(self.folds)
         while n_further < _FURTHER:
             larger = self.trials.larger(kind, candidate)
@@ -80,6 +84,8 @@ class StructureSearch:
             n_further += 1
             if self.judges.prefer(now, best):
                 best, n_further = now, 0
+            if self.judges.are_less(now.free_squares, best_free.free_squares):
+                best_free, n_further = now, 0
 
     def _judge_sparse_slopes(self, one, variance):
         """Judge a candidate with fewer slopes; it counts if there are, and its rules hold alone."""
@@ -91,20 +97,26 @@ class StructureSearch:
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""
-        squares = np.concatenate(
-            [
-                fold.squared_errors(fold.tuned(one), rest)
-                for fold, one, rest in zip(self.folds, in_folds, self.rest, strict=True)
-            ]
-        )
-        factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
-        squares *= factor
+        held = self.plan.held
+        free_squares = squares = self._squares(in_folds, None)
+        if held is not None:
+            squares = self._squares(in_folds, held)
         error = self.judges.mean(squares)
         tuned = self.trials.tuned(candidate)
         of_rules = error + tuned.disagreement
-        judged = Judged(candidate, in_folds, squares, error, cost_of(tuned), of_rules)
+        cost = cost_of(tuned)
+        judged = Judged(candidate, in_folds, squares, free_squares, error, cost, of_rules)
         self.judged.append(judged)
         return judged
+
+    def _squares(self, in_folds, held):
+        """Squared errors on the rows that judge, as of a training on all rows."""
+        squares = [
+            fold.squared_errors(fold.tuned(one), rest, held)
+            for fold, one, rest in zip(self.folds, in_folds, self.rest, strict=True)
+        ]
+        factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
+        return factor * np.concatenate(squares)
 
     def _variance(self):
         """Squared error of the mean on the rows that judge."""

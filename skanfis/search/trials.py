@@ -208,15 +208,12 @@ class Trials:
         weight = effective_weight(rows)
         return tune(problem, premise, plan.free, weight, turns, first_steps, begun=begun)
 
-    def _answering(self, tuned):
-        """The premises and consequents that new rows are predicted with."""
-        if self.plan.held is None:
-            return tuned.evaluation.antecedent, tuned.solved.coefficients
-        return self.plan.held(tuned.problem, tuned.solved)
-
-    def squared_errors(self, tuned: Tuned, rows: StandardisedData):
+    def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
         """Of rows that were not trained on, as predict answers; summed over outputs."""
-        seen, (antecedent, coefficients) = tuned.problem.rows, self._answering(tuned)
+        seen = tuned.problem.rows
+        antecedent, coefficients = tuned.evaluation.antecedent, tuned.solved.coefficients
+        if held is not None:
+            antecedent, coefficients = held(tuned.problem, tuned.solved)
         n_inputs, low, high = seen.X.shape[1], seen.y.min(axis=0), seen.y.max(axis=0)
         model = TSKModel(
             antecedent=antecedent,

@@ -12,7 +12,7 @@ from skanfis.search.choice import Judged, Judges, best_of, chosen, tolerated, wi
 
 def judged(squares, cost=1, n_rules=1):
     squares = np.asarray(squares, dtype=float)
-    return Judged(Candidate((n_rules,)), [], squares, squares.mean(), cost, 0.0)
+    return Judged(Candidate((n_rules,)), [], squares, squares, squares.mean(), cost, 0.0)
 
 
 def alike(n_rows, group=None):

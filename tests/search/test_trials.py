@@ -50,7 +50,7 @@ def test_squared_errors_of_one_rule_are_those_of_a_public_fit(rng):
     for k in range(5):
         fold, left = rows.part(band != k), rows.part(band == k)
         trials = Trials(fold, plan_of(3, 90.0, free=[], first=NOTHING))
-        found = trials.squared_errors(trials.tuned(trials.one_rule), left)
+        found = trials.squared_errors(trials.tuned(trials.one_rule), left, None)
         model = ANFISRegressor(n_mfs=1, agreement=0.0, alpha=0.0).fit(fold.X, fold.y[:, 0])
         assert_allclose(found, (model.predict(left.X) - left.y[:, 0]) ** 2, rtol=1e-5, atol=1e-9)
         n_beyond += np.count_nonzero(~model.in_bounds(left.X))
@@ -87,7 +87,7 @@ def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order)
     answers = answer(0.0) + oracles.complex_step(lambda t: answer(t[0]), np.zeros(1))[..., 0]
     answers = np.clip(answers, fold.y.min(axis=0) - 0.5, fold.y.max(axis=0) + 0.5)
     expected = ((answers - rest.y) ** 2).sum(axis=1)
-    assert_allclose(trials.squared_errors(tuned, rest), expected, rtol=1e-4, atol=1e-6)
+    assert_allclose(trials.squared_errors(tuned, rest, None), expected, rtol=1e-4, atol=1e-6)
     assert way.any()
 
 
