@@ -297,3 +297,21 @@ def test_what_the_rules_cannot_keep_is_named(rng):
     with pytest.warns(ConstraintWarning, match="The data contradict the limit 5 of 'y'"):
         constant = ANFISRegressor(n_mfs=1, order=0, **known).fit(X, y)
     assert_allclose(constant.predict(X), 5.0, atol=2e-3 * y.std())
+
+
+def test_a_kind_goes_on_while_its_free_rules_gain():
+    # A bias of temperature and a wave of the rate: terms on both, before either pays in order.
+    rng = np.random.default_rng(0)
+    X, fresh = rng.uniform(size=(200, 2)), rng.uniform(0.02, 0.98, (2000, 2))
+
+    def truth(X):
+        rate, temperature = 2.0 * X.T - 1.0
+        bias = 0.3 * np.sin(3.0 * temperature) + 0.1 * np.sin(6.0 * rate)
+        return rate * (1.0 + 0.1 * temperature) + bias
+
+    noise = 0.2 * truth(fresh).std()
+    y = truth(X) + noise * rng.standard_normal(200)
+    y_fresh = truth(fresh) + noise * rng.standard_normal(2000)
+    free, told = (ANFISRegressor(monotonic_cst=s).fit(X, y) for s in (None, [1, 0]))
+    errors = [np.mean((model.predict(fresh) - y_fresh) ** 2) for model in (free, told)]
+    assert errors[1] < errors[0]
