@@ -372,3 +372,20 @@ def test_of_columns_that_are_equal_their_order_says_nothing(partition):
         clone(plain).fit(columns, y).predict(columns) for columns in (twice, twice[:, ::-1].copy())
     ]
     assert_allclose(found[1], found[0], atol=1e-5 * y.std())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_share_of_an_outer_term_rises_to_the_end_of_the_axis(seed):
+    """ "High" is a shoulder in what it decides, if not in its own membership."""
+    rng = np.random.default_rng(seed)
+    X = np.column_stack([rng.lognormal(size=400), rng.standard_normal((400, 2))])
+    y = np.log(X[:, 0]) * np.tanh(2.0 * X[:, 1]) + 0.5 * X[:, 2] ** 2
+    model = ANFISRegressor(partition="grid").fit(X, y + 0.1 * rng.standard_normal(400)).model_
+    along = np.linspace(model.minimum, model.maximum, 200).T
+    shares, antecedent = model.antecedent.strengths_and_shares(along)[1], model.antecedent
+    assert antecedent.n_terms >= 4
+    for j in np.unique(antecedent.term_inputs):
+        own = np.flatnonzero(antecedent.term_inputs == j)
+        low, *_, high = own[np.argsort(antecedent.term_places[own])]
+        assert (np.diff(shares[low]) < 1e-3).all()
+        assert (np.diff(shares[high]) > -1e-3).all()
