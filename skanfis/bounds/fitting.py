@@ -244,11 +244,14 @@ class _ConstrainedFit:
         if not all(is_known(group.family) for group in ordered.free.antecedent.groups):
             return local, drawn
         near = self._nearest_at_points(ordered)
-        # First all of the way, then halves of what is left.
-        for step in (1.0, *(0.5 ** np.arange(1, 1 + _HALVINGS))):
+        halves = 0.5 ** np.arange(1, 1 + _HALVINGS)
+        # First all of the way, then next to none of it, and only then halves of what is left.
+        for step in (1.0, halves[-1], *halves[:-1]):
             now = near + (drawn - step) * (ordered.local - near)
             if self._is_proven(self._model(ordered, now)):
                 local, drawn = now, float(drawn - step)
+            elif step == halves[-1]:
+                break
             if drawn == 0.0:
                 break
         return local, drawn
