@@ -32,13 +32,11 @@ import numpy as np
 
 from .._sklearn import Interval, StrOptions
 from .objective import Evaluation, JointGradient
-from .solver import Solver, SolverResult, lse
+from .solver import LeastSquares, Solver, SolverResult
 
 _RISE, _FALL = 1.0, -1.0
 # His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
-_GROWTH, _SHRINKAGE = 1.1, 0.9
-_GROW_AFTER = [_FALL, _FALL, _FALL, _FALL]
-_SHRINK_AFTER = [_RISE, _FALL, _RISE, _FALL]
+_CHANGES = [([_FALL, _FALL, _FALL, _FALL], 1.1), ([_RISE, _FALL, _RISE, _FALL], 0.9)]
 # Gradients below this part of tol times the cost are zero, as in ``varpro``.
 _GRADIENT_FACTOR = 1e-2
 
@@ -49,22 +47,17 @@ class StepSize:
     def __init__(self, size, error):
         self.size = size
         self._error = error
-        self._course: deque[float] = deque(maxlen=len(_GROW_AFTER))
-        self._since_growth = self._since_shrinkage = 0
+        # One course for each: neither counts a change again that has once changed the length.
+        self._courses = [deque(maxlen=len(course)) for course, _ in _CHANGES]
 
     def follow(self, error):
         """Take the next error into account."""
-        self._course.append(float(np.sign(error - self._error)))
-        self._error = error
-        self._since_growth += 1
-        self._since_shrinkage += 1
-        course = list(self._course)
-        if course == _SHRINK_AFTER and self._since_shrinkage >= len(course):
-            self.size *= _SHRINKAGE
-            self._since_shrinkage = 0
-        elif course == _GROW_AFTER and self._since_growth >= len(course):
-            self.size *= _GROWTH
-            self._since_growth = 0
+        change, self._error = np.sign(error - self._error), error
+        for seen, (course, factor) in zip(self._courses, _CHANGES, strict=True):
+            seen.append(change)
+            if list(seen) == course:
+                self.size *= factor
+                seen.clear()
 
 
 class NaturalPremise:
@@ -161,7 +154,7 @@ class _Descent(Solver):
         self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
     ) -> SolverResult:
         if not premise.size:
-            return lse(problem, premise, on_iteration=on_iteration)
+            return LeastSquares().solve(problem, premise, max_iter=1, on_iteration=on_iteration)
         natural = NaturalPremise(premise)
         x = np.zeros(premise.size) if start is None else start
         first = problem.evaluate(premise.parameters(x)).coefficients

@@ -159,13 +159,9 @@ class OrderedTerms:
     def _start(self):
         return self._reach(np.exp(self.log_gaps))
 
-    def widening(self, displacement, gaps):
+    def widening(self, gaps):
         """What the logarithms of the widths change by, beside their displacements."""
         return (self._reach(gaps) - self._start)[self.terms]
-
-    def from_widths(self, change, gaps):
-        """The displacements at which the logarithms of the widths have changed by so much."""
-        return change - (self._reach(gaps) - self._start)[self.terms]
 
     def jacobian(self, displacement):
         """Derivatives of locations and log widths by the locations' displacements."""

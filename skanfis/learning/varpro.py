@@ -75,25 +75,6 @@ def trust_region_step(gradient, hessian, radius, damping=0.0):
     return -vectors @ step
 
 
-class _ReducedCost:
-    """F(x) + stiffness/2 |x|^2 over displacements."""
-
-    def __init__(self, problem, premise, stiffness):
-        self.problem, self.premise, self.stiffness = problem, premise, stiffness
-
-    def evaluate(self, x, reference=None):
-        evaluation = self.problem.evaluate(self.premise.parameters(x), reference)
-        return evaluation, self.of(x, evaluation)
-
-    def of(self, x, evaluation):
-        return evaluation.cost + 0.5 * self.stiffness * (x @ x)
-
-    def linearise(self, x, evaluation):
-        raw = self.problem.linearise(evaluation)
-        gradient, curvature = self.premise.pull_back(x, raw.gradient, raw.gauss_newton)
-        return gradient + self.stiffness * x, curvature
-
-
 def _free(x, gradient, premise):
     """Displacements that a descent may move without leaving the box."""
     stuck_low = (x <= premise.lower) & (gradient > 0.0)
@@ -149,16 +130,17 @@ def varpro(
     -------
     SolverResult
     """
-    cost_of = _ReducedCost(problem, premise, stiffness)
     x = np.zeros(premise.size) if start is None else start
     current = problem.evaluate(premise.parameters(x)) if evaluation is None else evaluation
-    cost = cost_of.of(x, current)
+    cost = current.cost + 0.5 * stiffness * (x @ x)
     loss_curve = [current.mean_squared_error]
     status = "max_iter" if premise.size else "no_premise"
     radius, settled, n_iter = _FIRST_RADIUS, 0, 0
     curvature = None
     while premise.size and n_iter < max_iter:
-        gradient, curvature = cost_of.linearise(x, current)
+        raw = problem.linearise(current)
+        gradient, curvature = premise.pull_back(x, raw.gradient, raw.gauss_newton)
+        gradient = gradient + stiffness * x
         hessian = curvature + stiffness * np.eye(x.size)
         free = _free(x, gradient, premise)
         steepest = float(np.max(np.abs(gradient[free]), initial=0.0))
@@ -169,7 +151,8 @@ def varpro(
             damping = _WORTH * cost
             trial_x, step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
             length = float(np.linalg.norm(step))
-            trial, trial_cost = cost_of.evaluate(trial_x, current.coefficients)
+            trial = problem.evaluate(premise.parameters(trial_x), current.coefficients)
+            trial_cost = trial.cost + 0.5 * stiffness * (trial_x @ trial_x)
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
             accepted = ratio > _ACCEPTED_RATIO
             if not ratio >= 0.25:  # also where the trial is not finite
