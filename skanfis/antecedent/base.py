@@ -46,6 +46,21 @@ def _stack(values, Z):
     return np.concatenate(values) if values else np.empty((0, Z.shape[1]))
 
 
+def by_group(gradients, by_term):
+    """Gradients of every group, and what belongs to its terms, out of a row per term."""
+    start = 0
+    for gradient in gradients:
+        stop = start + gradient.shape[1]
+        yield gradient, by_term[start:stop]
+        start = stop
+
+
+def by_parameter(gradients, by_term):
+    """Derivatives by every parameter out of those by log mu, shape (n_parameters, n_rows)."""
+    pairs = by_group(gradients, by_term)
+    return _stack([(gradient * own).reshape(-1, own.shape[1]) for gradient, own in pairs], by_term)
+
+
 def softmax_in_place(log_values):
     """Softmax along the last axis but one."""
     log_values -= np.maximum.reduce(log_values, axis=-2, keepdims=True)

@@ -147,7 +147,7 @@ class Laplace:
         return self._held(self.factor, held)
 
     def _held(self, factor, by_stiffness):
-        found = self.line.weights(self.penalty).copy()
+        found = self.line.weights(self.penalty)
         found[_AGREEMENT] *= factor.trace(self.disagreement)
         found[_OTHERS] *= self.line.traces(factor)
         found[_STIFFNESS] = by_stiffness
@@ -229,7 +229,7 @@ def laplace(
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), free)
     has_premises = curvature is not None and curvature.size
-    paid = line.weights(penalty).copy()
+    paid = line.weights(penalty)
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
     paid[_STIFFNESS] *= displacement @ displacement if has_premises else 0.0
     paid[_OTHERS] *= line.squares(solved)

@@ -189,7 +189,7 @@ class SeparableProblem:
         self.on_sample: SeparableProblem | None = None
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
         slopes = rows.inputs.varying(self.consequent_inputs)
-        self._common_line = CommonLine(self.local, self._extent(antecedent), antecedent, slopes)
+        self.common_line = CommonLine(self.local, self._extent(antecedent), antecedent, slopes)
 
     def _extent(self, antecedent):
         """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
@@ -222,18 +222,13 @@ class SeparableProblem:
         other._sums_at_start = None
         return other
 
-    @property
-    def common_line(self):
-        """The line that all rules share, in the coordinates of the local basis."""
-        return self._common_line
-
     def penalty_matrix(self, disagreement):
         """P in the local basis, where Q is ``disagreement``."""
         return self.penalty.agreement * disagreement + self._pull
 
     @cached_property
     def _pull(self):
-        return self._common_line.pull(self.penalty)
+        return self.common_line.pull(self.penalty)
 
     def _rows_of_block(self, antecedent):
         values_per_row = (
@@ -270,7 +265,7 @@ class SeparableProblem:
         masses = rule_masses(gram, antecedent.n_rules)
         disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
         penalty = self.penalty_matrix(disagreement)
-        free = self._common_line.free(self.penalty)
+        free = self.common_line.free(self.penalty)
         factor = NormalFactor(gram + penalty, free)
         penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
@@ -294,7 +289,7 @@ class SeparableProblem:
         normal, change, error = before.with_penalty(
             self.penalty_matrix(before.disagreement),
             evaluation.mean_squared_error,
-            self._common_line.free(self.penalty),
+            self.common_line.free(self.penalty),
         )
         paid = float(np.vdot(normal.coefficients, normal.penalty @ normal.coefficients))
         return replace(

@@ -44,8 +44,6 @@ from .departures import Departures
 
 # What comes first in a row of weights; after these, those on all slopes and on all components.
 WEIGHTS = ("agreement", "stiffness")
-# Penalties whose weights are kept.
-_MOST_KNOWN = 8
 
 
 @dataclass(frozen=True)
@@ -75,17 +73,6 @@ class Penalty:
     def rho(self):
         """The weight of the common line's slopes."""
         return self.alpha if self.slope is None else self.slope
-
-    def weights(self, slopes, components):
-        """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
-        found = np.empty(len(WEIGHTS) + len(slopes) + len(components))
-        found[:2] = self.agreement, self.stiffness
-        first = 2 + len(slopes)
-        found[2:first] = [self.slope_pulls.get(j, 1.0) for j in slopes]
-        found[first:] = [self.pulls.get(component, 1.0) for component in components]
-        found[2:first] *= self.rho
-        found[first:] *= self.alpha
-        return found
 
 
 def mean_and_parts(weights, names):
@@ -171,7 +158,6 @@ class CommonLine:
         self._per_unit = extent.mean(axis=0) / local.spread
         self._function = {j: k for k, j in enumerate(slopes) if j is not None}
         self._free: dict[tuple, np.ndarray] = {}
-        self._known: dict[int, tuple[Penalty, np.ndarray]] = {}
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
 
@@ -228,15 +214,11 @@ class CommonLine:
         return linalg.helmert(rules.size) @ self.of_slopes(j, rules)
 
     def weights(self, penalty: Penalty):
-        """All weights of a penalty, in a row; not to be changed."""
-        # The same few penalties are asked about again and again; kept, none is mistaken for them.
-        known = self._known.get(id(penalty))
-        if known is None:
-            while len(self._known) >= _MOST_KNOWN:
-                del self._known[next(iter(self._known))]
-            known = penalty, penalty.weights(self.slopes, self.departures.components)
-            self._known[id(penalty)] = known
-        return known[1]
+        """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
+        rho, alpha = penalty.rho, penalty.alpha
+        slopes = [rho * penalty.slope_pulls.get(j, 1.0) for j in self.slopes]
+        components = [alpha * penalty.pulls.get(one, 1.0) for one in self.departures.components]
+        return np.array([penalty.agreement, penalty.stiffness, *slopes, *components], dtype=float)
 
     def squares(self, coefficients):
         """Of every slope, and of every component of the departures; local, summed over outputs."""

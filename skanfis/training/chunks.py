@@ -332,7 +332,7 @@ class _ProblemOfSums(SeparableProblem):
         own = self.consequent_inputs
         extent = np.maximum(sums.extent / sums.inputs.scale[own], 1.0)
         slopes = sums.inputs.varying(own)
-        self._common_line = CommonLine(self.local, extent, self.antecedent, slopes)
+        self.common_line = CommonLine(self.local, extent, self.antecedent, slopes)
 
     def mean_squares(self, evaluation):
         """Mean squared error of every standardised output."""
