@@ -154,11 +154,6 @@ class Laplace:
         return found
 
     @property
-    def n_restrained(self):
-        """How many parameters the whole penalty holds."""
-        return float(np.sum(self.trace_after))
-
-    @property
     def freedom(self):
         """Rows by weight times outputs, less what a constant takes."""
         return max(self.n_rows - 1.0, 0.5) * self.n_outputs
@@ -192,8 +187,8 @@ class Laplace:
 
     @property
     def n_effective(self):
-        """Effective number of all parameters: of consequents, what the penalty leaves free."""
-        return self.n_columns + self.curvature.size - self.n_restrained
+        """Effective number of all parameters: those that no part of the penalty holds."""
+        return self.n_columns + self.curvature.size - float(np.sum(self.trace_after))
 
     @property
     def n_effective_premises(self):
@@ -285,16 +280,20 @@ def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
     if posterior.curvature.size:
         determined[_STIFFNESS] += _PRIOR_NUMBER
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
-    step = np.log((determined + 1e-12) / (cost + 1e-12))
+    step = _log_ratio(determined, cost)
     slopes, components = _blocks(line)
     if n_distinct < ROWS_EACH * posterior.n_columns:
-        step[slopes] = np.log((determined[slopes].sum() + 1e-12) / (cost[slopes].sum() + 1e-12))
+        step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
     moves = _is_free(free, line, now.size) & (before > 0.0)
-    ratio = np.exp(np.minimum(np.maximum(step, -_LONGEST_STEP), _LONGEST_STEP))
+    ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
     return _limited(penalty, line, now * ratio, moves, now, least)
+
+
+def _log_ratio(determined, cost):
+    return np.log((determined + 1e-12) / (cost + 1e-12))
 
 
 def _blocks(line):
@@ -311,7 +310,7 @@ def _step_to_likeness(cost, determined, weights):
     t = z - omega(z + log(cost s^2 / 2)).
     """
     if weights.size <= 1 or weights[0] == 0.0:
-        return np.log((determined + 1e-12) / (cost + 1e-12))
+        return _log_ratio(determined, cost)
     logs = np.log(weights)
     z = determined / (2.0 * _LIKENESS) - (logs - logs.mean())
     return z - wrightomega(z + np.log(cost / (2.0 * _LIKENESS) + _NOTHING))
@@ -333,7 +332,7 @@ def _limited(penalty, line, weights, moves, others, least):
     low, high = line.weights(_SMALLEST), line.weights(_LARGEST)
     if least is not None:
         low = np.maximum(low, line.weights(least))
-    found = np.where(moves, np.minimum(np.maximum(weights, low), high), others)
+    found = np.where(moves, np.clip(weights, low, high), others)
     after: dict[str, Any] = dict(zip(WEIGHTS, found.tolist(), strict=False))
     if moves[slopes].any():
         after["slope"], after["slope_pulls"] = mean_and_parts(found[slopes], line.slopes)
@@ -361,7 +360,7 @@ def extrapolated(line, before, now, after, free, least):
     if not moves.any():
         return after
     ratio = np.minimum(step / np.where(moves, last, 1.0), _MOST_ALIKE)
-    jump = np.minimum(np.maximum(step / (1.0 - ratio), -_LONGEST_STEP), _LONGEST_STEP)
+    jump = np.clip(step / (1.0 - ratio), -_LONGEST_STEP, _LONGEST_STEP)
     far = np.where(moves, np.exp(second + jump), weights[2])
     return _limited(after, line, far, moves, weights[2], least)
 

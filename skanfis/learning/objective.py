@@ -43,7 +43,7 @@ from functools import cached_property
 import numpy as np
 
 from ..antecedent import Antecedent
-from ..blocks import BLOCK_ROWS
+from ..blocks import BLOCK_ROWS, row_blocks
 from ..consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
 from .data import StandardisedData
 from .gram import DesignMoments
@@ -194,13 +194,12 @@ class SeparableProblem:
     def _extent(self, antecedent):
         """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
         farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))
-        for chunk in self.rows.chunks(self._block_rows):
-            for part in chunk:
-                Z, _, _ = self.rows.read(part)
-                root = np.sqrt(antecedent.strengths(Z))
-                for j, z in enumerate(self._design.basis(Z)[1:]):
-                    distance = root * np.abs(z - self.local.center[:, j, None])
-                    np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
+        for part in self._blocks():
+            Z, _, _ = self.rows.read(part)
+            root = np.sqrt(antecedent.strengths(Z))
+            for j, z in enumerate(self._design.basis(Z)[1:]):
+                distance = root * np.abs(z - self.local.center[:, j, None])
+                np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
         return np.maximum(farthest, 1.0)
 
     def with_penalty(self, penalty):
@@ -239,6 +238,9 @@ class SeparableProblem:
         )
         fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
         return int(np.clip(fitting, _FEWEST_ROWS, BLOCK_ROWS))
+
+    def _blocks(self):
+        return row_blocks(self.rows.n_rows, self._block_rows)
 
     def _sum(self, one_pass):
         """Means over the weight of what a pass sums."""
@@ -351,9 +353,8 @@ class SeparableProblem:
 
     def residuals(self, evaluation):
         """Blocks of rows in order: slice, residual of the standardised target, weights or None."""
-        for chunk in self.rows.chunks(self._block_rows):
-            for part in chunk:
-                yield part, *self.residual(evaluation, part)
+        for part in self._blocks():
+            yield part, *self.residual(evaluation, part)
 
     def residual(self, evaluation, part):
         """Residual (n_outputs, n_rows) of the standardised target, and weights, of some rows."""
@@ -397,16 +398,18 @@ class SeparableProblem:
         is orthogonal to them, and h_i that of this smaller problem.
         """
         total, unit = 0.0, self._weight / n_rows
-        for chunk in self.rows.chunks(self._block_rows):
-            for part in chunk:
-                Z, target, weight = self.rows.read(part)
-                strengths, basis_rows = self._firing(evaluation, Z)
-                residual = self._residual_at(evaluation, strengths, basis_rows, target)
-                half = self._half_at(evaluation, strengths, basis_rows)
-                leverage = _leverage(half, held) / self._weight
-                residual /= np.maximum(1.0 - unit * leverage, _SMALLEST_FREEDOM)
-                squares = np.sum(residual**2, axis=0)
-                total += squares.sum() if weight is None else weight @ squares
+        for part in self._blocks():
+            Z, target, weight = self.rows.read(part)
+            strengths, basis_rows = self._firing(evaluation, Z)
+            residual = self._residual_at(evaluation, strengths, basis_rows, target)
+            half = self._half_at(evaluation, strengths, basis_rows)
+            leverage = np.einsum("ij,ij->j", half, half)
+            if held is not None:
+                taken = [np.sum((own.T @ half) ** 2, axis=0) for own in held]
+                leverage = leverage - np.stack(taken)
+            residual /= np.maximum(1.0 - unit * (leverage / self._weight), _SMALLEST_FREEDOM)
+            squares = np.sum(residual**2, axis=0)
+            total += squares.sum() if weight is None else weight @ squares
         return float(total / self._weight)
 
     def half(self, evaluation, part):
@@ -432,11 +435,3 @@ class SeparableProblem:
         blocks[:, 1:] *= self.local.spread[:, :, None]
         blocks[:, 1:] += self.local.center[:, :, None] * blocks[:, :1]
         return blocks.reshape(local.shape)
-
-
-def _leverage(half, held=None):
-    """Squares of some columns; where something is ``held``, of every output, (n_outputs, ...)."""
-    found = np.einsum("ij,ij->j", half, half)
-    if held is None:
-        return found
-    return np.stack([found - np.sum((own.T @ half) ** 2, axis=0) for own in held])
