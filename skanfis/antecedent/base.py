@@ -1,20 +1,16 @@
 r"""Rule bases: from memberships to normalised firing strengths, and back for derivatives.
 
-Conventions
------------
 ``Z`` has shape (n_inputs, n_rows): one contiguous row of memory per input, so that every operation
 runs along the data's rows. A rule base has ``n_terms`` membership functions, its *terms*, and
 ``n_rules`` rules; ``strengths`` w has shape (n_rules, n_rows), and its columns sum to one.
 
 With f_r the value of rule r's consequent and y = sum_r w_r f_r, the derivative of y by the
-log-membership of term t is needed for training, and has one form for every rule base:
+log-membership of term t has one form for every rule base,
 
     dy / d log mu_t = sum_(rules r that contain t) w_r f_r  -  nu_t y ,
 
 where nu_t is the share of the strength that rules containing t hold (on a grid, what is left of
 its own membership when its input's are normalised; scattered rules: the rule's strength itself).
-The chain rule through the family's own derivatives then gives the sensitivity to every premise
-parameter.
 """
 
 from abc import ABC, abstractmethod

@@ -7,20 +7,16 @@ consequents that least squares gives, and solves for these again. The step's len
     n -> n - kappa g / |g| ,    g = dF / dn ,
 
 and follows the error: kappa grows by 10 % where the error has fallen four times in a row, and
-shrinks by 10 % where it has twice risen and fallen. Neither counts a change of the error again that
-has once changed kappa in the same way. Centers and widths are in standard deviations of their
-input, so that a fit does not depend on units. His rule has no bounds: a step can make a width
-negative. Here a step that would leave the premises' box ends on its edge, displacement by
-displacement; inside the box the rule is his to the letter. By the envelope theorem the gradient at
-solved consequents is that of the joint cost, which a pass without square matrices gives
-(``SeparableProblem.joint``): an epoch is that pass and one solve.
+shrinks by 10 % where it has twice risen and fallen. Centers and widths are in standard deviations
+of their input, so that a fit does not depend on units. His rule has no bounds: a step can make a
+width negative. Here a step that would leave the premises' box ends on its edge, displacement by
+displacement. By the envelope theorem the gradient at solved consequents is that of the joint cost,
+which a pass without square matrices gives (``SeparableProblem.joint``).
 
-**Gradient.** Premises and consequents beta on [1, z] take one step together,
-
-    (n, beta) -> (n, beta) - kappa g / |g| ,    g = (dE / dn, dE / dbeta) ,
-
-with E the cost of ``objective`` (Liu et al. 2009). The consequents start as the solution of least
-squares and are never solved for again (the second of the four methods in Jang 1993).
+**Gradient.** Premises and consequents beta on [1, z] take one such step together, down the gradient
+(dE / dn, dE / dbeta) of the cost E at these consequents (Liu et al. 2009). They start as the
+solution of least squares and are never solved for again (the second of the four methods in Jang
+1993).
 """
 
 from collections import deque
@@ -48,7 +44,7 @@ class StepSize:
         self.size = size
         self._error = error
         # One course for each: neither counts a change again that has once changed the length.
-        self._courses = [deque(maxlen=len(course)) for course, _ in _CHANGES]
+        self._courses: list[deque] = [deque(maxlen=len(course)) for course, _ in _CHANGES]
 
     def follow(self, error):
         """Take the next error into account."""

@@ -1,19 +1,14 @@
 r"""The evidence of a model: how probable the data are, with all that was learnt averaged out.
 
-The cost of ``penalty`` is, in units of the noise's variance sigma^2, minus the logarithm of a
-posterior: y = Phi beta + eps with eps ~ N(0, sigma^2 / s), consequents with the prior precision
-n P / sigma^2, displacements x of the premises with n kappa / sigma^2, where n is the number of rows
-(by weight) and kappa the stiffness. Laplace's method integrates over beta and x, and sigma^2 is put
-at its maximum (MacKay 1992; for the linear part alone this is restricted maximum likelihood):
+By Laplace's method (docs/mathematics.rst), up to what is the same for all models of the same data,
 
     -2 log p = (n - 1) m log 2F + m [log |M| - log |P|+ + log R] + log |I + H / kappa| ,
 
-    2F = MSE + beta' P beta + kappa |x|^2 ,    M = Phi' S Phi / W + P ,
+    2F = MSE + beta' P beta + kappa |x|^2 ,    M = Phi' S Phi / W + P .
 
-up to what is the same for all models of the same data; m is the number of outputs, R that of rules,
-H the reduced Gauss-Newton matrix by x. |P|+ leaves out the one direction on which no penalty acts,
-that in which all rules rise alike: it has a flat prior, for which n counts one less; its length in
-beta grows as sqrt(R), for which log R makes good.
+n is the number of rows by weight, m that of outputs, R that of rules; x are the displacements of
+the premises, kappa is their stiffness, H the reduced Gauss-Newton matrix by x. |P|+ leaves out the
+one direction on which no penalty acts, that in which all rules rise alike.
 
 The weights tau of the penalty, P = sum_k tau_k P_k, are where the evidence is largest, which is
 where, for each, as much is paid as is determined (Fellner and Schall; Wood and Fasiolo 2017):
@@ -26,19 +21,12 @@ where, for each, as much is paid as is determined (Fellner and Schall; Wood and 
 
 each weight being multiplied by the ratio of the right side to the left. nu and x0 are the prior of
 the stiffness, as if nu displacements of size x0 had been seen before, which adds nu (t - log t - 1)
-to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this
-takes no pass over the rows: for any weights, beta is one solve away.
+to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this takes no pass
+over the rows: for any weights, beta is one solve away.
 
-The pulls alpha_c on the components of the departures are weights like the others, but few
-departures may tell of one; and a single slope of each rho_j. What is expected beforehand is that
-those of a kind are alike: the logarithm of each is normally distributed about their mean, with the
-standard deviation s = log 3, which adds sum_c (log alpha_c / alpha)^2 / s^2 to -2 log p, alpha
-their geometric mean. The step of one is then that at which, what is paid growing with it and what
-is determined staying,
-
-    paid exp(t) - determined + 2 (log alpha_c / alpha + t) / s^2 = 0 ,
-
-which for s without end is the ratio above, and else a value of Wright's omega.
+The alpha_c, and the rho_j, are expected to be alike: the logarithm of each is normally distributed
+about their mean, with the standard deviation s = log 3, which adds sum_c (log alpha_c / alpha)^2 /
+s^2 to -2 log p (see ``_step_to_likeness``).
 """
 
 from dataclasses import dataclass, replace

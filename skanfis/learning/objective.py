@@ -4,33 +4,18 @@ With premise parameters theta, design Phi(theta), weights S of sum W and consequ
 
     F(theta) = min_beta  1/2 [ |y - Phi beta|_S^2 / W + beta' P beta ] ,   P = lambda Q(theta) + A ,
 
-where Q gives the disagreement of rules that fire together, A what else pulls on the consequents
-(see ``penalty``). beta is eliminated (variable projection: Golub and Pereyra 1973). With r the
-residual and D = (d Phi / d theta) beta its sensitivity at fixed beta, the envelope theorem gives
-the gradient exactly, and the Schur complement of the joint Gauss-Newton matrix that of the reduced
-problem (Kaufman 1975):
+where Q gives the disagreement V of rules that fire together, A what else pulls on the consequents
+(see ``penalty``). With r the residual and D = (d Phi / d theta) beta,
 
-    grad F = [- D' S r + lambda/2 dV] / W
+    grad F = [- D' S r + lambda/2 dV] / W ,
     H      = [D' S D + lambda K - C (Phi' S Phi + W P)^-1 C'] / W ,    C = D' S Phi + lambda L .
 
-The disagreement is a sum of squares too, of sqrt(w_r) e_r with e_r = f_r - y_hat, for every row
-and rule. Since sum_r w_r e_r = 0, what changes with theta at fixed beta are the w_r alone:
+docs/mathematics.rst derives them, with dV, K and L.
 
-    dV = sum over rows and rules of  s e_r^2 dw_r ,
-    K  = sum over rows and rules of  s (w_r e_r^2 / 4) (d log w_r) (d log w_r)' ,
-    L_(., r) = sum over rows of  s/2 (e_r dw_r - w_r D) b' .
-
-With g_r the derivatives of rule r's own log-strength (those of the terms it has) and N = sum_r w_r
-g_r, d log w_r = g_r - N: K and L are sums over the few terms of each rule and products with N.
-
-Everything is a block of one Gram matrix and adds over rows. Two passes make one iteration:
-:meth:`SeparableProblem.evaluate` accumulates Phi' S [Phi, r] and gives cost and beta, which is all
-that a rejected step needs; :meth:`SeparableProblem.linearise` accumulates the rest at that very
-beta, so that the gradient is exact. Phi itself is never formed (see ``gram``). A pass holds one
-block of rows per worker, whatever the number of rows.
-
-The right side is the residual of *reference* coefficients, those of the last accepted point, not y:
-the cost of a nearly exact fit would otherwise be a small difference of large numbers.
+Two passes over the rows make one iteration (``passes``): :meth:`SeparableProblem.evaluate` sums
+Phi' S [Phi, r] and gives cost and beta, which is all that a rejected step needs;
+:meth:`SeparableProblem.linearise` sums the rest at that very beta. The right side is the residual
+of *reference* coefficients, those of the last accepted point, not y.
 
 Theta here is the vector :attr:`Antecedent.parameters`; what solvers move is in ``premise``.
 """

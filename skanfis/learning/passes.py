@@ -3,7 +3,7 @@ r"""What one pass adds up over the rows, a block at a time: the sums behind ``ob
 A pass is a function of a block, Z (n_inputs, n_rows), target (n_outputs, n_rows) and weights or
 None, that adds to its sums, arrays of the pass's ``shapes``. It holds the point at which it is
 taken and nothing of the rows: it can be sent to where the rows are (``StandardisedData.sum``),
-and only the sums come back. The formulas are in ``objective``.
+and only the sums come back.
 """
 
 from dataclasses import dataclass
@@ -116,7 +116,12 @@ class SecondPass:
                 )
 
     def _disagree(self, square, slope, cross, excess, strengths, gradients, weighted_basis):
-        """Add the part of V: its dV, K and L."""
+        """Add the part of V: its dV, K and L.
+
+        With g_r the derivatives of rule r's own log-strength (those of the terms it has) and
+        N = sum_r w_r g_r, d log w_r = g_r - N: K and L are sums over the few terms of each rule and
+        products with N.
+        """
         antecedent, agreement, n_raw = self.antecedent, self.agreement, slope.size
         # w_r e_r^2, where w_r may be next to nothing.
         squares = excess**2

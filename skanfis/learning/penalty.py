@@ -1,35 +1,23 @@
 r"""What the consequents pay beside their errors: for disagreement, for standing alone, for slopes.
 
-With f_r the value of rule r and y_hat = sum_r w_r f_r, the cost of a model is
+The cost of a model is, as docs/mathematics.rst explains,
 
     F = 1/2 [ MSE + lambda V + sum_c alpha_c |delta_c|^2 + sum_j rho_j b_j^2 ] ,
 
-    V = mean over rows of  sum_r w_r (f_r - y_hat)^2 ,
-
 and every part is quadratic in the consequents beta.
 
-*Agreement*, lambda. Because sum_r w_r = 1, for every row
+*Agreement*, lambda. V, the mean over rows of sum_r w_r (f_r - y_hat)^2, is the disagreement of
+rules that fire on the same row. With G the Gram matrix of the design, V = beta' Q beta with
+Q = B - G, where B is block diagonal and its block of rule r the row sum over r' of the blocks
+G_(r, r'): nothing else is accumulated.
 
-    sum_r w_r (y - f_r)^2 = (y - y_hat)^2 + sum_r w_r (f_r - y_hat)^2
+*The rules' common line* b, alpha_c. It is the line of least squares through all rules. delta_r is
+how much rule r differs from it, in its value at its own centre and in its slopes times the distance
+to the farthest row for which it stands (see ``SeparableProblem``). ``departures`` says which parts
+delta_c this has; alpha_c is alpha times one of ``pulls``, whose geometric mean is one.
 
-(the ambiguity decomposition of Krogh and Vedelsby 1995): local learning, in which every rule is a
-model of the rows on which it fires, is global learning plus V, the *disagreement* of rules that
-fire on the same row. lambda = 0 lets rules compensate one another at will, lambda = 1 is local
-learning, and as lambda grows beyond all rules become one line. With G the Gram matrix of the
-design, V = beta' Q beta with Q = B - G, where B is block diagonal and its block of rule r the row
-sum over r' of the blocks G_(r, r'): nothing else is accumulated.
-
-*The rules' common line*, alpha_c. Disagreement is weighed by the rows and says nothing where there
-are none. There a pull of each rule by itself holds it: delta_r is how much the rule differs from
-the rules' common line b, in its value at its own centre and in its slopes times the distance to
-the farthest row for which it stands (see ``SeparableProblem``). b is the line of least squares
-through all rules, that for which sum_r |delta_r|^2 is smallest. What a departure concerns, one
-input alone, or how one input's part depends on another, are components with a pull each (see
-``departures``): alpha times one of ``pulls``, whose geometric mean is one.
-
-*The slopes b_j of that line* have a plain ridge, rho_j, with a weight for the slope by each input:
-rho times one of ``slope_pulls``. Of a single rule it is all there is. Nothing pulls on the line's
-height: constants are free.
+*The slopes b_j of that line* have a plain ridge: rho_j is rho times one of ``slope_pulls``. Nothing
+pulls on the line's height.
 """
 
 from dataclasses import dataclass, field

@@ -1,27 +1,13 @@
 r"""Variable projection: trust-region Gauss-Newton steps on the reduced problem, within a box.
 
-With g and H the gradient and Gauss-Newton matrix of the reduced cost F by the premises'
-displacements x, the step minimises the model
-
-    m(s) = g's + s'Hs / 2    over |s| <= radius ,
-
-exactly, from the eigenvalues of H, among the displacements that are free to move (a displacement at
-a bound whose gradient points outward is not); what would then leave the box is put on its edge.
-With rho the ratio of the actual decrease to the model's, the radius falls to a quarter of the step
-where rho < 1/4 and doubles where rho > 3/4 and the step ends on the region's edge; the step is
-taken where rho > 1e-4 (Nocedal and Wright 2006, algorithm 4.1 and section 4.3).
-
-To the curvature that a step sees is added what keeps rounding errors from deciding it. Normalised
-strengths do not change at all along some directions (two Gaussian terms have four parameters, their
-log ratio has three coefficients), and hardly along others: slope and curvature are both noise
-there, and so would their ratio be. The addition is a small part of the largest curvature, plus the
-curvature with which moving by one must pay: a decrease of the cost by a twentieth of itself. Two
-fits to the same data in other units so take the same path (tests/test_invariance.py).
+With g and H the gradient and Gauss-Newton matrix of the reduced cost by the premises' displacements
+x, a step s minimises g's + s'Hs / 2 over |s| <= radius, exactly, from the eigenvalues of H, among
+the displacements that are free to move; what would then leave the box is put on its edge. The
+radius follows Nocedal and Wright (2006, algorithm 4.1). docs/mathematics.rst has the whole of it,
+and why a little is added to the curvature: two fits to the same data in other units so take the
+same path (tests/test_invariance.py).
 
 A rejected step costs one pass over the data, an accepted one two (see ``objective``).
-
-``stiffness`` adds stiffness/2 |x|^2 to the cost, which draws the premises to their start. There is
-nothing to choose otherwise: displacements have no unit, so that one radius serves all problems.
 """
 
 from numbers import Real

@@ -1,13 +1,9 @@
 r"""From where a run has ended to the frozen model, in the user's units.
 
 How far beyond the data the tangent may be followed is told by the outermost rows. Had the box ended
-at the quartiles of every input, most rows would have been beyond it. With e(L) their mean squared
-error where the tangent is followed for L standard deviations of every input, and sigma the noise of
-the rows, the distance is
-
-    argmin_L e(L)   where   e(L) + sigma^2 < (e(1/2) + sigma^2) / 4 ,
-
-half the error; else it is a half. Distances beyond the outermost row all tell the same, and the
+at the quartiles of every input, most rows would have been beyond it. The distance is that at which
+the tangent from there errs least, if noise and error are then below a quarter of what they are at
+half a deviation; else it is a half. Distances beyond the outermost row all tell the same, and the
 least of them counts.
 """
 

@@ -1,12 +1,9 @@
 r"""Rules that do nothing: those that never fire, and those that repeat another.
 
-A rule *never fires* where it has no say on any training row: its strength is nowhere above one in a
-hundred. It *repeats* another where their strengths are in proportion on all rows, which shows in
-their mean products over the rows O_rs = mean of w_r w_s: O_rs / sqrt(O_rr O_ss) is close to one.
-They then have one consequent between them, however it is divided. Of two that repeat one another
-the stronger one stays.
-
-:func:`model_without_rules` leaves rules out of a frozen model, for training to go on from there.
+A rule *never fires* where its strength is nowhere above one in a hundred. It *repeats* another
+where their strengths are in proportion on all rows, which shows in their mean products over the
+rows O_rs = mean of w_r w_s: O_rs / sqrt(O_rr O_ss) is close to one. They then have one consequent
+between them, however it is divided. Of two that repeat one another the stronger one stays.
 """
 
 from collections.abc import Sequence
