@@ -22,7 +22,7 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
-from ..blocks import BLOCK_ROWS
+from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import column_statistics
 
 # The median of |u| for a standard normal u.
@@ -63,14 +63,13 @@ def robust_start(rows):
     if lines is None:
         return rows, weights
     sizes = np.empty(rows.n_rows)
-    for chunk in rows.chunks(BLOCK_ROWS):
-        for part in chunk:
-            Z, target, _ = rows.read(part)
-            squares = [
-                ((values - center) / spread - line.predict(Z.T)) ** 2
-                for values, (center, spread, line) in zip(target, lines, strict=True)
-            ]
-            sizes[part] = np.sqrt(np.mean(squares, axis=0))
+    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
+        Z, target, _ = rows.read(part)
+        squares = [
+            ((values - center) / spread - line.predict(Z.T)) ** 2
+            for values, (center, spread, line) in zip(target, lines, strict=True)
+        ]
+        sizes[part] = np.sqrt(np.mean(squares, axis=0))
     scale = _weighted_median(sizes, rows.sample_weight) / _NORMAL_MEDIAN
     if scale == 0.0:
         return rows, weights
