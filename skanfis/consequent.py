@@ -1,22 +1,14 @@
 r"""The THEN parts of the rules, which are linear, and the regression that finds them.
 
-Conventions
------------
 A rule's consequent is f_r(z) = beta_r . b(z) with the basis b(z) = [1, z_1, ..., z_d] (order 1) or
 [1] (order 0). The design has one column per rule and basis function, Phi_(r, i) = w_r b_i, rules
 first; it is held transposed, shape (n_columns, n_rows), as everything that runs along rows.
 
-The local basis
----------------
-Far from the origin the columns w_r and w_r z_j are nearly parallel. Each rule therefore has a basis
-centred and scaled where it fires, [1, (z_j - a_rj) / h_rj], with a and h the mean and the standard
-deviation of z_j weighted by w_r. Phi_local = Phi T with T block diagonal: the change costs nothing
-per row, because it is done on the Gram matrix,
-
-    Phi_local' S Phi_local = T' (Phi' S Phi) T ,
-
-and the penalty of ``penalty`` acts on the local coefficients. T is frozen at the start of training,
-for the objective must be one and the same function throughout.
+Far from the origin the columns w_r and w_r z_j are nearly parallel. Each rule therefore has a
+*local basis* centred and scaled where it fires, [1, (z_j - a_rj) / h_rj], with a and h the mean and
+the standard deviation of z_j weighted by w_r. Phi_local = Phi T with T block diagonal; the change
+is made on the Gram matrix, and the penalty of ``penalty`` acts on the local coefficients. T is
+frozen at the start of training, for the objective must be one and the same function throughout.
 
 Since sum_r w_r = 1, the moments behind a and h are row sums of the Gram matrix itself:
 sum_r' G[(r, i), (r', j)] = sum over rows of s w_r b_i b_j, where b_j is 1 or z_j.

@@ -22,7 +22,7 @@ from typing import Self
 
 import numpy as np
 
-from .antecedent import Antecedent, RuleTableAntecedent
+from .antecedent import Antecedent, RuleTableAntecedent, by_group
 from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names
 from .policies import (
@@ -441,11 +441,9 @@ class TSKModel:
         for k, one in enumerate(self.coefficients.transpose(2, 0, 1)):
             by_rule, output = rule_outputs(one, strengths, basis_rows)
             by_term = self.antecedent.term_sensitivity(by_rule, output, shares)
-            start = 0
-            for group, gradient in zip(self.antecedent.groups, gradients, strict=True):
-                own = by_term[start : start + group.n_terms]
+            pairs = by_group(gradients, by_term)
+            for group, (gradient, own) in zip(self.antecedent.groups, pairs, strict=True):
                 np.subtract.at(slopes[:, k], group.inputs, own * gradient[0])
-                start += group.n_terms
             slopes[: one.shape[1] - 1, k] += one[:, 1:].T @ strengths
             values.append(output)
         return np.stack(values), slopes

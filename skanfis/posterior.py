@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.linalg import blas
 
-from .antecedent import Antecedent
+from .antecedent import Antecedent, by_parameter
 from .consequent import rule_outputs
 
 __all__ = ["MOST_PARAMETERS", "Posterior", "parameter_units"]
@@ -207,9 +207,7 @@ class Posterior:
             by_term = antecedent.term_sensitivity(
                 *rule_outputs(coefficients, strengths, basis), shares
             )
-            edges = np.cumsum([group.n_terms for group in antecedent.groups])[:-1]
-            for gradient, of_group in zip(gradients, np.split(by_term, edges), strict=True):
-                rows.append((gradient * of_group).reshape(-1, Z.shape[1]))
+            rows.append(by_parameter(gradients, by_term))
         return np.concatenate(rows)
 
     def _halves(self, rows):

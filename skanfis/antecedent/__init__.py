@@ -1,6 +1,6 @@
 """Rule bases: the IF parts of a set of rules, over terms of any families."""
 
-from .base import Antecedent, TermGroup
+from .base import Antecedent, TermGroup, by_group, by_parameter
 from .grid import GridAntecedent
 from .rule_table import RuleTableAntecedent
 from .scattered import ScatteredAntecedent
@@ -13,4 +13,6 @@ __all__ = [
     "ScatteredAntecedent",
     "TermGroup",
     "TreeAntecedent",
+    "by_group",
+    "by_parameter",
 ]

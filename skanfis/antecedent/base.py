@@ -1,20 +1,16 @@
 r"""Rule bases: from memberships to normalised firing strengths, and back for derivatives.
 
-Conventions
------------
 ``Z`` has shape (n_inputs, n_rows): one contiguous row of memory per input, so that every operation
 runs along the data's rows. A rule base has ``n_terms`` membership functions, its *terms*, and
 ``n_rules`` rules; ``strengths`` w has shape (n_rules, n_rows), and its columns sum to one.
 
 With f_r the value of rule r's consequent and y = sum_r w_r f_r, the derivative of y by the
-log-membership of term t is needed for training, and has one form for every rule base:
+log-membership of term t has one form for every rule base,
 
     dy / d log mu_t = sum_(rules r that contain t) w_r f_r  -  nu_t y ,
 
 where nu_t is the share of the strength that rules containing t hold (on a grid, what is left of
 its own membership when its input's are normalised; scattered rules: the rule's strength itself).
-The chain rule through the family's own derivatives then gives the sensitivity to every premise
-parameter.
 """
 
 from abc import ABC, abstractmethod
@@ -44,6 +40,21 @@ def _stack(values, Z):
     if len(values) == 1:
         return values[0]
     return np.concatenate(values) if values else np.empty((0, Z.shape[1]))
+
+
+def by_group(gradients, by_term):
+    """Gradients of every group, and what belongs to its terms, out of a row per term."""
+    start = 0
+    for gradient in gradients:
+        stop = start + gradient.shape[1]
+        yield gradient, by_term[start:stop]
+        start = stop
+
+
+def by_parameter(gradients, by_term):
+    """Derivatives by every parameter out of those by log mu, shape (n_parameters, n_rows)."""
+    pairs = by_group(gradients, by_term)
+    return _stack([(gradient * own).reshape(-1, own.shape[1]) for gradient, own in pairs], by_term)
 
 
 def softmax_in_place(log_values):

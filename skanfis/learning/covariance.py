@@ -1,17 +1,13 @@
 r"""The posterior where a fit has ended, by Laplace's method.
 
-The cost of ``objective`` is, in units of sigma^2 / n, minus the logarithm of a posterior (see
-``evidence``). Laplace's method takes it for Gaussian where the fit ends, with the Gauss-Newton
-matrix of consequents beta and displacements x of the premises for its precision,
+The precision of consequents and displacements x of the premises is (docs/mathematics.rst)
 
     n / sigma^2  [ M   C' ]        M = Phi' S Phi / W + P ,
                  [ C   J  ] ,      J = (D' S D + lambda K) / W + kappa I .
 
 M is factored first, as in the fit; what is left of J is H + kappa I, H the reduced Gauss-Newton
-matrix. sigma^2 is what the residual leaves after the effective number of parameters k, as in
-restricted maximum likelihood and in MacKay (1992), n MSE / (n - k),
-k = tr M^-1 G + tr H (H + kappa)^-1. Every output has a sigma of its own for its noise and its
-consequents; the premises, which all outputs share, have the mean of them.
+matrix. Every output has a sigma of its own for its noise and its consequents; the premises, which
+all outputs share, have the mean of them.
 """
 
 from dataclasses import replace

@@ -256,6 +256,14 @@ class StandardisedData:
         inputs = (self.X[part] - self.inputs.offset) / self.inputs.scale
         return np.hstack([inputs, (self.y[part] - self.targets.offset) / self.targets.scale])
 
+    def fingerprints(self, of_inputs=False):
+        """One number for every row, the same where rows, or their inputs alone, are equal."""
+        numbers = np.empty(self.n_rows)
+        for part in row_blocks(self.n_rows, BLOCK_ROWS):
+            Z, target, _ = self.read(part)
+            numbers[part] = fingerprint(Z if of_inputs else np.concatenate([Z, target]))
+        return numbers
+
     def read(self, part):
         """Z, standardised target, and weights or None, of one block."""
         X, y = self.X[part], self.y[part]

@@ -1,21 +1,18 @@
 r"""How rules depart from their common line, in parts that each concern some inputs alone.
 
 The departures delta = N u of all rules, in the value at their own centre and in their slopes, are a
-table over the rules of a grid, (m_1, ..., m_d), and the functions of the basis. It is split as in
-the analysis of variance, but in functions and not in cells: along the axis of every input with
-terms by orthonormal contrasts, the first of which is the mean. What varies along the axes of the
-inputs S, in the slope by input j, is a function of S and j together. So each contrast belongs to
-one *component*,
+table over the rules of a grid, (m_1, ..., m_d), and the functions of the basis. Along the axis of
+every input with terms it is split by orthonormal contrasts, the first of which is the mean. What
+varies along the axes of the inputs S, in the slope by input j, is a function of S and j together.
+So each contrast belongs to one *component*,
 
     (j,)      how a rule's part of the output changes with input j alone,
     (i, j)    how that change depends on input i,
     ()        the rest: what concerns three inputs and more,
 
 and |delta|^2 is the sum of the components' own. Scattered rules have no axes: there a component is
-the values at the centres, (), or the slopes by an input, (j,).
-
-Each component c has a pull of its own, alpha_c: sum_c alpha_c |delta_c|^2 = u' D' diag(alpha) D u
-with D = H N, H the contrasts.
+the values at the centres, (), or the slopes by an input, (j,). With a pull alpha_c on each, they
+pay u' D' diag(alpha) D u, D = H N, H the contrasts.
 """
 
 from functools import cached_property, lru_cache

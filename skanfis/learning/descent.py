@@ -7,20 +7,16 @@ consequents that least squares gives, and solves for these again. The step's len
     n -> n - kappa g / |g| ,    g = dF / dn ,
 
 and follows the error: kappa grows by 10 % where the error has fallen four times in a row, and
-shrinks by 10 % where it has twice risen and fallen. Neither counts a change of the error again that
-has once changed kappa in the same way. Centers and widths are in standard deviations of their
-input, so that a fit does not depend on units. His rule has no bounds: a step can make a width
-negative. Here a step that would leave the premises' box ends on its edge, displacement by
-displacement; inside the box the rule is his to the letter. By the envelope theorem the gradient at
-solved consequents is that of the joint cost, which a pass without square matrices gives
-(``SeparableProblem.joint``): an epoch is that pass and one solve.
+shrinks by 10 % where it has twice risen and fallen. Centers and widths are in standard deviations
+of their input, so that a fit does not depend on units. His rule has no bounds: a step can make a
+width negative. Here a step that would leave the premises' box ends on its edge, displacement by
+displacement. By the envelope theorem the gradient at solved consequents is that of the joint cost,
+which a pass without square matrices gives (``SeparableProblem.joint``).
 
-**Gradient.** Premises and consequents beta on [1, z] take one step together,
-
-    (n, beta) -> (n, beta) - kappa g / |g| ,    g = (dE / dn, dE / dbeta) ,
-
-with E the cost of ``objective`` (Liu et al. 2009). The consequents start as the solution of least
-squares and are never solved for again (the second of the four methods in Jang 1993).
+**Gradient.** Premises and consequents beta on [1, z] take one such step together, down the gradient
+(dE / dn, dE / dbeta) of the cost E at these consequents (Liu et al. 2009). They start as the
+solution of least squares and are never solved for again (the second of the four methods in Jang
+1993).
 """
 
 from collections import deque
@@ -32,13 +28,11 @@ import numpy as np
 
 from .._sklearn import Interval, StrOptions
 from .objective import Evaluation, JointGradient
-from .solver import Solver, SolverResult, lse
+from .solver import LeastSquares, Solver, SolverResult
 
 _RISE, _FALL = 1.0, -1.0
 # His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
-_GROWTH, _SHRINKAGE = 1.1, 0.9
-_GROW_AFTER = [_FALL, _FALL, _FALL, _FALL]
-_SHRINK_AFTER = [_RISE, _FALL, _RISE, _FALL]
+_CHANGES = [([_FALL, _FALL, _FALL, _FALL], 1.1), ([_RISE, _FALL, _RISE, _FALL], 0.9)]
 # Gradients below this part of tol times the cost are zero, as in ``varpro``.
 _GRADIENT_FACTOR = 1e-2
 
@@ -49,22 +43,17 @@ class StepSize:
     def __init__(self, size, error):
         self.size = size
         self._error = error
-        self._course: deque[float] = deque(maxlen=len(_GROW_AFTER))
-        self._since_growth = self._since_shrinkage = 0
+        # One course for each: neither counts a change again that has once changed the length.
+        self._courses: list[deque] = [deque(maxlen=len(course)) for course, _ in _CHANGES]
 
     def follow(self, error):
         """Take the next error into account."""
-        self._course.append(float(np.sign(error - self._error)))
-        self._error = error
-        self._since_growth += 1
-        self._since_shrinkage += 1
-        course = list(self._course)
-        if course == _SHRINK_AFTER and self._since_shrinkage >= len(course):
-            self.size *= _SHRINKAGE
-            self._since_shrinkage = 0
-        elif course == _GROW_AFTER and self._since_growth >= len(course):
-            self.size *= _GROWTH
-            self._since_growth = 0
+        change, self._error = np.sign(error - self._error), error
+        for seen, (course, factor) in zip(self._courses, _CHANGES, strict=True):
+            seen.append(change)
+            if list(seen) == course:
+                self.size *= factor
+                seen.clear()
 
 
 class NaturalPremise:
@@ -161,7 +150,7 @@ class _Descent(Solver):
         self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
     ) -> SolverResult:
         if not premise.size:
-            return lse(problem, premise, on_iteration=on_iteration)
+            return LeastSquares().solve(problem, premise, max_iter=1, on_iteration=on_iteration)
         natural = NaturalPremise(premise)
         x = np.zeros(premise.size) if start is None else start
         first = problem.evaluate(premise.parameters(x)).coefficients

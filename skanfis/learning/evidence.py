@@ -1,19 +1,14 @@
 r"""The evidence of a model: how probable the data are, with all that was learnt averaged out.
 
-The cost of ``penalty`` is, in units of the noise's variance sigma^2, minus the logarithm of a
-posterior: y = Phi beta + eps with eps ~ N(0, sigma^2 / s), consequents with the prior precision
-n P / sigma^2, displacements x of the premises with n kappa / sigma^2, where n is the number of rows
-(by weight) and kappa the stiffness. Laplace's method integrates over beta and x, and sigma^2 is put
-at its maximum (MacKay 1992; for the linear part alone this is restricted maximum likelihood):
+By Laplace's method (docs/mathematics.rst), up to what is the same for all models of the same data,
 
     -2 log p = (n - 1) m log 2F + m [log |M| - log |P|+ + log R] + log |I + H / kappa| ,
 
-    2F = MSE + beta' P beta + kappa |x|^2 ,    M = Phi' S Phi / W + P ,
+    2F = MSE + beta' P beta + kappa |x|^2 ,    M = Phi' S Phi / W + P .
 
-up to what is the same for all models of the same data; m is the number of outputs, R that of rules,
-H the reduced Gauss-Newton matrix by x. |P|+ leaves out the one direction on which no penalty acts,
-that in which all rules rise alike: it has a flat prior, for which n counts one less; its length in
-beta grows as sqrt(R), for which log R makes good.
+n is the number of rows by weight, m that of outputs, R that of rules; x are the displacements of
+the premises, kappa is their stiffness, H the reduced Gauss-Newton matrix by x. |P|+ leaves out the
+one direction on which no penalty acts, that in which all rules rise alike.
 
 The weights tau of the penalty, P = sum_k tau_k P_k, are where the evidence is largest, which is
 where, for each, as much is paid as is determined (Fellner and Schall; Wood and Fasiolo 2017):
@@ -26,19 +21,12 @@ where, for each, as much is paid as is determined (Fellner and Schall; Wood and 
 
 each weight being multiplied by the ratio of the right side to the left. nu and x0 are the prior of
 the stiffness, as if nu displacements of size x0 had been seen before, which adds nu (t - log t - 1)
-to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this
-takes no pass over the rows: for any weights, beta is one solve away.
+to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this takes no pass
+over the rows: for any weights, beta is one solve away.
 
-The pulls alpha_c on the components of the departures are weights like the others, but few
-departures may tell of one; and a single slope of each rho_j. What is expected beforehand is that
-those of a kind are alike: the logarithm of each is normally distributed about their mean, with the
-standard deviation s = log 3, which adds sum_c (log alpha_c / alpha)^2 / s^2 to -2 log p, alpha
-their geometric mean. The step of one is then that at which, what is paid growing with it and what
-is determined staying,
-
-    paid exp(t) - determined + 2 (log alpha_c / alpha + t) / s^2 = 0 ,
-
-which for s without end is the ratio above, and else a value of Wright's omega.
+The alpha_c, and the rho_j, are expected to be alike: the logarithm of each is normally distributed
+about their mean, with the standard deviation s = log 3, which adds sum_c (log alpha_c / alpha)^2 /
+s^2 to -2 log p (see ``_step_to_likeness``).
 """
 
 from dataclasses import dataclass, replace
@@ -147,16 +135,11 @@ class Laplace:
         return self._held(self.factor, held)
 
     def _held(self, factor, by_stiffness):
-        found = self.line.weights(self.penalty).copy()
+        found = self.line.weights(self.penalty)
         found[_AGREEMENT] *= factor.trace(self.disagreement)
         found[_OTHERS] *= self.line.traces(factor)
         found[_STIFFNESS] = by_stiffness
         return found
-
-    @property
-    def n_restrained(self):
-        """How many parameters the whole penalty holds."""
-        return float(np.sum(self.trace_after))
 
     @property
     def freedom(self):
@@ -192,8 +175,8 @@ class Laplace:
 
     @property
     def n_effective(self):
-        """Effective number of all parameters: of consequents, what the penalty leaves free."""
-        return self.n_columns + self.curvature.size - self.n_restrained
+        """Effective number of all parameters: those that no part of the penalty holds."""
+        return self.n_columns + self.curvature.size - float(np.sum(self.trace_after))
 
     @property
     def n_effective_premises(self):
@@ -229,7 +212,7 @@ def laplace(
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), free)
     has_premises = curvature is not None and curvature.size
-    paid = line.weights(penalty).copy()
+    paid = line.weights(penalty)
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
     paid[_STIFFNESS] *= displacement @ displacement if has_premises else 0.0
     paid[_OTHERS] *= line.squares(solved)
@@ -285,16 +268,20 @@ def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
     if posterior.curvature.size:
         determined[_STIFFNESS] += _PRIOR_NUMBER
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
-    step = np.log((determined + 1e-12) / (cost + 1e-12))
+    step = _log_ratio(determined, cost)
     slopes, components = _blocks(line)
     if n_distinct < ROWS_EACH * posterior.n_columns:
-        step[slopes] = np.log((determined[slopes].sum() + 1e-12) / (cost[slopes].sum() + 1e-12))
+        step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
     moves = _is_free(free, line, now.size) & (before > 0.0)
-    ratio = np.exp(np.minimum(np.maximum(step, -_LONGEST_STEP), _LONGEST_STEP))
+    ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
     return _limited(penalty, line, now * ratio, moves, now, least)
+
+
+def _log_ratio(determined, cost):
+    return np.log((determined + 1e-12) / (cost + 1e-12))
 
 
 def _blocks(line):
@@ -311,7 +298,7 @@ def _step_to_likeness(cost, determined, weights):
     t = z - omega(z + log(cost s^2 / 2)).
     """
     if weights.size <= 1 or weights[0] == 0.0:
-        return np.log((determined + 1e-12) / (cost + 1e-12))
+        return _log_ratio(determined, cost)
     logs = np.log(weights)
     z = determined / (2.0 * _LIKENESS) - (logs - logs.mean())
     return z - wrightomega(z + np.log(cost / (2.0 * _LIKENESS) + _NOTHING))
@@ -333,7 +320,7 @@ def _limited(penalty, line, weights, moves, others, least):
     low, high = line.weights(_SMALLEST), line.weights(_LARGEST)
     if least is not None:
         low = np.maximum(low, line.weights(least))
-    found = np.where(moves, np.minimum(np.maximum(weights, low), high), others)
+    found = np.where(moves, np.clip(weights, low, high), others)
     after: dict[str, Any] = dict(zip(WEIGHTS, found.tolist(), strict=False))
     if moves[slopes].any():
         after["slope"], after["slope_pulls"] = mean_and_parts(found[slopes], line.slopes)
@@ -361,7 +348,7 @@ def extrapolated(line, before, now, after, free, least):
     if not moves.any():
         return after
     ratio = np.minimum(step / np.where(moves, last, 1.0), _MOST_ALIKE)
-    jump = np.minimum(np.maximum(step / (1.0 - ratio), -_LONGEST_STEP), _LONGEST_STEP)
+    jump = np.clip(step / (1.0 - ratio), -_LONGEST_STEP, _LONGEST_STEP)
     far = np.where(moves, np.exp(second + jump), weights[2])
     return _limited(after, line, far, moves, weights[2], least)
 

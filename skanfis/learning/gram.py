@@ -6,15 +6,14 @@ Columns of Phi are products of one share per *factor* of the rule base and one b
 
 where a grid has one factor per input with terms, and scattered rules are a single factor whose
 shares are the strengths. An entry of Phi' S Phi is therefore a moment that depends on unordered
-pairs alone,
+pairs alone, of shares of each factor and of basis functions,
 
-    sum over rows of  s (nu_1k1 nu_1l1) ... (nu_dkd nu_dld) (b_i b_j) ,
+    sum over rows of  s (nu_1k1 nu_1l1) ... (nu_dkd nu_dld) (b_i b_j) :
 
-of which there are prod_j m_j (m_j + 1) / 2 times b (b + 1) / 2: for 3 x 3 x 3 rules on three inputs
-2,160, where the symmetric product of the design, dsyrk, takes 5,886. The pairs are split into two
-groups of about equal size, each group's products are formed row by row, and one general matrix
-product gives all moments: for that grid 4,320 flops per row instead of 11,664. The matrix is put
-together from the moments once per pass, by indexing.
+for 3 x 3 x 3 rules on three inputs 2,160 moments, where the symmetric product of the design, dsyrk,
+takes 5,886. The pairs are split into two groups of about equal size, each group's products are
+formed row by row, and one general matrix product gives all moments. The matrix is put together from
+the moments once per pass, by indexing.
 """
 
 from functools import cache, lru_cache

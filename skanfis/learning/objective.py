@@ -4,33 +4,18 @@ With premise parameters theta, design Phi(theta), weights S of sum W and consequ
 
     F(theta) = min_beta  1/2 [ |y - Phi beta|_S^2 / W + beta' P beta ] ,   P = lambda Q(theta) + A ,
 
-where Q gives the disagreement of rules that fire together, A what else pulls on the consequents
-(see ``penalty``). beta is eliminated (variable projection: Golub and Pereyra 1973). With r the
-residual and D = (d Phi / d theta) beta its sensitivity at fixed beta, the envelope theorem gives
-the gradient exactly, and the Schur complement of the joint Gauss-Newton matrix that of the reduced
-problem (Kaufman 1975):
+where Q gives the disagreement V of rules that fire together, A what else pulls on the consequents
+(see ``penalty``). With r the residual and D = (d Phi / d theta) beta,
 
-    grad F = [- D' S r + lambda/2 dV] / W
+    grad F = [- D' S r + lambda/2 dV] / W ,
     H      = [D' S D + lambda K - C (Phi' S Phi + W P)^-1 C'] / W ,    C = D' S Phi + lambda L .
 
-The disagreement is a sum of squares too, of sqrt(w_r) e_r with e_r = f_r - y_hat, for every row
-and rule. Since sum_r w_r e_r = 0, what changes with theta at fixed beta are the w_r alone:
+docs/mathematics.rst derives them, with dV, K and L.
 
-    dV = sum over rows and rules of  s e_r^2 dw_r ,
-    K  = sum over rows and rules of  s (w_r e_r^2 / 4) (d log w_r) (d log w_r)' ,
-    L_(., r) = sum over rows of  s/2 (e_r dw_r - w_r D) b' .
-
-With g_r the derivatives of rule r's own log-strength (those of the terms it has) and N = sum_r w_r
-g_r, d log w_r = g_r - N: K and L are sums over the few terms of each rule and products with N.
-
-Everything is a block of one Gram matrix and adds over rows. Two passes make one iteration:
-:meth:`SeparableProblem.evaluate` accumulates Phi' S [Phi, r] and gives cost and beta, which is all
-that a rejected step needs; :meth:`SeparableProblem.linearise` accumulates the rest at that very
-beta, so that the gradient is exact. Phi itself is never formed (see ``gram``). A pass holds one
-block of rows per worker, whatever the number of rows.
-
-The right side is the residual of *reference* coefficients, those of the last accepted point, not y:
-the cost of a nearly exact fit would otherwise be a small difference of large numbers.
+Two passes over the rows make one iteration (``passes``): :meth:`SeparableProblem.evaluate` sums
+Phi' S [Phi, r] and gives cost and beta, which is all that a rejected step needs;
+:meth:`SeparableProblem.linearise` sums the rest at that very beta. The right side is the residual
+of *reference* coefficients, those of the last accepted point, not y.
 
 Theta here is the vector :attr:`Antecedent.parameters`; what solvers move is in ``premise``.
 """
@@ -43,7 +28,7 @@ from functools import cached_property
 import numpy as np
 
 from ..antecedent import Antecedent
-from ..blocks import BLOCK_ROWS
+from ..blocks import BLOCK_ROWS, row_blocks
 from ..consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
 from .data import StandardisedData
 from .gram import DesignMoments
@@ -189,18 +174,17 @@ class SeparableProblem:
         self.on_sample: SeparableProblem | None = None
         self.local = LocalBasis.from_gram(gram, antecedent.n_rules)
         slopes = rows.inputs.varying(self.consequent_inputs)
-        self._common_line = CommonLine(self.local, self._extent(antecedent), antecedent, slopes)
+        self.common_line = CommonLine(self.local, self._extent(antecedent), antecedent, slopes)
 
     def _extent(self, antecedent):
         """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
         farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))
-        for chunk in self.rows.chunks(self._block_rows):
-            for part in chunk:
-                Z, _, _ = self.rows.read(part)
-                root = np.sqrt(antecedent.strengths(Z))
-                for j, z in enumerate(self._design.basis(Z)[1:]):
-                    distance = root * np.abs(z - self.local.center[:, j, None])
-                    np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
+        for part in self._blocks():
+            Z, _, _ = self.rows.read(part)
+            root = np.sqrt(antecedent.strengths(Z))
+            for j, z in enumerate(self._design.basis(Z)[1:]):
+                distance = root * np.abs(z - self.local.center[:, j, None])
+                np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
         return np.maximum(farthest, 1.0)
 
     def with_penalty(self, penalty):
@@ -222,18 +206,13 @@ class SeparableProblem:
         other._sums_at_start = None
         return other
 
-    @property
-    def common_line(self):
-        """The line that all rules share, in the coordinates of the local basis."""
-        return self._common_line
-
     def penalty_matrix(self, disagreement):
         """P in the local basis, where Q is ``disagreement``."""
         return self.penalty.agreement * disagreement + self._pull
 
     @cached_property
     def _pull(self):
-        return self._common_line.pull(self.penalty)
+        return self.common_line.pull(self.penalty)
 
     def _rows_of_block(self, antecedent):
         values_per_row = (
@@ -244,6 +223,9 @@ class SeparableProblem:
         )
         fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
         return int(np.clip(fitting, _FEWEST_ROWS, BLOCK_ROWS))
+
+    def _blocks(self):
+        return row_blocks(self.rows.n_rows, self._block_rows)
 
     def _sum(self, one_pass):
         """Means over the weight of what a pass sums."""
@@ -270,7 +252,7 @@ class SeparableProblem:
         masses = rule_masses(gram, antecedent.n_rules)
         disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
         penalty = self.penalty_matrix(disagreement)
-        free = self._common_line.free(self.penalty)
+        free = self.common_line.free(self.penalty)
         factor = NormalFactor(gram + penalty, free)
         penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
@@ -294,7 +276,7 @@ class SeparableProblem:
         normal, change, error = before.with_penalty(
             self.penalty_matrix(before.disagreement),
             evaluation.mean_squared_error,
-            self._common_line.free(self.penalty),
+            self.common_line.free(self.penalty),
         )
         paid = float(np.vdot(normal.coefficients, normal.penalty @ normal.coefficients))
         return replace(
@@ -356,9 +338,8 @@ class SeparableProblem:
 
     def residuals(self, evaluation):
         """Blocks of rows in order: slice, residual of the standardised target, weights or None."""
-        for chunk in self.rows.chunks(self._block_rows):
-            for part in chunk:
-                yield part, *self.residual(evaluation, part)
+        for part in self._blocks():
+            yield part, *self.residual(evaluation, part)
 
     def residual(self, evaluation, part):
         """Residual (n_outputs, n_rows) of the standardised target, and weights, of some rows."""
@@ -402,16 +383,18 @@ class SeparableProblem:
         is orthogonal to them, and h_i that of this smaller problem.
         """
         total, unit = 0.0, self._weight / n_rows
-        for chunk in self.rows.chunks(self._block_rows):
-            for part in chunk:
-                Z, target, weight = self.rows.read(part)
-                strengths, basis_rows = self._firing(evaluation, Z)
-                residual = self._residual_at(evaluation, strengths, basis_rows, target)
-                half = self._half_at(evaluation, strengths, basis_rows)
-                leverage = _leverage(half, held) / self._weight
-                residual /= np.maximum(1.0 - unit * leverage, _SMALLEST_FREEDOM)
-                squares = np.sum(residual**2, axis=0)
-                total += squares.sum() if weight is None else weight @ squares
+        for part in self._blocks():
+            Z, target, weight = self.rows.read(part)
+            strengths, basis_rows = self._firing(evaluation, Z)
+            residual = self._residual_at(evaluation, strengths, basis_rows, target)
+            half = self._half_at(evaluation, strengths, basis_rows)
+            leverage = np.einsum("ij,ij->j", half, half)
+            if held is not None:
+                taken = [np.sum((own.T @ half) ** 2, axis=0) for own in held]
+                leverage = leverage - np.stack(taken)
+            residual /= np.maximum(1.0 - unit * (leverage / self._weight), _SMALLEST_FREEDOM)
+            squares = np.sum(residual**2, axis=0)
+            total += squares.sum() if weight is None else weight @ squares
         return float(total / self._weight)
 
     def half(self, evaluation, part):
@@ -437,11 +420,3 @@ class SeparableProblem:
         blocks[:, 1:] *= self.local.spread[:, :, None]
         blocks[:, 1:] += self.local.center[:, :, None] * blocks[:, :1]
         return blocks.reshape(local.shape)
-
-
-def _leverage(half, held=None):
-    """Squares of some columns; where something is ``held``, of every output, (n_outputs, ...)."""
-    found = np.einsum("ij,ij->j", half, half)
-    if held is None:
-        return found
-    return np.stack([found - np.sum((own.T @ half) ** 2, axis=0) for own in held])

@@ -2,12 +2,10 @@ r"""The terms of one input, one after another: the gaps between them, and widths
 
 * *In order, and where there are data.* The m terms that an input has, where no two are in the same
   place, divide its range, and a little beyond, into m + 1 gaps g. What moves are the ratios of
-  neighbouring gaps, within bounds. No term can pass its neighbour or leave the data, and no gap is
-  much wider than the next.
+  neighbouring gaps, within bounds.
 * *Of a width that goes with their distance.* A term's widths grow with the mean of the gaps beside
   it. What moves besides is a factor, between the one at which the term is half true half-way to a
-  neighbour (wherever a row is between two terms, one of them is true), and the one at which it is
-  0.9 true there (two neighbours can be told apart).
+  neighbour, and the one at which it is 0.9 true there.
 
 ``is_free`` is the classic ANFIS: terms stay in order, but may leave the data by their distance, and
 be four times as wide. It fits exact data better, by rules that cannot be read.
@@ -159,13 +157,9 @@ class OrderedTerms:
     def _start(self):
         return self._reach(np.exp(self.log_gaps))
 
-    def widening(self, displacement, gaps):
+    def widening(self, gaps):
         """What the logarithms of the widths change by, beside their displacements."""
         return (self._reach(gaps) - self._start)[self.terms]
-
-    def from_widths(self, change, gaps):
-        """The displacements at which the logarithms of the widths have changed by so much."""
-        return change - (self._reach(gaps) - self._start)[self.terms]
 
     def jacobian(self, displacement):
         """Derivatives of locations and log widths by the locations' displacements."""

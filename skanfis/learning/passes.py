@@ -3,16 +3,17 @@ r"""What one pass adds up over the rows, a block at a time: the sums behind ``ob
 A pass is a function of a block, Z (n_inputs, n_rows), target (n_outputs, n_rows) and weights or
 None, that adds to its sums, arrays of the pass's ``shapes``. It holds the point at which it is
 taken and nothing of the rows: it can be sent to where the rows are (``StandardisedData.sum``),
-and only the sums come back. The formulas are in ``objective``.
+and only the sums come back.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..antecedent import Antecedent
+from ..antecedent import Antecedent, by_group, by_parameter
 from ..consequent import basis, rule_outputs
 from .gram import DesignMoments
+from .ordered_terms import terms_of
 
 _TINY = np.finfo(float).tiny
 
@@ -97,11 +98,10 @@ class SecondPass:
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
         n_rows = Z.shape[1]
-        sensitivity = np.empty((slope.size, n_rows))
         for k in range(design.n_outputs):
             by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
             by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
-            _chain(gradients, by_term, sensitivity)
+            sensitivity = by_parameter(gradients, by_term)
             # One product for D' S Phi and, the basis beginning with 1, the weighted D itself.
             products = sensitivity[:, None, :] * weighted_basis
             square += products[:, 0] @ sensitivity.T
@@ -116,27 +116,32 @@ class SecondPass:
                 )
 
     def _disagree(self, square, slope, cross, excess, strengths, gradients, weighted_basis):
-        """Add the part of V: its dV, K and L."""
+        """Add the part of V: its dV, K and L.
+
+        With g_r the derivatives of rule r's own log-strength (those of the terms it has) and
+        N = sum_r w_r g_r, d log w_r = g_r - N: K and L are sums over the few terms of each rule and
+        products with N.
+        """
         antecedent, agreement, n_raw = self.antecedent, self.agreement, slope.size
         # w_r e_r^2, where w_r may be next to nothing.
         squares = excess**2
         squares /= np.maximum(strengths, _TINY)
         weight, n_rows = weighted_basis[0], excess.shape[1]
         total = squares.sum(axis=0)
-        every = np.concatenate([g.reshape(-1, n_rows) for g in gradients] or [excess[:0]])
-        mean, change = np.empty((2, n_raw, n_rows))
-        _chain(gradients, antecedent.sum_over_rules(strengths), mean)  # N
-        _chain(gradients, antecedent.sum_over_rules(squares), change)
+        mean = by_parameter(gradients, antecedent.sum_over_rules(strengths))  # N
+        change = by_parameter(gradients, antecedent.sum_over_rules(squares))
         change -= mean * total  # e_r^2 dw_r, summed over rules
         slope -= 0.5 * agreement * (change @ weight)
         # - (change N' + N change' + total N N') / 4
         half = (0.25 * agreement * weight) * (change + 0.5 * total * mean)
         product = half @ mean.T
         square -= product + product.T
-        cross -= _outer_rows(mean, (0.5 * agreement) * weighted_basis) @ excess.T
+        outer = mean[:, None, :] * ((0.5 * agreement) * weighted_basis)
+        cross -= outer.reshape(-1, n_rows) @ excess.T
         # Of every rule, its own parameters; those that it lacks are a row of nothing at the end.
         own, size = self.design.own_parameters, n_raw + 1
-        of_rule = np.concatenate([every, np.zeros((1, n_rows))])[own]
+        every = [gradient.reshape(-1, n_rows) for gradient in gradients]
+        of_rule = np.concatenate([*every, np.zeros((1, n_rows))])[own]
         squares *= 0.25 * agreement * weight
         blocks = (of_rule * squares[:, None]) @ of_rule.transpose(0, 2, 1)
         places = (size * own[:, :, None] + own[:, None, :]).ravel()
@@ -190,33 +195,12 @@ class JointPass:
                 change = antecedent.sum_over_rules(squares)
                 change -= antecedent.sum_over_rules(strengths) * total
                 by_term -= (0.5 * agreement) * own * change
-            premises += _chain_sum(gradients, by_term)
-
-
-def _chain_sum(gradients, by_term):
-    """Sum over rows of what ``_chain`` gives, without an array of every parameter's rows."""
-    parts, term = [], 0
-    for gradient in gradients:
-        n_terms = gradient.shape[1]
-        own = by_term[term : term + n_terms]
-        parts.append(np.einsum("pti,ti->pt", gradient, own).ravel())
-        term += n_terms
-    return np.concatenate(parts) if parts else np.empty(0)
-
-
-def _chain(gradients, by_term, out):
-    """Sensitivity to every parameter: that to log mu times its derivative, group by group."""
-    row = term = 0
-    for gradient in gradients:
-        n_parameters, n_terms, _ = gradient.shape
-        target = out[row : row + n_parameters * n_terms].reshape(gradient.shape)
-        np.multiply(gradient, by_term[term : term + n_terms], out=target)
-        row, term = row + n_parameters * n_terms, term + n_terms
-
-
-def _outer_rows(rows, others):
-    """Products of every row with every one of others, (rows.shape[0] * others.shape[0], n)."""
-    return (rows[:, None, :] * others).reshape(-1, rows.shape[1])
+            # Not by ``by_parameter``: there is no need of an array of every parameter's rows.
+            parts = [
+                np.einsum("pti,ti->pt", gradient, own).ravel()
+                for gradient, own in by_group(gradients, by_term)
+            ]
+            premises += np.concatenate(parts or [premises[:0]])
 
 
 def own_parameters(antecedent):
@@ -225,14 +209,10 @@ def own_parameters(antecedent):
     Shape (n_rules, the most that a rule has); of rules that have fewer, the rest is one position
     beyond the vector.
     """
-    n_raw = antecedent.parameters.size
-    most = max([group.theta.shape[0] for group in antecedent.groups], default=0)
-    of_term = np.full((antecedent.n_terms + 1, most), n_raw)
-    start = term = 0
-    for group in antecedent.groups:
-        n_parameters, n_terms = group.theta.shape
-        rows = start + np.arange(group.theta.size).reshape(group.theta.shape)
-        of_term[term : term + n_terms, :n_parameters] = rows.T
-        start, term = start + group.theta.size, term + n_terms
+    positions = [term.positions for term in terms_of(antecedent)]
+    most = max(map(len, positions), default=0)
     # No term is the last.
+    of_term = np.full((len(positions) + 1, most), antecedent.parameters.size)
+    for row, own in zip(of_term, positions, strict=False):
+        row[: own.size] = own
     return of_term[antecedent.rule_terms].reshape(antecedent.n_rules, -1)

@@ -1,35 +1,23 @@
 r"""What the consequents pay beside their errors: for disagreement, for standing alone, for slopes.
 
-With f_r the value of rule r and y_hat = sum_r w_r f_r, the cost of a model is
+The cost of a model is, as docs/mathematics.rst explains,
 
     F = 1/2 [ MSE + lambda V + sum_c alpha_c |delta_c|^2 + sum_j rho_j b_j^2 ] ,
 
-    V = mean over rows of  sum_r w_r (f_r - y_hat)^2 ,
-
 and every part is quadratic in the consequents beta.
 
-*Agreement*, lambda. Because sum_r w_r = 1, for every row
+*Agreement*, lambda. V, the mean over rows of sum_r w_r (f_r - y_hat)^2, is the disagreement of
+rules that fire on the same row. With G the Gram matrix of the design, V = beta' Q beta with
+Q = B - G, where B is block diagonal and its block of rule r the row sum over r' of the blocks
+G_(r, r'): nothing else is accumulated.
 
-    sum_r w_r (y - f_r)^2 = (y - y_hat)^2 + sum_r w_r (f_r - y_hat)^2
+*The rules' common line* b, alpha_c. It is the line of least squares through all rules. delta_r is
+how much rule r differs from it, in its value at its own centre and in its slopes times the distance
+to the farthest row for which it stands (see ``SeparableProblem``). ``departures`` says which parts
+delta_c this has; alpha_c is alpha times one of ``pulls``, whose geometric mean is one.
 
-(the ambiguity decomposition of Krogh and Vedelsby 1995): local learning, in which every rule is a
-model of the rows on which it fires, is global learning plus V, the *disagreement* of rules that
-fire on the same row. lambda = 0 lets rules compensate one another at will, lambda = 1 is local
-learning, and as lambda grows beyond all rules become one line. With G the Gram matrix of the
-design, V = beta' Q beta with Q = B - G, where B is block diagonal and its block of rule r the row
-sum over r' of the blocks G_(r, r'): nothing else is accumulated.
-
-*The rules' common line*, alpha_c. Disagreement is weighed by the rows and says nothing where there
-are none. There a pull of each rule by itself holds it: delta_r is how much the rule differs from
-the rules' common line b, in its value at its own centre and in its slopes times the distance to
-the farthest row for which it stands (see ``SeparableProblem``). b is the line of least squares
-through all rules, that for which sum_r |delta_r|^2 is smallest. What a departure concerns, one
-input alone, or how one input's part depends on another, are components with a pull each (see
-``departures``): alpha times one of ``pulls``, whose geometric mean is one.
-
-*The slopes b_j of that line* have a plain ridge, rho_j, with a weight for the slope by each input:
-rho times one of ``slope_pulls``. Of a single rule it is all there is. Nothing pulls on the line's
-height: constants are free.
+*The slopes b_j of that line* have a plain ridge: rho_j is rho times one of ``slope_pulls``. Nothing
+pulls on the line's height.
 """
 
 from dataclasses import dataclass, field
@@ -44,8 +32,6 @@ from .departures import Departures
 
 # What comes first in a row of weights; after these, those on all slopes and on all components.
 WEIGHTS = ("agreement", "stiffness")
-# Penalties whose weights are kept.
-_MOST_KNOWN = 8
 
 
 @dataclass(frozen=True)
@@ -75,17 +61,6 @@ class Penalty:
     def rho(self):
         """The weight of the common line's slopes."""
         return self.alpha if self.slope is None else self.slope
-
-    def weights(self, slopes, components):
-        """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
-        found = np.empty(len(WEIGHTS) + len(slopes) + len(components))
-        found[:2] = self.agreement, self.stiffness
-        first = 2 + len(slopes)
-        found[2:first] = [self.slope_pulls.get(j, 1.0) for j in slopes]
-        found[first:] = [self.pulls.get(component, 1.0) for component in components]
-        found[2:first] *= self.rho
-        found[first:] *= self.alpha
-        return found
 
 
 def mean_and_parts(weights, names):
@@ -171,7 +146,6 @@ class CommonLine:
         self._per_unit = extent.mean(axis=0) / local.spread
         self._function = {j: k for k, j in enumerate(slopes) if j is not None}
         self._free: dict[tuple, np.ndarray] = {}
-        self._known: dict[int, tuple[Penalty, np.ndarray]] = {}
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
 
@@ -228,15 +202,11 @@ class CommonLine:
         return linalg.helmert(rules.size) @ self.of_slopes(j, rules)
 
     def weights(self, penalty: Penalty):
-        """All weights of a penalty, in a row; not to be changed."""
-        # The same few penalties are asked about again and again; kept, none is mistaken for them.
-        known = self._known.get(id(penalty))
-        if known is None:
-            while len(self._known) >= _MOST_KNOWN:
-                del self._known[next(iter(self._known))]
-            known = penalty, penalty.weights(self.slopes, self.departures.components)
-            self._known[id(penalty)] = known
-        return known[1]
+        """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
+        rho, alpha = penalty.rho, penalty.alpha
+        slopes = [rho * penalty.slope_pulls.get(j, 1.0) for j in self.slopes]
+        components = [alpha * penalty.pulls.get(one, 1.0) for one in self.departures.components]
+        return np.array([penalty.agreement, penalty.stiffness, *slopes, *components], dtype=float)
 
     def squares(self, coefficients):
         """Of every slope, and of every component of the departures; local, summed over outputs."""

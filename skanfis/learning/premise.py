@@ -87,7 +87,7 @@ class Premise:
         for row in self._ordered:
             gaps = row.gaps(displacement)
             raw[row.locations] = row.low + np.cumsum(gaps)[:-1]
-            raw[row.widths] += row.widening(displacement, gaps)
+            raw[row.widths] += row.widening(gaps)
         return raw
 
     def displacement(self, parameters):
@@ -96,7 +96,7 @@ class Premise:
         for row in self._ordered:
             gaps = row.gaps_of(parameters[row.locations])
             x[row.locations] = row.from_gaps(gaps)
-            x[row.widths] = row.from_widths(x[row.widths], gaps)
+            x[row.widths] -= row.widening(gaps)
         # What stands on an edge stays there whatever rounding says: it is what does not move.
         for edge in (self.lower, self.upper):
             x = np.where(np.abs(x - edge) < _ON_EDGE, edge, x)

@@ -10,7 +10,7 @@ The number is the fractional part of a multiple of the fingerprint, which is con
 rounding errors of the standardisation move it by about 1e-11, and with it no row past another.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -28,44 +28,6 @@ _TURNS = 8192.0
 _MARGIN = 1.25
 
 
-@dataclass(frozen=True, eq=False)
-class _Drawn:
-    """Rows by their numbers: raw X, y, weight, fingerprint, number, and group (or None) of each."""
-
-    columns: tuple[np.ndarray, ...]
-    groups: np.ndarray | None
-
-    @property
-    def size(self):
-        return self.columns[0].shape[0]
-
-    @staticmethod
-    def of_all(parts):
-        """The rows of several."""
-        columns = zip(*(part.columns for part in parts), strict=True)
-        groups = [part.groups for part in parts]
-        return _Drawn(
-            tuple(map(np.concatenate, columns)),
-            None if groups[0] is None else np.concatenate(groups),
-        )
-
-    def taken(self, places):
-        """Some of the rows."""
-        groups = None if self.groups is None else self.groups[places]
-        return _Drawn(tuple(column[places] for column in self.columns), groups)
-
-    def smallest(self, most):
-        """Each row once, with the weight of all; at most so many, by their numbers."""
-        rows = self.taken(np.argsort(self.columns[3], kind="stable"))
-        X, y, weight, prints, numbers = rows.columns
-        first = np.flatnonzero(np.diff(prints, prepend=-np.inf))
-        if first.size:
-            sums = np.zeros(rows.size)
-            sums[first] = np.add.reduceat(weight, first)
-            rows = replace(rows, columns=(X, y, sums, prints, numbers))
-        return rows.taken(first[np.argsort(numbers[first], kind="stable")[:most]])
-
-
 def is_many(rows):
     """Whether the premises are found on a sample."""
     return rows.n_rows > MANY_ROWS
@@ -77,28 +39,44 @@ def with_sample(rows, most=None):
     # The second limit is for rows that repeat each other, of which the first brings too few.
     for limit in (_MARGIN * most / rows.n_rows, 1.0):
         drawn = rows.reduce(partial(_draw, most=most, limit=limit), partial(_join, most=most))
-        if drawn.size == most:
+        if len(drawn[0]) == most:
             break
-    X, y, weight, _, _ = drawn.columns
+    X, y, weight, _, _, *groups = drawn
     weight = None if (weight == 1.0).all() else weight
-    sample = StandardisedData(X, y, weight, rows.inputs, rows.targets, drawn.groups)
+    sample = StandardisedData(X, y, weight, rows.inputs, rows.targets, *groups)
     return replace(rows, sample=sample)
 
 
-def _join(one, other, most):
-    return _Drawn.of_all([one, other]).smallest(most)
-
-
 def _draw(rows, most, limit):
-    """Of some rows in memory, those of the smallest numbers, below ``limit``."""
+    """Of some rows in memory, those of the smallest numbers, below ``limit``.
+
+    A list of raw X, y, weights, fingerprints and numbers, and groups where the rows have some.
+    """
     found, n_found = [_of_block(rows, slice(0, 0), limit)], 0
     for part in row_blocks(rows.n_rows, BLOCK_ROWS):
         found.append(_of_block(rows, part, limit))
-        n_found += found[-1].size
+        n_found += len(found[-1][0])
         if n_found > 2 * most:
-            found = [_Drawn.of_all(found).smallest(most)]
-            n_found = found[0].size
-    return _Drawn.of_all(found).smallest(most)
+            found = [_smallest(found, most)]
+            n_found = len(found[0][0])
+    return _smallest(found, most)
+
+
+def _join(one, other, most):
+    return _smallest([one, other], most)
+
+
+def _smallest(parts, most):
+    """Each row of all parts once, with the weight of all; at most so many, by their numbers."""
+    columns = [np.concatenate(of_all) for of_all in zip(*parts, strict=True)]
+    order = np.argsort(columns[3], kind="stable")
+    columns = [column[order] for column in columns]
+    _, _, weight, prints, numbers, *_ = columns
+    first = np.flatnonzero(np.diff(prints, prepend=-np.inf))
+    if first.size:
+        weight[first] = np.add.reduceat(weight, first)
+    kept = first[np.argsort(numbers[first], kind="stable")[:most]]
+    return [column[kept] for column in columns]
 
 
 def _of_block(rows, part, limit):
@@ -106,13 +84,11 @@ def _of_block(rows, part, limit):
     prints = fingerprint(np.concatenate([Z, target]))
     numbers = (_TURNS * prints) % 1.0
     kept = np.flatnonzero(numbers < limit)
-    return _Drawn(
-        (
-            np.asarray(rows.X[part], dtype=float)[kept],
-            np.asarray(rows.y[part], dtype=float)[kept],
-            np.ones(kept.size) if weight is None else weight[kept],
-            prints[kept],
-            numbers[kept],
-        ),
-        None if rows.groups is None else rows.groups[part][kept],
-    )
+    return [
+        np.asarray(rows.X[part], dtype=float)[kept],
+        np.asarray(rows.y[part], dtype=float)[kept],
+        np.ones(kept.size) if weight is None else weight[kept],
+        prints[kept],
+        numbers[kept],
+        *([] if rows.groups is None else [rows.groups[part][kept]]),
+    ]

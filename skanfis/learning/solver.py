@@ -14,7 +14,7 @@ from sklearn.base import BaseEstimator
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
-__all__ = ["MESSAGES", "LeastSquares", "Solver", "SolverResult", "Watch", "lse"]
+__all__ = ["MESSAGES", "LeastSquares", "Solver", "SolverResult", "Watch"]
 
 # Called with the number of the iteration and the evaluation there; what is true ends the run.
 Watch = Callable[[int, Evaluation], bool]
@@ -145,16 +145,6 @@ class Solver(BaseEstimator, ABC):
         """
 
 
-def lse(problem, premise, *, start=None, on_iteration=None):
-    """Solve for the consequents; the one solve counts as an iteration."""
-    x = np.zeros(premise.size) if start is None else start
-    evaluation = problem.evaluate(premise.parameters(x))
-    if on_iteration is not None:
-        on_iteration(1, evaluation)
-    loss_curve = np.full(2, evaluation.mean_squared_error)
-    return SolverResult(evaluation, loss_curve, 1, "no_premise")
-
-
 class LeastSquares(Solver):
     """Least squares alone: the premises stay as they start, the consequents are solved for once.
 
@@ -174,4 +164,10 @@ class LeastSquares(Solver):
     def solve(
         self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
     ) -> SolverResult:
-        return lse(problem, premise, start=start, on_iteration=on_iteration)
+        x = np.zeros(premise.size) if start is None else start
+        evaluation = problem.evaluate(premise.parameters(x))
+        # The one solve counts as an iteration.
+        if on_iteration is not None:
+            on_iteration(1, evaluation)
+        loss_curve = np.full(2, evaluation.mean_squared_error)
+        return SolverResult(evaluation, loss_curve, 1, "no_premise")

@@ -1,14 +1,12 @@
 r"""Slopes that several rules have in common, and slopes of zero: where the evidence asks no more.
 
-With M and P of ``evidence``, the consequents of an output have the posterior N(m, V), V = sigma^2 /
-n M^-1, and before the data N(0, V0), V0 = sigma^2 / n P^-1. That some rules have one slope by an
-input says C u = 0, C contrasts of their slopes. By the ratio of Savage and Dickey (Dickey 1971),
-what it takes from the evidence is
+The consequents of an output have the posterior N(m, V), and before the data N(0, V0). That some
+rules have one slope by an input says C u = 0, C contrasts of their slopes; with C one slope, it
+says that there is none. What it takes from the evidence (docs/mathematics.rst) is
 
-    -2 log p(C u = 0 | data) / p(C u = 0)  =  (C m)' (C V C')^-1 C m + log |C V C'| - log |C V0 C'|
+    (C m)' (C V C')^-1 C m + log |C V C'| - log |C V0 C'| ,
 
-at a given sigma. With C the slope that they have in common, or that of a single rule, it says that
-there is none. So one factorisation tells of every input and of every set of rules. What is found is
+so that one factorisation tells of every input and of every set of rules. What is found is
 conditioned on before the next is asked for; the inputs of which the rules say least come first.
 """
 

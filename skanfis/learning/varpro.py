@@ -1,27 +1,13 @@
 r"""Variable projection: trust-region Gauss-Newton steps on the reduced problem, within a box.
 
-With g and H the gradient and Gauss-Newton matrix of the reduced cost F by the premises'
-displacements x, the step minimises the model
-
-    m(s) = g's + s'Hs / 2    over |s| <= radius ,
-
-exactly, from the eigenvalues of H, among the displacements that are free to move (a displacement at
-a bound whose gradient points outward is not); what would then leave the box is put on its edge.
-With rho the ratio of the actual decrease to the model's, the radius falls to a quarter of the step
-where rho < 1/4 and doubles where rho > 3/4 and the step ends on the region's edge; the step is
-taken where rho > 1e-4 (Nocedal and Wright 2006, algorithm 4.1 and section 4.3).
-
-To the curvature that a step sees is added what keeps rounding errors from deciding it. Normalised
-strengths do not change at all along some directions (two Gaussian terms have four parameters, their
-log ratio has three coefficients), and hardly along others: slope and curvature are both noise
-there, and so would their ratio be. The addition is a small part of the largest curvature, plus the
-curvature with which moving by one must pay: a decrease of the cost by a twentieth of itself. Two
-fits to the same data in other units so take the same path (tests/test_invariance.py).
+With g and H the gradient and Gauss-Newton matrix of the reduced cost by the premises' displacements
+x, a step s minimises g's + s'Hs / 2 over |s| <= radius, exactly, from the eigenvalues of H, among
+the displacements that are free to move; what would then leave the box is put on its edge. The
+radius follows Nocedal and Wright (2006, algorithm 4.1). docs/mathematics.rst has the whole of it,
+and why a little is added to the curvature: two fits to the same data in other units so take the
+same path (tests/test_invariance.py).
 
 A rejected step costs one pass over the data, an accepted one two (see ``objective``).
-
-``stiffness`` adds stiffness/2 |x|^2 to the cost, which draws the premises to their start. There is
-nothing to choose otherwise: displacements have no unit, so that one radius serves all problems.
 """
 
 from numbers import Real
@@ -73,25 +59,6 @@ def trust_region_step(gradient, hessian, radius, damping=0.0):
         # Newton on 1 / |s(damping)| = 1 / radius, which converges from this side without overshoot.
         damping += (length / radius - 1.0) * length**2 / np.sum(step**2 / (values + damping))
     return -vectors @ step
-
-
-class _ReducedCost:
-    """F(x) + stiffness/2 |x|^2 over displacements."""
-
-    def __init__(self, problem, premise, stiffness):
-        self.problem, self.premise, self.stiffness = problem, premise, stiffness
-
-    def evaluate(self, x, reference=None):
-        evaluation = self.problem.evaluate(self.premise.parameters(x), reference)
-        return evaluation, self.of(x, evaluation)
-
-    def of(self, x, evaluation):
-        return evaluation.cost + 0.5 * self.stiffness * (x @ x)
-
-    def linearise(self, x, evaluation):
-        raw = self.problem.linearise(evaluation)
-        gradient, curvature = self.premise.pull_back(x, raw.gradient, raw.gauss_newton)
-        return gradient + self.stiffness * x, curvature
 
 
 def _free(x, gradient, premise):
@@ -149,16 +116,17 @@ def varpro(
     -------
     SolverResult
     """
-    cost_of = _ReducedCost(problem, premise, stiffness)
     x = np.zeros(premise.size) if start is None else start
     current = problem.evaluate(premise.parameters(x)) if evaluation is None else evaluation
-    cost = cost_of.of(x, current)
+    cost = current.cost + 0.5 * stiffness * (x @ x)
     loss_curve = [current.mean_squared_error]
     status = "max_iter" if premise.size else "no_premise"
     radius, settled, n_iter = _FIRST_RADIUS, 0, 0
     curvature = None
     while premise.size and n_iter < max_iter:
-        gradient, curvature = cost_of.linearise(x, current)
+        raw = problem.linearise(current)
+        gradient, curvature = premise.pull_back(x, raw.gradient, raw.gauss_newton)
+        gradient = gradient + stiffness * x
         hessian = curvature + stiffness * np.eye(x.size)
         free = _free(x, gradient, premise)
         steepest = float(np.max(np.abs(gradient[free]), initial=0.0))
@@ -169,7 +137,8 @@ def varpro(
             damping = _WORTH * cost
             trial_x, step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
             length = float(np.linalg.norm(step))
-            trial, trial_cost = cost_of.evaluate(trial_x, current.coefficients)
+            trial = problem.evaluate(premise.parameters(trial_x), current.coefficients)
+            trial_cost = trial.cost + 0.5 * stiffness * (trial_x @ trial_x)
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
             accepted = ratio > _ACCEPTED_RATIO
             if not ratio >= 0.25:  # also where the trial is not finite

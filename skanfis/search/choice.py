@@ -1,15 +1,14 @@
 r"""One rule of choice: of all candidates that are next to the best, the one that is read soonest.
 
 With e^2 the squared error expected of new rows and v that of the mean, a candidate is within the
-tolerance of ``simplicity`` s where
+tolerance of ``simplicity`` s where (docs/mathematics.rst says why)
 
-    e^2 - e_best^2  <=  ((1 + s)^2 - 1) min(e_best^2, v - e_best^2) :
+    e^2 - e_best^2  <=  ((1 + s)^2 - 1) min(e_best^2, v - e_best^2) .
 
-s of the error where the signal is clear, and no more than that part of what the best explains where
-it is weak. Of all within it that have no more rules than the best, the one that costs least to read
-is taken; of equal cost, that with the smaller error. Slopes in common are a claim about each rule:
-what the rules err one by one, e^2 + V by the ambiguity decomposition (see ``penalty``), must stay
-below v, or within the tolerance too. What is left of it goes into agreement (``start``).
+Of all within it that have no more rules than the best, the one that costs least to read is taken;
+of equal cost, that with the smaller error. Slopes in common are a claim about each rule: what the
+rules err one by one, e^2 and their disagreement, must stay below v, or within the tolerance too.
+What is left of it goes into agreement (``start``).
 """
 
 from dataclasses import dataclass

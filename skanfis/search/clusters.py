@@ -1,10 +1,8 @@
 r"""Scattered rules from clusters: one rule where the data gather.
 
-Clusters are sought in standardised inputs and target together, as is the custom since genfis2
-(Chiu 1994), so that rules part where the target bends and not only where the inputs are dense. A
-rule's terms stand at the mean of its cluster; their widths are the cluster's standard deviations
-times sqrt(d), for the distance from the centre grows as sqrt(d) in d inputs and rules would
-otherwise hardly overlap.
+Clusters are sought in standardised inputs and target together. A rule's terms stand at the mean of
+its cluster; their widths are the cluster's standard deviations times sqrt(d), for the distance from
+the centre grows as sqrt(d) in d inputs and rules would otherwise hardly overlap.
 """
 
 import numpy as np

@@ -1,14 +1,13 @@
 r"""Grid partition: terms over the range of every input, close together where the data are dense.
 
-Evenly spaced terms waste themselves on a range that is mostly empty, as those of a heavy-tailed
-input are: rules stand there on a handful of rows. So terms stand at even steps of
+Terms stand at even steps of
 
     G(x) = sum of (gap between neighbouring values)^(2/3) up to x ,
 
-which is where the optimal quantiser of a density f has its points: as dense as f^(1/3) (Panter and
-Dite 1951). Even values give even terms; and no step is in units of the input, so that none depends
-on them. The outer terms stand at quantiles and not at the outermost row. No two neighbouring gaps
-differ by more than a factor: a term has one width, which has to reach into both.
+which is where the optimal quantiser has its points (Panter and Dite 1951): evenly spaced terms
+waste themselves on a range that is mostly empty. The outer terms stand at quantiles and not at the
+outermost row. No two neighbouring gaps differ by more than a factor: a term has one width, which
+has to reach into both.
 """
 
 import numpy as np

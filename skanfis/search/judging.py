@@ -1,9 +1,9 @@
 r"""What is expected of new rows: the error on rows that had no part in anything.
 
-A sequence of candidates is grown anew, from the clusters and the choice of inputs on, without some
-of the rows, and its members are judged on these, size by size, as CART's trees are. With few rows
-in five folds; with many, half of the rows are enough to grow and half to judge, once. Rows that
-come in groups, runs of an instrument say, are left out in whole groups, a fifth of them at a time.
+A sequence of candidates is grown anew without some of the rows, and its members are judged on
+these, size by size. With few rows in five folds; with many, half of the rows are enough to grow and
+half to judge, once. Rows that come in groups, runs of an instrument say, are left out in whole
+groups, a fifth of them at a time.
 
 Rows are dealt in the order of their target, so that neither the order in which they come nor that
 of the columns makes a difference; what is equal in all columns is one row with a weight.

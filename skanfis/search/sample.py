@@ -44,15 +44,6 @@ def counting_weight(rows: StandardisedData):
     return weight * (effective_weight(rows) / weight.sum())
 
 
-def _fingerprints(rows: StandardisedData):
-    """A number for every row of standardised inputs and target."""
-    numbers = np.empty(rows.n_rows)
-    for chunk in rows.chunks(_MOST_ROWS):
-        for part in chunk:
-            numbers[part] = fingerprint(rows.table(part).T)
-    return numbers
-
-
 def representative_rows(rows: StandardisedData, most=_MOST_ROWS):
     """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
 
@@ -67,7 +58,7 @@ def representative_rows(rows: StandardisedData, most=_MOST_ROWS):
         The first row of each.
     """
     weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
-    numbers = _fingerprints(rows)
+    numbers = rows.fingerprints()
     order = np.argsort(numbers, kind="stable")
     first = np.flatnonzero(np.diff(numbers[order], prepend=-np.inf))
     distinct, weight = order[first], np.add.reduceat(weight[order], first)

@@ -7,9 +7,7 @@ the statistic is the sum over b of
 
     (sum s w (h - p) b r)^2 / sum s w (h - p)^2 b^2 ,
 
-in deviations from what noise alone would give it: how much a value and slopes that differ between
-the two sides would explain. The slopes by other inputs are in it, so that a product of two inputs
-shows at the first cut of one of them.
+in deviations from what noise alone would give it.
 """
 
 from dataclasses import dataclass

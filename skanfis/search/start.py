@@ -27,7 +27,6 @@ from .tuning import (
     Tuned,
     cost_of,
     scaled,
-    settled,
     tune,
     tune_unbounded,
     with_most_agreement,
@@ -38,6 +37,8 @@ from .tuning import (
 _LESS_ERROR = 0.9
 # The weights of rules that are given are found on at most so many representative rows.
 _MOST_ROWS = 1000
+# Of displacements, in spacings of terms: rounding errors stay below.
+_DIGITS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +63,12 @@ def started(tuned: Tuned, plan: Plan, left: float, candidates, is_free=False) ->
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
     low, high = problem.rows.inputs.box
     premise = Premise.of(problem.antecedent, low, high, is_free)
-    tuned = with_most_agreement(tuned, premise, plan.free, n_rows, left)
+    tuned = with_most_agreement(tuned, premise, plan.free, left)
     return Start(
         problem.antecedent,
         scaled(tuned.penalty, plan.free, n_rows / plan.n_all, tuned.agreement_is_raised),
-        settled(tuned.displacement),
+        # Training goes on from there, without the digits that rounding errors reach.
+        np.round(tuned.displacement, _DIGITS),
         is_free,
         tuned.agreement_is_raised,
         candidates,

@@ -55,8 +55,6 @@ _NO_WEIGHT, _UNBOUNDED_ITERATIONS = 1e-12, 25
 # Agreement: beyond the last weight, all rules are one line; less of a rise is not worth a training.
 _MOST_RAISES, _HALVINGS, _LEAST_RAISE = 3, 8, 2.0
 _MOST_AGREEMENT = 1.0
-# Of displacements, in spacings of terms: rounding errors stay below.
-_DIGITS = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +122,6 @@ def tune(
     n_rows: float,
     turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
-    has_least=True,
     begun: Tuned | None = None,
 ) -> Tuned:
     """Find the free weights, and the premises that go with them.
@@ -142,8 +139,6 @@ def tune(
         Most turns of the premises; with 0 they stay where they are.
     first_steps : int
         Steps of the weights before the premises move.
-    has_least : bool
-        Whether weights stay above those of ``least_weights``.
     begun : Tuned, optional
         What earlier turns have found: these go on from there.
     """
@@ -153,24 +148,21 @@ def tune(
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
     if begun is not None and begun.is_trained:
-        return _risen(begun, premise, free, n_rows, turns, steps, has_least)
+        return _risen(begun, premise, free, turns, steps)
     if begun is not None:
         x, evaluation = begun.displacement, begun.evaluation
     else:
         x = np.zeros(premise.size)
         evaluation = problem.evaluate(premise.parameters(x))
-    posterior = _improved(
-        problem, evaluation, x, problem.penalty, first_steps, free, n_rows, has_least
-    )
-    penalty = posterior.penalty
-    start = Tuned(problem.with_penalty(penalty), evaluation, x, posterior)
+    start = _improved(problem, evaluation, x, problem.penalty, first_steps, free, n_rows)
     if premise.size == 0 or turns == 0:
         return start
+    penalty = start.penalty
     if "stiffness" in free:
-        stiffness = posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
+        stiffness = start.posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
         penalty = replace(penalty, stiffness=stiffness)
-    first = _turned(start, premise, penalty, free, n_rows, _ITERATIONS, steps, has_least)
-    return _risen(first, premise, free, n_rows, turns - 1, steps, has_least)
+    first = _turned(start, premise, penalty, free, steps)
+    return _risen(first, premise, free, turns - 1, steps)
 
 
 def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: float) -> Tuned:
@@ -182,19 +174,16 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: fl
     nothing: dict[str, Any] = dict.fromkeys(free, _NO_WEIGHT)
     penalty = replace(problem.penalty, **nothing)
     evaluation = problem.evaluate(premise.parameters(x))
-    posterior = _improved(problem, evaluation, x, penalty, 0, free, n_rows, False)
-    start = Tuned(problem, evaluation, x, posterior)
-    first = _turned(
-        start, premise, penalty, free, n_rows, _UNBOUNDED_ITERATIONS, FIRST_STEPS, False
-    )
-    return _risen(first, premise, free, n_rows, MOST_TURNS - 1, _STEPS, False)
+    start = _improved(problem, evaluation, x, penalty, 0, free, n_rows)
+    first = _turned(start, premise, penalty, free, FIRST_STEPS, _UNBOUNDED_ITERATIONS, False)
+    return _risen(first, premise, free, MOST_TURNS - 1, _STEPS, has_least=False)
 
 
-def _risen(tuned: Tuned, premise, free, n_rows, turns, steps, has_least) -> Tuned:
+def _risen(tuned: Tuned, premise, free, turns, steps, has_least=True) -> Tuned:
     """The turn of the largest evidence, of so many more."""
     best = last = tuned
     for _ in range(turns):
-        last = _turned(last, premise, last.penalty, free, n_rows, _ITERATIONS, steps, has_least)
+        last = _turned(last, premise, last.penalty, free, steps, has_least=has_least)
         rises = last.score < best.score - _RISE
         best = last if last.score < best.score else best
         if not rises:
@@ -203,9 +192,12 @@ def _risen(tuned: Tuned, premise, free, n_rows, turns, steps, has_least) -> Tune
 
 
 def _turned(
-    tuned: Tuned, premise, penalty, free, n_rows, iterations, steps, has_least=True
+    tuned: Tuned, premise, penalty, free, steps, iterations=_ITERATIONS, has_least=True
 ) -> Tuned:
-    """One turn from where the last one ended: premises down the cost, then weights up."""
+    """One turn from where the last one ended: premises down the cost, then weights up.
+
+    ``has_least``: whether weights stay above those of ``least_weights``.
+    """
     problem = tuned.problem.with_penalty(penalty)
     result = varpro(
         problem,
@@ -220,16 +212,14 @@ def _turned(
     x = premise.displacement(evaluation.antecedent.parameters)
     # One step before the end as a rule, and as good there: another pass is not worth it.
     curvature = np.maximum(np.linalg.eigvalsh(result.gauss_newton), 0.0)
-    posterior = _improved(
-        problem, evaluation, x, penalty, steps, free, n_rows, has_least, curvature
-    )
-    return Tuned(problem.with_penalty(posterior.penalty), evaluation, x, posterior)
+    n_rows = tuned.posterior.n_rows
+    return _improved(problem, evaluation, x, penalty, steps, free, n_rows, curvature, has_least)
 
 
 def _improved(
-    problem, evaluation, x, penalty, steps, free, n_rows, has_least, curvature=None
-) -> Laplace:
-    """The posterior after so many steps of the free weights, or when they stand still.
+    problem, evaluation, x, penalty, steps, free, n_rows, curvature=None, has_least=True
+) -> Tuned:
+    """The point after so many steps of the free weights, or when they stand still.
 
     Steps that are alike are taken on to where they lead, if the evidence rises there; the last is
     always a plain one.
@@ -257,7 +247,7 @@ def _improved(
         if posterior is now or posterior.minus_twice_log > now.minus_twice_log:
             posterior = posterior_at(plain)
             before = now.penalty
-    return posterior
+    return Tuned(problem.with_penalty(posterior.penalty), evaluation, x, posterior)
 
 
 def cost_of(tuned: Tuned) -> int:
@@ -267,7 +257,7 @@ def cost_of(tuned: Tuned) -> int:
     return reading_cost(problem.antecedent, n_slopes, problem.n_outputs)
 
 
-def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, left: float) -> Tuned:
+def with_most_agreement(tuned: Tuned, premise: Premise, free, left: float) -> Tuned:
     """The same with as much agreement as keeps the squared error within ``left`` of itself.
 
     The consequents alone tell how much that is at least; then the premises follow, which makes room
@@ -282,7 +272,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
         if agreement < _LEAST_RAISE * best.penalty.agreement:
             break
         penalty = replace(best.penalty, agreement=agreement)
-        found = _turned(best, premise, penalty, others, n_rows, _ITERATIONS, 0)
+        found = _turned(best, premise, penalty, others, steps=0)
         if found.expected_error <= most:
             best, agreement = found, 0.0
         else:
@@ -292,28 +282,13 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, n_rows: float, lef
 
 def with_sparse_slopes(tuned: Tuned, free) -> Tuned:
     """The same with as few slopes as the evidence allows: one for several rules, or none."""
-    problem = tuned.problem
+    problem, posterior, x = tuned.problem, tuned.posterior, tuned.displacement
     if not {"alpha", "slope"} <= set(free) or problem.n_columns > MOST_COLUMNS:
         return tuned
-    common, absent = sparse_slopes(tuned.posterior, tuned.solved.normal.coefficients)
-    penalty, n_rows = replace(tuned.penalty, common=common, absent=absent), tuned.posterior.n_rows
-    posterior = _improved(
-        problem,
-        tuned.evaluation,
-        tuned.displacement,
-        penalty,
-        0,
-        free,
-        n_rows,
-        False,
-        tuned.posterior.curvature,
-    )
-    return replace(tuned, problem=problem.with_penalty(penalty), posterior=posterior)
-
-
-def _with_penalty(tuned: Tuned, penalty: Penalty) -> Tuned:
-    """The same with the consequents of another penalty; no pass over the rows but for its error."""
-    return replace(tuned, problem=tuned.problem.with_penalty(penalty))
+    common, absent = sparse_slopes(posterior, tuned.solved.normal.coefficients)
+    penalty = replace(tuned.penalty, common=common, absent=absent)
+    n_rows, curvature = posterior.n_rows, posterior.curvature
+    return _improved(problem, tuned.evaluation, x, penalty, 0, free, n_rows, curvature)
 
 
 def _most_agreement(tuned: Tuned, most: float) -> float:
@@ -322,16 +297,13 @@ def _most_agreement(tuned: Tuned, most: float) -> float:
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         penalty = replace(tuned.penalty, agreement=float(np.exp(middle)))
-        if _with_penalty(tuned, penalty).expected_error <= most:
+        # The consequents of another penalty take no pass over the rows but for their error.
+        raised = replace(tuned, problem=tuned.problem.with_penalty(penalty))
+        if raised.expected_error <= most:
             low = middle
         else:
             high = middle
     return float(np.exp(low))
-
-
-def settled(displacement):
-    """Displacements without the digits that rounding errors reach; training goes on from there."""
-    return np.round(displacement, _DIGITS)
 
 
 def scaled(penalty: Penalty, free, ratio, agreement_is_raised=False):

@@ -2,13 +2,12 @@
 
 from .data import Fitted, SolverRun, ValidatedData, validated
 from .fit import fit_rules
-from .pruning import RuleStatistics, model_without_rules, redundant_rules
+from .pruning import model_without_rules, redundant_rules
 from .watching import Callbacks
 
 __all__ = [
     "Callbacks",
     "Fitted",
-    "RuleStatistics",
     "SolverRun",
     "ValidatedData",
     "fit_rules",

@@ -25,7 +25,7 @@ from ..policies import TargetRange
 from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
 from ..support import RuleSupport
 from .chunk_checks import check_distance
-from .pruning import RuleStatistics, redundant_rules
+from .pruning import redundant_rules
 
 # The weights of the penalty that are found where premises stay.
 _FREE = ("agreement", "alpha", "slope")
@@ -332,7 +332,7 @@ class _ProblemOfSums(SeparableProblem):
         own = self.consequent_inputs
         extent = np.maximum(sums.extent / sums.inputs.scale[own], 1.0)
         slopes = sums.inputs.varying(own)
-        self._common_line = CommonLine(self.local, extent, self.antecedent, slopes)
+        self.common_line = CommonLine(self.local, extent, self.antecedent, slopes)
 
     def mean_squares(self, evaluation):
         """Mean squared error of every standardised output."""
@@ -406,12 +406,11 @@ def solve(sums: RowSums, given, first=None) -> Solved:
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
     overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight
-    statistics = RuleStatistics(overlap, sums.strongest / sums.weight, sums.peak)
     return Solved(
         _model(sums, problem, evaluation),
         problem.penalty,
         evaluation.mean_squared_error,
-        redundant_rules(statistics),
+        redundant_rules(overlap, sums.peak),
     )
 
 

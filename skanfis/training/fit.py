@@ -13,14 +13,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from sklearn.base import BaseEstimator, clone
+from sklearn.base import clone
 from sklearn.exceptions import ConvergenceWarning
 
 from .._threads import map_in_threads
 from .._validation import warn_user
 from ..bounds.fitting import constrained, held_in_search
 from ..inspection.anova import input_marginals
-from ..learning import SOLVERS, LeastSquares, Solver, VariableProjection
+from ..learning import LeastSquares, VariableProjection
 from ..learning.covariance import posterior_of
 from ..learning.data import StandardisedData
 from ..learning.objective import SeparableProblem
@@ -31,7 +31,7 @@ from ..options import EarlyStopping, Huber, policy_of
 from ..search import Start, StructureRequest, effective_weight, report_constant
 from .data import Fitted, SolverRun, ValidatedData
 from .freezing import ModelBuilder, as_given, extrapolation_distance
-from .pruning import redundant_rules, rule_statistics
+from .pruning import redundant_rules
 from .robust import (
     huber_weights,
     reweighted,
@@ -39,6 +39,7 @@ from .robust import (
     without_outliers,
     without_weight,
 )
+from .settings import solver_of
 from .watching import Callbacks, Printer, ValidationLoss, hold_out, watch_all
 
 # Part of tol that a sample of many rows is trained to: its iterations cost next to nothing, and
@@ -87,11 +88,12 @@ class _Fit:
     def __init__(self, estimator, data, request, callbacks):
         self.estimator, self.data, self.callbacks = estimator, data, callbacks
         self.printer = Printer(type(estimator).__name__) if estimator.verbose else None
-        self.solver: Solver = _object_for(estimator.solver, SOLVERS)
-        if estimator.max_iter == 0:
-            self.solver = LeastSquares()
-        self.huber = _object_for(estimator.loss, {"huber": Huber, "squared_error": None})
-        self.stopping = _object_for(estimator.early_stopping, {True: EarlyStopping, False: None})
+        self.solver = solver_of(estimator) if estimator.max_iter > 0 else LeastSquares()
+        self.huber, self.stopping = estimator.loss, estimator.early_stopping
+        if not isinstance(self.huber, Huber):
+            self.huber = Huber() if self.huber == "huber" else None
+        if not isinstance(self.stopping, EarlyStopping):
+            self.stopping = EarlyStopping() if self.stopping else None
         self.map_ordered = map_in_threads(estimator.n_jobs)
         self.rows, self.trained_on, self.held_out = data.rows(), slice(None), None
         if self.stopping is not None:
@@ -258,7 +260,7 @@ class _Fit:
             model,
             run.result,
             run.start,
-            redundant_rules(rule_statistics(rows, firing)),
+            redundant_rules(firing.overlap / rows.total_weight, firing.peak),
             None if weights is None else self.data.spread_over_rows(weights, self.trained_on),
             run.validation_losses,
         )
@@ -288,11 +290,3 @@ class _Fit:
             result=replace(run.result, evaluation=kept.evaluation),
             constraints=report,
         )
-
-
-def _object_for(given, by_word):
-    """The object that a word stands for, or that is given in its place; None for no object."""
-    if isinstance(given, BaseEstimator):
-        return given
-    of_word = by_word[given]
-    return None if of_word is None else of_word()

@@ -1,13 +1,9 @@
 r"""From where a run has ended to the frozen model, in the user's units.
 
 How far beyond the data the tangent may be followed is told by the outermost rows. Had the box ended
-at the quartiles of every input, most rows would have been beyond it. With e(L) their mean squared
-error where the tangent is followed for L standard deviations of every input, and sigma the noise of
-the rows, the distance is
-
-    argmin_L e(L)   where   e(L) + sigma^2 < (e(1/2) + sigma^2) / 4 ,
-
-half the error; else it is a half. Distances beyond the outermost row all tell the same, and the
+at the quartiles of every input, most rows would have been beyond it. The distance is that at which
+the tangent from there errs least, if noise and error are then below a quarter of what they are at
+half a deviation; else it is a half. Distances beyond the outermost row all tell the same, and the
 least of them counts.
 """
 
@@ -33,7 +29,7 @@ from ..search import (
     weighted_quantile,
 )
 from .data import Fitted, ValidatedData
-from .pruning import redundant_rules, rule_statistics
+from .pruning import redundant_rules
 
 _DISTANCES = (MAX_EXTRAPOLATION, 1.0, 2.0, 5.0, 20.0, FARTHEST)
 # Less of the squared error is more than chance: with a half in place of a quarter, one fit in
@@ -68,17 +64,15 @@ class ModelBuilder:
         rows, trained = self.rows, evaluation.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
         firing = self.firing(evaluation) if firing is None else firing
+        slopes, order = self.request.consequent_inputs, self.request.order
         coefficients = with_common_slopes(
-            evaluation.coefficients,
-            evaluation.masses,
-            start.penalty.common,
-            self.request.consequent_inputs,
+            evaluation.coefficients, evaluation.masses, start.penalty.common, slopes
         )
         support = rule_support(rows, trained, self.n_coefficients, firing)
         model = TSKModel(
             antecedent=trained.change_units(offset, scale),
             initial_antecedent=start.antecedent.change_units(offset, scale),
-            coefficients=self.in_user_units(coefficients),
+            coefficients=in_user_units(coefficients, rows.inputs, rows.targets, slopes, order),
             reference=offset,
             spread=scale,
             minimum=rows.inputs.minimum,
@@ -106,13 +100,6 @@ class ModelBuilder:
         found = np.clip(found, rows.inputs.minimum, rows.inputs.maximum)
         return np.where(held, found, np.nan)
 
-    def in_user_units(self, coefficients):
-        """Consequents about the inputs' means, from those on [1, z] of standardised data."""
-        inputs, targets, request = self.rows.inputs, self.rows.targets, self.request
-        return in_user_units(
-            coefficients, inputs, targets, request.consequent_inputs, request.order
-        )
-
 
 def as_given(estimator, data, model) -> Fitted:
     """The imported model itself, with its error on the data."""
@@ -133,7 +120,7 @@ def as_given(estimator, data, model) -> Fitted:
     residual = (data.y - answering.predict(data.X)) / rows.targets.scale
     loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)
     firing = RuleFiring.of(rows, imported_antecedent(model, rows), 0)
-    redundant = redundant_rules(rule_statistics(rows, firing))
+    redundant = redundant_rules(firing.overlap / rows.total_weight, firing.peak)
     result = SolverResult(None, np.full(2, loss), 0, "as_given")
     return Fitted(model, result, Start(model.antecedent, Penalty()), redundant)
 

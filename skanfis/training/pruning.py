@@ -1,21 +1,16 @@
 r"""Rules that do nothing: those that never fire, and those that repeat another.
 
-A rule *never fires* where it has no say on any training row: its strength is nowhere above one in a
-hundred. It *repeats* another where their strengths are in proportion on all rows, which shows in
-their mean products over the rows O_rs = mean of w_r w_s: O_rs / sqrt(O_rr O_ss) is close to one.
-They then have one consequent between them, however it is divided. Of two that repeat one another
-the stronger one stays.
-
-:func:`model_without_rules` leaves rules out of a frozen model, for training to go on from there.
+A rule *never fires* where its strength is nowhere above one in a hundred. It *repeats* another
+where their strengths are in proportion on all rows, which shows in their mean products over the
+rows O_rs = mean of w_r w_s: O_rs / sqrt(O_rr O_ss) is close to one. They then have one consequent
+between them, however it is divided. Of two that repeat one another the stronger one stays.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 import numpy as np
 
-from ..learning.data import StandardisedData
-from ..learning.firing import RuleFiring
 from ..model import TSKModel
 from ..support import RuleSupport
 
@@ -27,26 +22,14 @@ _NEVER = 0.01
 _ALIKE = 0.9999
 
 
-@dataclass(frozen=True, eq=False)
-class RuleStatistics:
-    """How rules fire on a set of rows."""
+def redundant_rules(overlap, peak):
+    """Rules that do nothing: list of dict with "rule", "reason" and "weight", by rule.
 
-    overlap: np.ndarray  # mean of w_r w_s, (n_rules, n_rules)
-    strongest: np.ndarray  # part of the weight on which each rule is the strongest
-    peak: np.ndarray  # largest strength of each rule on any row
-
-
-def rule_statistics(rows: StandardisedData, firing: RuleFiring) -> RuleStatistics:
-    """Statistics of every rule, out of how rules have fired on these rows."""
-    weight = rows.total_weight
-    return RuleStatistics(firing.overlap / weight, firing.strongest / weight, firing.peak)
-
-
-def redundant_rules(statistics: RuleStatistics):
-    """Rules that do nothing: list of dict with "rule", "reason" and "weight", by rule."""
-    overlap = statistics.overlap
+    ``overlap`` is the mean of w_r w_s over the rows, (n_rules, n_rules), ``peak`` the largest
+    strength of each rule on any row.
+    """
     weight, own = overlap.sum(axis=1), np.sqrt(np.diagonal(overlap))
-    found = dict.fromkeys(np.flatnonzero(statistics.peak < _NEVER), "never fires")
+    found = dict.fromkeys(np.flatnonzero(peak < _NEVER), "never fires")
     strongest_first = [r for r in np.argsort(-weight, kind="stable") if r not in found]
     kept: list[int] = []
     for r in strongest_first:

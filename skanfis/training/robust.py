@@ -1,22 +1,18 @@
 r"""Huber's loss by reweighting: rows far from the model count less, those near it as ever.
 
-Huber's estimator (1964) minimises sum_i rho(r_i / s) with rho(u) = u^2 / 2 up to |u| = epsilon and
-epsilon |u| - epsilon^2 / 2 beyond. Least squares with the weights
+Least squares with the weights
 
     w_i = min(1, epsilon s / |r_i|)
 
-of the residuals before has the same minimum: weights and fit are found in turns, and one Gram
-matrix serves as before. The scale s is the median of |r| over 0.6745, a robust standard deviation,
-found anew in every turn. Of several outputs, r is the length of the row's residuals, over the root
-of their number.
+of the residuals before has the minimum of Huber's estimator (1964): weights and fit are found in
+turns, and one Gram matrix serves as before. The scale s is the median of |r| over 0.6745, a robust
+standard deviation, found anew in every turn. Of several outputs, r is the length of the row's
+residuals, over the root of their number.
 
 Before there is any model, rows far beyond all others already count less: by the residuals of a
 linear model that scikit-learn's HuberRegressor finds, beyond ten robust standard deviations. The
 target's own scale is found with these weights. A grid of many rules would otherwise spend a rule on
 each outlier before it is known for one.
-
-Weights change between runs of the solver (``fit``) and not inside one, whose steps compare costs:
-they are costs of one and the same problem only so.
 """
 
 import warnings
@@ -26,7 +22,7 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
-from ..blocks import BLOCK_ROWS
+from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import column_statistics
 
 # The median of |u| for a standard normal u.
@@ -67,14 +63,13 @@ def robust_start(rows):
     if lines is None:
         return rows, weights
     sizes = np.empty(rows.n_rows)
-    for chunk in rows.chunks(BLOCK_ROWS):
-        for part in chunk:
-            Z, target, _ = rows.read(part)
-            squares = [
-                ((values - center) / spread - line.predict(Z.T)) ** 2
-                for values, (center, spread, line) in zip(target, lines, strict=True)
-            ]
-            sizes[part] = np.sqrt(np.mean(squares, axis=0))
+    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
+        Z, target, _ = rows.read(part)
+        squares = [
+            ((values - center) / spread - line.predict(Z.T)) ** 2
+            for values, (center, spread, line) in zip(target, lines, strict=True)
+        ]
+        sizes[part] = np.sqrt(np.mean(squares, axis=0))
     scale = _weighted_median(sizes, rows.sample_weight) / _NORMAL_MEDIAN
     if scale == 0.0:
         return rows, weights

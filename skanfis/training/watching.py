@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from sklearn.model_selection import GroupShuffleSplit
 
-from ..blocks import BLOCK_ROWS
+from ..blocks import BLOCK_ROWS, row_blocks
 from ..consequent import basis, rule_outputs
-from ..learning.data import StandardisedData, fingerprint
+from ..learning.data import StandardisedData
 
 
 def watch_all(*watchers):
@@ -19,8 +19,8 @@ def watch_all(*watchers):
         return None
 
     def watch(n_iter, evaluation):
-        constraints = [watcher(n_iter, evaluation) for watcher in present]
-        return any(constraints)
+        asked_to_stop = [watcher(n_iter, evaluation) for watcher in present]
+        return any(asked_to_stop)
 
     return watch
 
@@ -100,7 +100,7 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
     what = f"{rows.n_rows} rows"
     groups = rows.groups
     if groups is None:
-        groups = _equal_rows(rows)
+        groups = rows.fingerprints(of_inputs=True)
     else:
         what += f" in {np.unique(groups).size} groups"
     splitter = GroupShuffleSplit(1, test_size=validation_fraction, random_state=seed)
@@ -116,15 +116,6 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
             "early_stopping=False."
         )
     return training, validation
-
-
-def _equal_rows(rows):
-    """One number per row, the same for rows of equal inputs."""
-    numbers = np.empty(rows.n_rows)
-    for chunk in rows.chunks(BLOCK_ROWS):
-        for part in chunk:
-            numbers[part] = fingerprint(rows.read(part)[0])
-    return numbers
 
 
 class ValidationLoss:
@@ -175,13 +166,12 @@ def held_out_loss(rows: StandardisedData, consequent_inputs, evaluation):
     coefficients = evaluation.coefficients
     by_rule = coefficients.reshape(evaluation.antecedent.n_rules, -1, coefficients.shape[1])
     total = 0.0
-    for chunk in rows.chunks(BLOCK_ROWS):
-        for part in chunk:
-            Z, target, weight = rows.read(part)
-            np.clip(Z, low, high, out=Z)
-            strengths = evaluation.antecedent.strengths(Z)
-            basis_rows = basis(Z[consequent_inputs])
-            for k, one in enumerate(by_rule.transpose(2, 0, 1)):
-                squares = (target[k] - rule_outputs(one, strengths, basis_rows)[1]) ** 2
-                total += squares.sum() if weight is None else weight @ squares
+    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
+        Z, target, weight = rows.read(part)
+        np.clip(Z, low, high, out=Z)
+        strengths = evaluation.antecedent.strengths(Z)
+        basis_rows = basis(Z[consequent_inputs])
+        for k, one in enumerate(by_rule.transpose(2, 0, 1)):
+            squares = (target[k] - rule_outputs(one, strengths, basis_rows)[1]) ** 2
+            total += squares.sum() if weight is None else weight @ squares
     return total / rows.total_weight

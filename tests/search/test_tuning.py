@@ -81,7 +81,7 @@ def test_what_rules_err_one_by_one(two_rules):
 def with_agreement(tuned, agreement):
     """The same with consequents alone of another agreement."""
     penalty = replace(tuned.penalty, agreement=agreement)
-    return tuning._with_penalty(tuned, penalty)
+    return replace(tuned, problem=tuned.problem.with_penalty(penalty))
 
 
 class TestAgreement:
@@ -89,7 +89,7 @@ class TestAgreement:
     def test_it_is_raised_as_far_as_the_error_allows(self, left, rng):
         problem, premise = two_rules_of_a_sine(rng, 0.3)
         apart = tuning.tune(problem, premise, FREE, 100.0)
-        found = tuning.with_most_agreement(apart, premise, FREE, 100.0, left)
+        found = tuning.with_most_agreement(apart, premise, FREE, left)
         assert found.agreement_is_raised
         assert apart.expected_error < found.expected_error <= left * apart.expected_error
         # As far as consequents alone allow, or further.
@@ -110,5 +110,5 @@ class TestAgreement:
     def test_what_is_given_or_leaves_nothing_is_not_changed(self, two_rules):
         problem, premise = two_rules
         apart = tuning.tune(problem, premise, FREE, 100.0)
-        assert tuning.with_most_agreement(apart, premise, FREE[1:], 100.0, 2.0) is apart
-        assert tuning.with_most_agreement(apart, premise, FREE, 100.0, 1.0) is apart
+        assert tuning.with_most_agreement(apart, premise, FREE[1:], 2.0) is apart
+        assert tuning.with_most_agreement(apart, premise, FREE, 1.0) is apart

@@ -19,23 +19,22 @@ _POINT = 1e-12
 
 def function_of(family, natural):
     """Name and parameters in the file of a term with these natural parameters."""
-    if family.name not in _TABLE:
+    if family.name not in _TO_FILE:
         raise ValueError(
             f"the membership {family.name!r} has no function in the .fis format; "
-            f"{', '.join(_TABLE)} have."
+            f"{', '.join(_TO_FILE)} have."
         )
-    name, _, to_file, _ = _TABLE[family.name]
+    name, to_file = _TO_FILE[family.name]
     return name, to_file(*map(float, natural))
 
 
 def theta_of(name, parameters, low, high):
     """Family and theta of a membership function in a file; [low, high] is its input's Range."""
-    if name not in _FAMILIES:
+    if name not in _FROM_FILE:
         raise ValueError(
-            f"the membership function {shown(name)} is not supported; {', '.join(_FAMILIES)} are."
+            f"the membership function {shown(name)} is not supported; {', '.join(_FROM_FILE)} are."
         )
-    family = _FAMILIES[name]
-    _, n_parameters, _, from_file = _TABLE[family]
+    family, n_parameters, from_file = _FROM_FILE[name]
     if len(parameters) != n_parameters:
         raise ValueError(f"{name} takes {n_parameters} parameters, found {len(parameters)}.")
     if name in ("trimf", "trapmf", "pimf"):
@@ -43,9 +42,11 @@ def theta_of(name, parameters, low, high):
     natural = from_file(*parameters)
     if name == "trapmf" and parameters[1] == parameters[2]:
         family, natural = "triangular", natural[:3]
-    if name in ("sigmf", "psigmf"):
-        signs = [1.0 if slope > 0.0 else -1.0 for slope in _from_the_left(parameters)[0]]
-        family = (SIDES[signs[0]] if name == "sigmf" else PRODUCTS[signs[0], signs[1]]).name
+    if name == "sigmf":
+        family = SIDES[np.sign(parameters[0])].name
+    if name == "psigmf":
+        left, right = np.sign(_from_the_left(parameters)[0])
+        family = PRODUCTS[left, right].name
     theta = []
     for parameter, value in zip(FAMILIES[family].parameters, natural, strict=True):
         if parameter.kind == "location":
@@ -126,53 +127,39 @@ def _product_to_file(first, second):
     return lambda c, width, left, right: [first / left, c - width, second / right, c + width]
 
 
-# By family: the function's name, its number of parameters, and what turns those of the family into
-# them and back.
-_TABLE: dict[str, tuple[str, int, Callable, Callable]] = {
-    "gaussian": ("gaussmf", 2, lambda c, width: [width, c], lambda width, c: [c, abs(width)]),
-    "bell": (
-        "gbellmf",
-        3,
-        lambda c, width, slope: [width, slope, c],
-        lambda width, slope, c: [c, abs(width), slope],
-    ),
-    "triangular": (
-        "trimf",
-        3,
-        lambda c, left, right: [c - left, c, c + right],
-        lambda foot, peak, other_foot: [peak, peak - foot, other_foot - peak],
-    ),
-    "trapezoidal": ("trapmf", 4, _corners, _from_corners),
-    "pi_shaped": ("pimf", 4, _corners, _from_corners),
+# By family: the function's name, and what turns the parameters of the family into its own.
+_TO_FILE: dict[str, tuple[str, Callable]] = {
+    "gaussian": ("gaussmf", lambda c, width: [width, c]),
+    "bell": ("gbellmf", lambda c, width, slope: [width, slope, c]),
+    "triangular": ("trimf", lambda c, left, right: [c - left, c, c + right]),
+    "trapezoidal": ("trapmf", _corners),
+    "pi_shaped": ("pimf", _corners),
     "two_sided_gaussian": (
         "gauss2mf",
-        4,
         lambda c, left, right, plateau: [left, c - 0.5 * plateau, right, c + 0.5 * plateau],
-        _about_middle,
     ),
-    "s_shaped": (
-        "smf",
-        2,
-        lambda top, width: [top - width, top],
-        lambda foot, top: [top, top - foot],
-    ),
-    "z_shaped": (
-        "zmf",
-        2,
-        lambda top, width: [top, top + width],
-        lambda top, foot: [top, foot - top],
-    ),
+    "s_shaped": ("smf", lambda top, width: [top - width, top]),
+    "z_shaped": ("zmf", lambda top, width: [top, top + width]),
     "sigmoid_difference": (
         "dsigmf",
-        4,
         lambda c, width, flank: [1.0 / flank, c - width, 1.0 / flank, c + width],
-        _difference_from_file,
     ),
-    "sigmoid_rising": ("sigmf", 2, lambda cut, width: [1.0 / width, cut], _sides_from_file),
-    "sigmoid_falling": ("sigmf", 2, lambda cut, width: [-1.0 / width, cut], _sides_from_file),
-    **{
-        one.name: ("psigmf", 4, _product_to_file(*signs), _sides_from_file)
-        for signs, one in PRODUCTS.items()
-    },
+    "sigmoid_rising": ("sigmf", lambda cut, width: [1.0 / width, cut]),
+    "sigmoid_falling": ("sigmf", lambda cut, width: [-1.0 / width, cut]),
+    **{one.name: ("psigmf", _product_to_file(*signs)) for signs, one in PRODUCTS.items()},
 }
-_FAMILIES = {name: family for family, (name, *_) in _TABLE.items()}
+# By function: its family, the number of its parameters, and what turns them into the family's. Which
+# family of sigmoids it is, the signs of the slopes tell.
+_FROM_FILE: dict[str, tuple[str, int, Callable]] = {
+    "gaussmf": ("gaussian", 2, lambda width, c: [c, abs(width)]),
+    "gbellmf": ("bell", 3, lambda width, slope, c: [c, abs(width), slope]),
+    "trimf": ("triangular", 3, lambda left, peak, right: [peak, peak - left, right - peak]),
+    "trapmf": ("trapezoidal", 4, _from_corners),
+    "pimf": ("pi_shaped", 4, _from_corners),
+    "gauss2mf": ("two_sided_gaussian", 4, _about_middle),
+    "smf": ("s_shaped", 2, lambda foot, top: [top, top - foot]),
+    "zmf": ("z_shaped", 2, lambda top, foot: [top, foot - top]),
+    "dsigmf": ("sigmoid_difference", 4, _difference_from_file),
+    "sigmf": ("", 2, _sides_from_file),
+    "psigmf": ("", 4, _sides_from_file),
+}
