@@ -115,7 +115,7 @@ class TestSequences:
             smaller = trials.tuned(found[-2])
             promised = {
                 found[-2].with_more_terms(j): trials.expected(
-                    trials._train(found[-2].with_more_terms(j), smaller, 0, 1)
+                    trials._train(trials._problem(found[-2].with_more_terms(j), smaller), turns=0)
                 )
                 for j in range(4)
             }
