@@ -39,13 +39,12 @@ class RuleFiring:
         return cls(overlap, second, strongest, peak, np.array([len(own) for own in distinct]))
 
 
-def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients: int, firing=None):
+def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients: int, firing):
     """The :class:`RuleSupport` of every rule, in the rows' standardised units.
 
     ``firing`` is the :class:`RuleFiring` of the same rows, with distinct inputs counted up to
-    ``n_coefficients``; where it is not given, it takes a pass of its own.
+    ``n_coefficients``.
     """
-    firing = RuleFiring.of(rows, antecedent, n_coefficients) if firing is None else firing
     n_rules, n_inputs = antecedent.n_rules, firing.second.shape[1] - 1
     known = np.flatnonzero(firing.n_distinct)
     center, factor = np.zeros((n_rules, n_inputs)), np.zeros((n_rules, n_inputs, n_inputs))

@@ -109,12 +109,8 @@ def rule_base(candidate, rows, families, inputs, spacing, seed, smaller=None):
 def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):
     """How much the residual of a model asks for so many terms on each input, (n_inputs,).
 
-    With nu_k the shares of ``counts`` even Gaussian terms on an input, b the functions 1 and z_i,
-    and r the residual, the statistic is the sum over k and b of
-
-        (sum s nu_k b r)^2 / sum s (nu_k b)^2 ,    nu_k less its mean,
-
-    in deviations from what noise alone would give it.
+    As of the splits of a tree (``splits``), with the shares nu_k of ``counts`` even Gaussian terms
+    on an input, less their means, in the place of h - p.
     """
     rows = tuned.problem.rows
     weight = counting_weight(rows)

@@ -50,20 +50,12 @@ class StructureRequest:
     max_rules: int | None
     held: Held | None = None
 
-    @property
-    def is_searched(self):
-        """Whether the data decide on the structure."""
-        return (
-            isinstance(self.n_mfs, str)
-            and isinstance(self.partition, str)
-            and self.partition in ("auto", *KINDS)
-        )
-
     def start(self, rows: StandardisedData) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
         check_columns_fit(len(self.names), _memory_limit())
-        if self.is_searched:
+        is_word = isinstance(self.n_mfs, str) and isinstance(self.partition, str)
+        if is_word and self.partition in ("auto", *KINDS):
             return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
         if isinstance(self.partition, TSKModel):
             model = self.partition
