@@ -15,6 +15,6 @@ def two_rules(rng):
     """A problem of 100 rows, and its premise."""
     x = rng.uniform(-1.0, 1.0, (100, 1))
     rows = StandardisedData.of(x, np.sin(3.0 * x) + 0.1 * rng.normal(size=(100, 1)))
-    antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
+    antecedent = grid_antecedent([Gaussian], [2], Spacing(rows))
     problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
     return problem, Premise.of(antecedent, *rows.inputs.box)

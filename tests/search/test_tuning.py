@@ -19,7 +19,7 @@ def test_weights_arrive_where_there_are_more_columns_than_rows(rng):
     """Of noise on 150 inputs, nothing is learnt from 100 rows."""
     X, y = rng.normal(size=(100, 150)), rng.normal(size=(100, 1))
     rows = StandardisedData.of(X, y)
-    antecedent = grid_antecedent(150 * [Gaussian], 150 * [1], Spacing(rows), 0.6)
+    antecedent = grid_antecedent(150 * [Gaussian], 150 * [1], Spacing(rows))
     problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
     premise = Premise.of(antecedent, *rows.inputs.box)
     found = tuning.tune(problem, premise, FREE, 100.0)
@@ -74,7 +74,7 @@ class TestAgreement:
     def test_it_is_raised_as_far_as_the_error_allows(self, left, rng):
         x = rng.uniform(-1.0, 1.0, (100, 1))
         rows = StandardisedData.of(x, np.sin(3.0 * x) + 0.3 * rng.normal(size=(100, 1)))
-        antecedent = grid_antecedent([Gaussian], [2], Spacing(rows), 0.6)
+        antecedent = grid_antecedent([Gaussian], [2], Spacing(rows))
         problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
         premise = Premise.of(antecedent, *rows.inputs.box)
         apart = tuning.tune(problem, premise, FREE, 100.0)
