@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor, blocks
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.firing import rule_support
+from skanfis.learning.firing import RuleFiring, rule_support
 
 from . import oracles
 
@@ -61,7 +61,8 @@ def test_support_is_that_of_the_definitions(kind, n_coefficients, weighted, rng,
     rows = StandardisedData.of(X, X[:, :1], weight)
     antecedent = ANTECEDENTS[kind](rng)
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)  # 64 rows
-    found = rule_support(rows, antecedent, n_coefficients)
+    firing = RuleFiring.of(rows, antecedent, n_coefficients)
+    found = rule_support(rows, antecedent, n_coefficients, firing)
     assert_array_equal(found.factor, np.tril(found.factor))
     for r, expected in enumerate(brute_force(rows, antecedent, n_coefficients)):
         if expected is None:

@@ -30,16 +30,9 @@ _MOST_INPUTS = 2
 class Departures:
     """The departures N u of consequents in local coordinates u, N = S - Q A'.
 
-    Parameters
-    ----------
-    scale : ndarray of shape (n_columns,)
-        The diagonal of S.
-    orthonormal, along : ndarray of shape (n_columns, n_basis)
-        Q and A.
-    antecedent : Antecedent
-    slopes : list of (int or None)
-        The input that each function of the basis but the first is a slope by; None where it is
-        constant, and there is nothing to learn.
+    ``scale`` is the diagonal of S, ``orthonormal`` and ``along`` (n_columns, n_basis) are Q and A;
+    ``slopes`` are the inputs that the functions of the basis but the first are slopes by, None
+    where one is constant, and there is nothing to learn.
 
     Attributes
     ----------

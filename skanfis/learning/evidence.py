@@ -77,45 +77,20 @@ _LEAST_ERROR = 1e-22
 
 @dataclass(frozen=True)
 class Laplace:
-    """The posterior at a point: all that the evidence and its derivatives are made of.
-
-    Parameters
-    ----------
-    penalty : Penalty
-    n_rows : float
-        Rows by weight.
-    twice_cost : float
-        2F.
-    n_outputs : int
-        Those that vary.
-    determinants : float
-        log |M| - log |P|+ + log R.
-    paid : ndarray of shape (2 + n_slopes + n_components,)
-        Of each part of the penalty, in the order of ``Penalty.weights``, beta' tau P beta (or
-        kappa |x|^2).
-    disagreement : ndarray of shape (n_columns, n_columns)
-    line : CommonLine
-        These two make the penalty.
-    prior, factor : NormalFactor
-        Of P, its null space joined in at P's own size, and of M.
-    curvature : ndarray of shape (n_displacements,)
-        Eigenvalues of H.
-    n_columns : int
-        Consequent parameters of one output.
-    """
+    """The posterior at a point: all that the evidence and its derivatives are made of."""
 
     penalty: Penalty
-    n_rows: float
-    twice_cost: float
-    n_outputs: int
-    determinants: float
-    paid: np.ndarray
-    disagreement: np.ndarray
+    n_rows: float  # by weight
+    twice_cost: float  # 2F
+    n_outputs: int  # those that vary
+    determinants: float  # log |M| - log |P|+ + log R
+    paid: np.ndarray  # beta' tau P beta, or kappa |x|^2, of each of ``CommonLine.weights``
+    disagreement: np.ndarray  # Q, which makes the penalty together with the line
     line: CommonLine
-    prior: NormalFactor
-    factor: NormalFactor
-    curvature: np.ndarray
-    n_columns: int
+    prior: NormalFactor  # of P, its null space joined in at P's own size
+    factor: NormalFactor  # of M
+    curvature: np.ndarray  # eigenvalues of H
+    n_columns: int  # consequent parameters of one output
 
     @cached_property
     def trace_before(self):

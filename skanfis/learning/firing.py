@@ -21,27 +21,13 @@ FIRES = 0.5
 
 @dataclass(frozen=True, eq=False)
 class RuleFiring:
-    """How rules fire on a set of rows, in one pass over them.
+    """How rules fire on a set of rows of weights s, in one pass over them."""
 
-    Attributes
-    ----------
-    overlap : ndarray of shape (n_rules, n_rules)
-        Sums of s w_r w_q, s the rows' weights.
-    second : ndarray of shape (n_rules, 1 + n_inputs, 1 + n_inputs)
-        Sums of s w_r [1, z] [1, z]'.
-    strongest : ndarray of shape (n_rules,)
-        Weight of the rows on which each rule is the strongest.
-    peak : ndarray of shape (n_rules,)
-        Largest strength on any row.
-    n_distinct : ndarray of int of shape (n_rules,)
-        Distinct inputs on which each rule is the strongest, up to a limit.
-    """
-
-    overlap: np.ndarray
-    second: np.ndarray
-    strongest: np.ndarray
-    peak: np.ndarray
-    n_distinct: np.ndarray
+    overlap: np.ndarray  # sums of s w_r w_q, (n_rules, n_rules)
+    second: np.ndarray  # sums of s w_r [1, z] [1, z]', (n_rules, 1 + n_inputs, 1 + n_inputs)
+    strongest: np.ndarray  # weight of the rows on which each rule is the strongest
+    peak: np.ndarray  # largest strength of each rule on any row
+    n_distinct: np.ndarray  # inputs on which each rule is the strongest, up to a limit
 
     @classmethod
     def of(cls, rows: StandardisedData, antecedent: Antecedent, enough: int):
@@ -53,13 +39,12 @@ class RuleFiring:
         return cls(overlap, second, strongest, peak, np.array([len(own) for own in distinct]))
 
 
-def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients: int, firing=None):
+def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients: int, firing):
     """The :class:`RuleSupport` of every rule, in the rows' standardised units.
 
     ``firing`` is the :class:`RuleFiring` of the same rows, with distinct inputs counted up to
-    ``n_coefficients``; where it is not given, it takes a pass of its own.
+    ``n_coefficients``.
     """
-    firing = RuleFiring.of(rows, antecedent, n_coefficients) if firing is None else firing
     n_rules, n_inputs = antecedent.n_rules, firing.second.shape[1] - 1
     known = np.flatnonzero(firing.n_distinct)
     center, factor = np.zeros((n_rules, n_inputs)), np.zeros((n_rules, n_inputs, n_inputs))

@@ -289,13 +289,13 @@ class SeparableProblem:
 
     def linearise(self, evaluation):
         """Gradient and Gauss-Newton matrix at an evaluated point."""
-        if self.on_sample is not None:
-            return self._linearise_by_sample(evaluation)
         antecedent = evaluation.antecedent
+        point = self._design, antecedent, evaluation.coefficients, self.penalty.agreement
+        if self.on_sample is not None:
+            slope, *_ = self._sum(JointPass(*point))
+            return replace(self.curvature(evaluation), gradient=-slope)
+        gauss_newton, slope, *cross = self._sum(SecondPass(*point))
         n_raw, n_rules = antecedent.parameters.size, antecedent.n_rules
-        gauss_newton, slope, *cross = self._sum(
-            SecondPass(self._design, antecedent, evaluation.coefficients, self.penalty.agreement)
-        )
         halves = []
         for one in cross:
             by_column = one.reshape(n_raw, self.n_basis, n_rules).transpose(2, 1, 0)
@@ -313,13 +313,6 @@ class SeparableProblem:
         sample, coefficients = self.on_sample, evaluation.coefficients
         own = sample.evaluate(evaluation.antecedent.parameters, coefficients)
         return sample.linearise(replace(own, coefficients=coefficients))
-
-    def _linearise_by_sample(self, evaluation):
-        antecedent, coefficients = evaluation.antecedent, evaluation.coefficients
-        slope, *_ = self._sum(
-            JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
-        )
-        return replace(self.curvature(evaluation), gradient=-slope)
 
     def joint(self, parameters, coefficients):
         """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""

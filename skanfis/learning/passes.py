@@ -20,23 +20,13 @@ _TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The columns of the design: its basis functions, and the moments that its Gram matrix takes.
+    """The columns of the design: its basis functions, and what its Gram matrix is made of."""
 
-    Parameters
-    ----------
-    consequent_inputs : ndarray of int or None
-        The inputs that the consequents are linear in; None is all.
-    n_basis, n_outputs : int
-    moments : DesignMoments
-    own_parameters : ndarray of int
-        Of the premises, see the function of this name.
-    """
-
-    consequent_inputs: np.ndarray | None
+    consequent_inputs: np.ndarray | None  # that the consequents are linear in; None is all
     n_basis: int
     n_outputs: int
     moments: DesignMoments
-    own_parameters: np.ndarray
+    own_parameters: np.ndarray  # of the premises, see the function of this name
 
     def basis(self, Z):
         """Basis functions of the consequents at a block of rows."""

@@ -88,17 +88,11 @@ def disagreement_matrix(gram, n_rules, local: LocalBasis):
 
 
 class CommonLine:
-    """The line that all rules share, in the coordinates of their local basis.
+    """The line that all rules share, in the coordinates u of their local basis.
 
-    Parameters
-    ----------
-    local : LocalBasis
-    extent : ndarray of shape (n_rules, n_basis - 1)
-        How far from its centre each rule stands for rows, along every input.
-    antecedent : Antecedent
-        The rules.
-    slopes : list of (int or None)
-        The inputs that the consequents are linear in; None for those that are constant.
+    ``extent`` (n_rules, n_basis - 1) is how far from its centre each rule stands for rows, along
+    every input; ``slopes`` are the inputs that the consequents are linear in, None for those that
+    are constant.
 
     Attributes
     ----------

@@ -90,31 +90,11 @@ def varpro(
     patience=2,
     evaluation=None,
 ):
-    """Minimise the reduced cost over the premises.
+    """Minimise the reduced cost over the premises, as :meth:`Solver.solve` does.
 
-    Parameters
-    ----------
-    problem : SeparableProblem
-    premise : Premise
-    max_iter : int
-        Most iterations (accepted steps).
-    tol : float
-        Stop when expected and actual relative decrease of the cost stay below ``tol``, so many
-        times in a row as ``patience`` says.
-    stiffness : float
-        Weight of the pull of the premises to their start.
-    start : ndarray of shape (premise.size,), optional
-        Displacements to start from, inside the box; zero if not given.
-    on_iteration : callable, optional
-        Called with (n_iter, evaluation) after every accepted step; what is true ends the training.
-    patience : int
-        Twice, where nothing is known of the start; once, where a sample of the rows has settled.
-    evaluation : Evaluation, optional
-        That of the start, where it is known.
-
-    Returns
-    -------
-    SolverResult
+    An iteration is an accepted step. Expected and actual relative decrease of the cost are to stay
+    below ``tol`` for ``patience`` of them: two, where nothing is known of the start, one, where a
+    sample of the rows has settled. ``evaluation`` is that of the start, where it is known.
     """
     x = np.zeros(premise.size) if start is None else start
     current = problem.evaluate(premise.parameters(x)) if evaluation is None else evaluation

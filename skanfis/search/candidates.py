@@ -6,7 +6,6 @@ tree, one leaf at a time is split (``splits``). Scattered rules stand on the clu
 half as many again each time.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import prod
 
@@ -14,8 +13,6 @@ import numpy as np
 from sklearn.cluster import KMeans
 
 from ..antecedent import TreeAntecedent
-from ..learning.data import StandardisedData
-from ..membership import Membership
 from .clusters import clustered_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
 from .sample import counting_weight
@@ -84,60 +81,36 @@ class Candidate:
         return replace(self, n_clusters=number)
 
 
-@dataclass(frozen=True, eq=False)
-class RuleBases:
-    """What candidates begin with.
+def rule_base(candidate, rows, families, inputs, spacing, seed, smaller=None):
+    """The antecedent that a candidate begins with.
 
-    Parameters
-    ----------
-    families : sequence of type of Membership
-        One per input.
-    inputs : ndarray of int
-        Those that may have terms.
-    spacing : Spacing
-        Where the terms of grids stand.
-    seed : int
-        Of the clustering.
+    Clusters are sought in the ``rows``, on the ``inputs`` that may have terms; grids and trees keep
+    what a ``smaller`` one has learnt.
     """
+    if candidate.splits:
+        *before, last = candidate.splits
+        tree = smaller if before else TreeAntecedent.build([], [[], []], [[]])
+        return tree.split(last.leaf, last.input, last.cut, last.log_width)
+    if not candidate.n_clusters:
+        return grid_antecedent(families, candidate.counts, spacing, known=smaller)
+    clusterer = KMeans(candidate.n_clusters, n_init=1, random_state=seed)
 
-    families: Sequence[type[Membership]]
-    inputs: np.ndarray
-    spacing: Spacing
-    seed: int
+    def label(table, weight):
+        # It begins at some of the rows: the order of columns is to have no part in which, and
+        # rounding none in what is near to two centres.
+        table = np.round(table, _DIGITS)
+        order = np.lexsort(np.sort(table, axis=1).T)
+        labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
+        return labels[np.argsort(order)]
 
-    def of(self, candidate: Candidate, rows: StandardisedData, smaller=None):
-        """The antecedent of a candidate.
-
-        Clusters are sought in the rows; grids and trees keep what a ``smaller`` one has learnt.
-        """
-        if candidate.splits:
-            *before, last = candidate.splits
-            tree = smaller if before else TreeAntecedent.build([], [[], []], [[]])
-            return tree.split(last.leaf, last.input, last.cut, last.log_width)
-        if not candidate.n_clusters:
-            return grid_antecedent(self.families, candidate.counts, self.spacing, known=smaller)
-        clusterer = KMeans(candidate.n_clusters, n_init=1, random_state=self.seed)
-
-        def label(table, weight):
-            # It begins at some of the rows: the order of columns is to have no part in which, and
-            # rounding none in what is near to two centres.
-            table = np.round(table, _DIGITS)
-            order = np.lexsort(np.sort(table, axis=1).T)
-            labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
-            return labels[np.argsort(order)]
-
-        return clustered_antecedent(self.families, rows, label, self.inputs)
+    return clustered_antecedent(families, rows, label, inputs)
 
 
 def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):
     """How much the residual of a model asks for so many terms on each input, (n_inputs,).
 
-    With nu_k the shares of ``counts`` even Gaussian terms on an input, b the functions 1 and z_i,
-    and r the residual, the statistic is the sum over k and b of
-
-        (sum s nu_k b r)^2 / sum s (nu_k b)^2 ,    nu_k less its mean,
-
-    in deviations from what noise alone would give it.
+    As of the splits of a tree (``splits``), with the shares nu_k of ``counts`` even Gaussian terms
+    on an input, less their means, in the place of h - p.
     """
     rows = tuned.problem.rows
     weight = counting_weight(rows)

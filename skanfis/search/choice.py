@@ -23,30 +23,15 @@ _ROUNDING = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, eq=False)
 class Judged:
-    """A candidate, and what it left of rows that had no part in it.
-
-    Parameters
-    ----------
-    candidate : Candidate
-    in_folds : list of Candidate
-        Its like in every fold.
-    squares, free_squares : ndarray of shape (n_judged,)
-        Squared errors, summed over outputs, and what they were if nothing had to rise or fall.
-    squared_error : float
-        Expected of new rows, once trained on all rows.
-    cost : int
-        To read it.
-    squared_error_of_rules : float
-        As ``squared_error``, of the rules one by one, each on the rows on which it fires.
-    """
+    """A candidate, and what it left of rows that had no part in it."""
 
     candidate: Candidate
-    in_folds: list[Candidate]
-    squares: np.ndarray
-    free_squares: np.ndarray
-    squared_error: float
-    cost: int
-    squared_error_of_rules: float
+    in_folds: list[Candidate]  # its like in every fold
+    squares: np.ndarray  # squared errors of these rows, summed over outputs
+    free_squares: np.ndarray  # what they were if nothing had to rise or fall
+    squared_error: float  # expected of new rows, once trained on all rows
+    cost: int  # to read it
+    squared_error_of_rules: float  # of the rules one by one, each on the rows on which it fires
 
 
 @dataclass(frozen=True, eq=False)

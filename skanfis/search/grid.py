@@ -34,12 +34,7 @@ _MOST_ROWS = 20_000
 
 
 class Spacing:
-    """Where the terms of every input stand, whatever their number.
-
-    Parameters
-    ----------
-    rows : StandardisedData
-    """
+    """Where the terms of every input stand, whatever their number."""
 
     def __init__(self, rows: StandardisedData):
         table, weight, _ = representative_rows(rows, _MOST_ROWS)
@@ -76,8 +71,8 @@ def _levels(column, weight):
     return values, levels / max(levels[-1], np.finfo(float).tiny)
 
 
-def grid_antecedent(families, counts, spacing: Spacing, overlap=OVERLAP, known=None):
-    """Terms by a :class:`Spacing`, of which neighbours cross at about membership ``overlap``.
+def grid_antecedent(families, counts, spacing: Spacing, known=None):
+    """Terms by a :class:`Spacing`, of which neighbours cross at about membership ``OVERLAP``.
 
     Inputs with a count of one have no terms: they take part in the consequents alone. ``families``
     and ``counts`` have one entry per input. Where a ``known`` rule base has as many terms on an
@@ -93,7 +88,7 @@ def grid_antecedent(families, counts, spacing: Spacing, overlap=OVERLAP, known=N
         centers = spacing.centers(j, counts[j])
         if j in terms:
             centers = _with_more(np.sort(terms[j][0]), counts[j])
-        thetas.append(families[j].start(centers, _distance(np.diff(centers)), overlap))
+        thetas.append(families[j].start(centers, _distance(np.diff(centers)), OVERLAP))
     return GridAntecedent.build([families[j] for j in inputs], inputs, thetas)
 
 

@@ -34,60 +34,28 @@ _MOST_NAMED = 10
 
 @dataclass(frozen=True, eq=False)
 class StructureRequest:
-    """What was asked for.
-
-    Parameters
-    ----------
-    n_mfs, partition : object
-        As given to the estimator; a model in place of the estimator that holds it.
-    families : sequence of type of Membership
-        One per input.
-    order : {0, 1}
-    premise_inputs, consequent_inputs : ndarray of int
-    weights : dict of str to float
-        The weights of the penalty that are given, by their names in ``evidence.FREE``; the evidence
-        finds the others.
-    premises_move : bool
-        Whether what is trained afterwards moves the premises.
-    seed : int
-        Of clusterings that have none of their own.
-    names : sequence of str
-        Of the inputs.
-    simplicity : float
-        What may be given up for a model that costs less to read.
-    max_rules : int or None
-    held : callable, optional
-        See ``Plan``.
-    """
+    """What was asked for."""
 
     n_mfs: Any
-    partition: Any
-    families: Sequence[type[Membership]]
+    partition: Any  # as given; a model in place of the estimator that holds it
+    families: Sequence[type[Membership]]  # one per input
     order: int
     premise_inputs: np.ndarray
     consequent_inputs: np.ndarray
-    weights: dict[str, float]
-    premises_move: bool
-    seed: int
-    names: Sequence[str]
-    simplicity: float
+    weights: dict[str, float]  # of the penalty, those that are given, of ``evidence.FREE``
+    premises_move: bool  # whether what is trained afterwards moves them
+    seed: int  # of clusterings that have none of their own
+    names: Sequence[str]  # of the inputs
+    simplicity: float  # what may be given up for a model that costs less to read
     max_rules: int | None
     held: Held | None = None
-
-    @property
-    def is_searched(self):
-        """Whether the data decide on the structure."""
-        return (
-            isinstance(self.n_mfs, str)
-            and isinstance(self.partition, str)
-            and self.partition in ("auto", *KINDS)
-        )
 
     def start(self, rows: StandardisedData) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
         check_columns_fit(len(self.names), _memory_limit())
-        if self.is_searched:
+        is_word = isinstance(self.n_mfs, str) and isinstance(self.partition, str)
+        if is_word and self.partition in ("auto", *KINDS):
             return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
         if isinstance(self.partition, TSKModel):
             model = self.partition

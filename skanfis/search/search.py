@@ -24,16 +24,7 @@ _FURTHER = 2
 
 
 class StructureSearch:
-    """A search over structures for one set of rows.
-
-    Parameters
-    ----------
-    rows : StandardisedData
-        The rows that the final model will be trained on.
-    plan : Plan
-    simplicity : float
-        What may be given up for a model that costs less to read.
-    """
+    """A search over structures for the rows that the final model will be trained on."""
 
     def __init__(self, rows: StandardisedData, plan: Plan, simplicity: float):
         self.plan, self.simplicity = plan, simplicity

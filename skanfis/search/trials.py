@@ -22,7 +22,7 @@ from ..learning.premise import Premise
 from ..membership import Membership
 from ..model import TSKModel
 from ..policies import TargetRange
-from .candidates import Candidate, RuleBases, term_scores
+from .candidates import Candidate, rule_base, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
 from .splits import best_splits
@@ -41,42 +41,23 @@ _TRIED = 4
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
 _SIGNIFICANT = 2.0
 
+# The premises and consequents that keep what is known of the outputs. They are what is judged;
+# training is free.
 Held = Callable[[SeparableProblem, Evaluation], tuple[Antecedent, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What all trainings of a search have in common.
+    """What all trainings of a search have in common."""
 
-    Parameters
-    ----------
-    families : sequence of type of Membership
-        One per input.
-    order : {0, 1}
-    inputs, consequent_inputs : ndarray of int
-        The inputs that may have terms, and those that the consequents are linear in.
-    seed : int
-        Of the clustering.
-    free : list of str
-        Weights of the penalty that the evidence finds, of ``evidence.FREE``.
-    first : Penalty
-        Where they start.
-    n_all : float
-        Rows by weight that the final model will be trained on.
-    most_rules : int or None
-    held : callable, optional
-        Of a problem and an evaluation: the consequents that keep what is known of the outputs. They
-        are what is judged; training is free.
-    """
-
-    families: Sequence[type[Membership]]
+    families: Sequence[type[Membership]]  # one per input
     order: int
-    inputs: np.ndarray
+    inputs: np.ndarray  # those that may have terms
     consequent_inputs: np.ndarray
-    seed: int
-    free: list[str]
-    first: Penalty
-    n_all: float
+    seed: int  # of the clustering
+    free: list[str]  # weights of the penalty that the evidence finds, of ``evidence.FREE``
+    first: Penalty  # where they start
+    n_all: float  # rows by weight that the final model will be trained on
     most_rules: int | None
     held: Held | None = None
 
@@ -98,7 +79,8 @@ class Trials:
         self._begun: dict[Candidate, Tuned] = {}
         self.scattered_inputs = plan.inputs
         # A line has no premises to move: begun is done.
-        self._begun[self.one_rule] = self._found[self.one_rule] = self._train(self.one_rule)
+        line = self._train(self._problem(self.one_rule), first_steps=FIRST_STEPS)
+        self._begun[self.one_rule] = self._found[self.one_rule] = line
         # Scattered rules have terms on those inputs of which the line's residual says something.
         scores = self._scores(self.one_rule)
         asked = scores > _SIGNIFICANT
@@ -131,10 +113,9 @@ class Trials:
             grown = [candidate.with_split(split) for split in splits]
         else:
             grown = [candidate.with_more_terms(j) for j in self._asking(candidate)]
-        # Weights go on from those of the smaller one.
         smaller = self.tuned(candidate)
         promising = [
-            (one, self._train(one, smaller, 0, _STEPS_TO_PROMISE))
+            (one, self._train(self._problem(one, smaller), turns=0))
             for one in grown
             if self._is_small(one)
         ]
@@ -174,7 +155,8 @@ class Trials:
                 trained = self.tuned(replace(candidate, has_sparse_slopes=False))
                 found = with_sparse_slopes(trained, self.plan.free)
             else:
-                found = self._train(candidate, begun=self._begun[candidate])
+                begun = self._begun[candidate]
+                found = self._train(begun.problem, begun=begun)
             self._found[candidate] = found
         return self._found[candidate]
 
@@ -190,23 +172,22 @@ class Trials:
         n_effective = tuned.posterior.n_effective
         return (1.0 + n_effective / self.plan.n_all) / (1.0 + n_effective / tuned.posterior.n_rows)
 
-    def _train(self, candidate, smaller=None, turns=None, first_steps=FIRST_STEPS, begun=None):
-        turns = _TURNS if turns is None else turns
+    def _problem(self, candidate, smaller=None):
+        """What a candidate begins with: rules and weights of a smaller one, if there is one."""
         plan, rows = self.plan, self.rows_for(candidate)
-        if begun is None:
-            bases = RuleBases(plan.families, self.scattered_inputs, self.spacing, plan.seed)
-            problem = SeparableProblem(
-                rows,
-                bases.of(candidate, rows, smaller and smaller.evaluation.antecedent),
-                plan.order,
-                smaller.penalty if smaller else plan.first,
-                consequent_inputs=plan.consequent_inputs,
-            )
-        else:
-            problem, first_steps = begun.problem, _STEPS_TO_PROMISE
-        premise = Premise.of(problem.antecedent, rows.inputs.minimum, rows.inputs.maximum)
-        weight = effective_weight(rows)
-        return tune(problem, premise, plan.free, weight, turns, first_steps, begun=begun)
+        known, penalty = None, plan.first
+        if smaller is not None:
+            known, penalty = smaller.evaluation.antecedent, smaller.penalty
+        inputs, slopes = self.scattered_inputs, plan.consequent_inputs
+        antecedent = rule_base(
+            candidate, rows, plan.families, inputs, self.spacing, plan.seed, known
+        )
+        return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
+
+    def _train(self, problem, turns=_TURNS, first_steps=_STEPS_TO_PROMISE, begun=None):
+        inputs, weight = problem.rows.inputs, effective_weight(problem.rows)
+        premise = Premise.of(problem.antecedent, inputs.minimum, inputs.maximum)
+        return tune(problem, premise, self.plan.free, weight, turns, first_steps, begun=begun)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
         """Of rows that were not trained on, as predict answers; summed over outputs."""

@@ -40,54 +40,27 @@ _TINY = float(np.finfo(float).tiny)
 
 @dataclass(frozen=True, eq=False)
 class RowSums:
-    """What is kept of rows: sums of a fixed size; immutable.
+    """What is kept of rows: sums of a fixed size; immutable."""
 
-    Attributes
-    ----------
-    base : TSKModel
-        Its premises and names hold, its consequents are not used.
-    consequent_inputs : ndarray of int
-    inputs, targets : Scale
-        The scales that the sums are on.
-    n_rows : int
-        Rows with weight, however long ago.
-    weight, squared_weight : float
-        W and the sum of squares of the weights.
-    gram : ndarray of shape (n_columns, n_columns)
-    slope : ndarray of shape (n_columns, n_outputs)
-    square : ndarray of shape (n_outputs,)
-    second : ndarray of shape (n_rules, 1 + n_inputs, 1 + n_inputs)
-        Sums of s w_r [1, z] [1, z]' over all inputs.
-    strongest : ndarray of shape (n_rules,)
-        Weight of the rows on which each rule is the strongest.
-    peak : ndarray of shape (n_rules,)
-        Largest strength on any row.
-    extent : ndarray of shape (n_rules, n_consequent_inputs)
-        Largest sqrt(w_r) |x - a_r|, with a_r the centre that the rule has in ``base``.
-    distinct : ndarray of shape (n, 1)
-        Fingerprints of distinct rows, up to a limit.
-    distinct_inputs : ndarray of shape (n, 2)
-        Rules, and fingerprints of distinct inputs on which they are the strongest.
-    farthest : ndarray of shape (n, 1 + n_inputs)
-        Rules, and the rows on which they fire farthest from their centres.
-    """
-
-    base: TSKModel
+    base: TSKModel  # its premises and names hold, its consequents are not used
     consequent_inputs: np.ndarray
-    inputs: Scale
+    inputs: Scale  # that the sums are on, and that of the targets
     targets: Scale
-    n_rows: int
-    weight: float
-    squared_weight: float
-    gram: np.ndarray
-    slope: np.ndarray
-    square: np.ndarray
-    second: np.ndarray
-    strongest: np.ndarray
-    peak: np.ndarray
+    n_rows: int  # with weight, however long ago
+    weight: float  # W
+    squared_weight: float  # the sum of squares of the weights
+    gram: np.ndarray  # G
+    slope: np.ndarray  # c, (n_columns, n_outputs)
+    square: np.ndarray  # q, (n_outputs,)
+    second: np.ndarray  # sums of s w_r [1, z] [1, z]', (n_rules, 1 + n_inputs, 1 + n_inputs)
+    strongest: np.ndarray  # weight of the rows on which each rule is the strongest
+    peak: np.ndarray  # largest strength of each rule on any row
+    # Largest sqrt(w_r) |x - a_r|, with a_r the centre that the rule has in ``base``, by input.
     extent: np.ndarray
-    distinct: np.ndarray
+    distinct: np.ndarray  # fingerprints of distinct rows, up to a limit, (n, 1)
+    # Rules, and fingerprints of distinct inputs on which they are the strongest, (n, 2).
     distinct_inputs: np.ndarray
+    # Rules, and the rows on which they fire farthest from their centres, (n, 1 + n_inputs).
     farthest: np.ndarray
 
     @classmethod

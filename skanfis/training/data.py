@@ -26,30 +26,16 @@ from ..search import Start
 
 @dataclass(frozen=True, eq=False)
 class ValidatedData:
-    """Validated data.
-
-    Parameters
-    ----------
-    X : ndarray of shape (n_rows, n_inputs)
-    y : ndarray of shape (n_rows, n_outputs)
-    sample_weight : ndarray of shape (n_rows,) or None
-        Positive.
-    groups : ndarray of shape (n_rows,) or None
-    input_names, output_names : sequence of str
-    kept : ndarray of bool of shape (n_given_rows,), optional
-        Which of the rows given have weight and are here, if not all.
-    constraints : Constraints, optional
-        What is known of the target, in the user's units.
-    """
+    """Validated data."""
 
     X: np.ndarray
-    y: np.ndarray
-    sample_weight: np.ndarray | None
+    y: np.ndarray  # (n_rows, n_outputs)
+    sample_weight: np.ndarray | None  # positive
     groups: np.ndarray | None
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
-    kept: np.ndarray | None = None
-    constraints: Constraints | None = None
+    kept: np.ndarray | None = None  # which of the rows given have weight and are here, if not all
+    constraints: Constraints | None = None  # what is known of the target, in the user's units
 
     def rows(self, indices=slice(None)):
         """Some of the rows, on scales of their own."""

@@ -59,16 +59,7 @@ def fit_rules(
     request: StructureRequest,
     callbacks: Callbacks | None = None,
 ) -> Fitted:
-    """Fit the rules of an estimator, whose parameters say how, to data.
-
-    Parameters
-    ----------
-    estimator : ANFISRegressor
-    data : ValidatedData
-    request : StructureRequest
-    callbacks : Callbacks, optional
-        scikit-learn's.
-    """
+    """Fit the rules of an estimator, whose parameters say how, to data."""
     if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
         return as_given(estimator, data, request.partition)
     fit = _Fit(estimator, data, request, callbacks)

@@ -54,13 +54,8 @@ class Printer:
 class Callbacks:
     """scikit-learn's callbacks: told of every iteration, and asked whether to go on.
 
-    Parameters
-    ----------
-    estimator : ANFISRegressor
-    context : sklearn.callback.CallbackContext
-        Of the fit.
-    data : dict
-        "X", "y" and "metadata", as the user gave them.
+    ``context`` is scikit-learn's of the fit, ``data`` are "X", "y" and "metadata", as the user gave
+    them.
     """
 
     def __init__(self, estimator, context, data):
@@ -121,14 +116,8 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
 class ValidationLoss:
     """Watches a run: the mean squared error of held-out rows after every iteration.
 
-    Parameters
-    ----------
-    rows : StandardisedData
-        The held-out rows, on the training rows' scales.
-    consequent_inputs : ndarray of int
-    n_iter_no_change : int
-        End after so many iterations without an error smaller by ``tol``, relatively.
-    tol : float
+    ``rows`` are these, on the training rows' scales. The run ends after ``n_iter_no_change``
+    iterations without an error smaller by ``tol``, relatively.
     """
 
     def __init__(self, rows: StandardisedData, consequent_inputs, n_iter_no_change, tol):

@@ -11,7 +11,7 @@ from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
 from skanfis.search import Spacing, grid_antecedent, tuning
-from skanfis.search.candidates import Candidate, RuleBases, term_scores
+from skanfis.search.candidates import Candidate, rule_base, term_scores
 from skanfis.search.sample import search_sample
 
 pytestmark = pytest.mark.theory
@@ -59,9 +59,7 @@ def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
     rows = sample_of(X, clump.sum(axis=1), rng.uniform(0.5, 2.0, 90))
     turned = replace(rows, X=rows.X[:, ::-1])
     found = [
-        RuleBases([Gaussian] * 3, np.array([0, 2]), Spacing(own), 7).of(
-            Candidate((1, 1, 1), 3), own
-        )
+        rule_base(Candidate((1, 1, 1), 3), own, [Gaussian] * 3, np.array([0, 2]), Spacing(own), 7)
         for own in (rows, turned)
     ]
     labels = rows.X[:, [0, 2]] > 0.5

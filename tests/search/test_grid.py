@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import Gaussian, Triangular
 from skanfis.search import Spacing, grid_antecedent
-from skanfis.search.grid import _EDGE, _QUANTISER
+from skanfis.search.grid import _EDGE, _QUANTISER, OVERLAP
 
 N_ROWS = 1001
 
@@ -35,7 +35,7 @@ def terms(antecedent):
 
 def test_even_values_give_even_terms_between_the_outer_quantiles():
     spacing, low, high = evenly(2)
-    antecedent = grid_antecedent([Gaussian] * 2, [3, 2], spacing, 0.6)
+    antecedent = grid_antecedent([Gaussian] * 2, [3, 2], spacing)
     found = [(j, theta[0, 0]) for j, _, theta in terms(antecedent)]
     assert [j for j, _ in found] == [0, 0, 0, 1, 1]
     centers = [low, 0.5 * (low + high), high, low, high]
@@ -46,16 +46,15 @@ def test_even_values_give_even_terms_between_the_outer_quantiles():
 
 # Of what families make of a place and a distance: tests/membership.
 @pytest.mark.parametrize("family", [Gaussian, Triangular])
-@pytest.mark.parametrize("overlap", [0.3, 0.5, 0.8])
 @pytest.mark.parametrize("count", [2, 3, 7])
-def test_neighbours_cross_half_way_at_the_overlap(family, overlap, count):
+def test_neighbours_cross_half_way_at_the_overlap(family, count):
     spacing, low, high = evenly(1)
-    antecedent = grid_antecedent([family], [count], spacing, overlap)
+    antecedent = grid_antecedent([family], [count], spacing)
     centers = np.linspace(low, high, count)
     between = 0.5 * (centers[1:] + centers[:-1])
     mu = np.exp(antecedent.log_memberships(between[None]))
     for k in range(count - 1):
-        assert_allclose(mu[k : k + 2, k], overlap, rtol=1e-8)
+        assert_allclose(mu[k : k + 2, k], OVERLAP, rtol=1e-8)
 
 
 def places(rows, count, j=0):

@@ -17,7 +17,7 @@ from skanfis.search import Spacing, grid_antecedent, tuning
 def problem_of(X, y, count):
     """A problem with so many terms on every input, and its premise."""
     rows, n_inputs = StandardisedData.of(X, y), X.shape[1]
-    antecedent = grid_antecedent(n_inputs * [Gaussian], n_inputs * [count], Spacing(rows), 0.6)
+    antecedent = grid_antecedent(n_inputs * [Gaussian], n_inputs * [count], Spacing(rows))
     problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
     return problem, Premise.of(antecedent, *rows.inputs.box)
 
