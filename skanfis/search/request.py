@@ -6,7 +6,6 @@ from math import prod
 from typing import Any
 
 import numpy as np
-from sklearn import get_config
 from sklearn.base import clone
 from sklearn.utils.validation import has_fit_parameter
 
@@ -22,12 +21,11 @@ from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .sample import effective_weight, n_distinct_inputs
 from .search import StructureSearch
-from .size import check_clusters_fit, check_columns_fit, check_grid_fits, term_counts
+from .size import check_columns_fit, check_grid_fits, check_rules_fit, term_counts
 from .start import Start, imported_antecedent, tuned_start
 from .trials import Held, Plan
 from .tuning import FIRST_PENALTY, scaled
 
-_MIB = 2**20
 # Columns that a warning names; it counts the others.
 _MOST_NAMED = 10
 
@@ -53,7 +51,7 @@ class StructureRequest:
     def start(self, rows: StandardisedData) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
-        check_columns_fit(len(self.names), _memory_limit())
+        check_columns_fit(len(self.names))
         is_word = isinstance(self.n_mfs, str) and isinstance(self.partition, str)
         if is_word and self.partition in ("auto", *KINDS):
             return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
@@ -76,19 +74,21 @@ class StructureRequest:
             left_out.append("scattered")
         return [kind for kind in KINDS if kind not in left_out]
 
+    @property
+    def _free(self):
+        """Weights that were not given."""
+        return [key for key in FREE if key not in self.weights]
+
     def _plan(self, rows):
         given: dict[str, Any] = {**self.weights}
-        free, is_constant = (
-            [key for key in FREE if key not in self.weights],
-            rows.inputs.is_constant,
-        )
+        is_constant = rows.inputs.is_constant
         return Plan(
             self.families,
             self.order,
             self.premise_inputs[~is_constant[self.premise_inputs]],
             self.consequent_inputs,
             self.seed,
-            free,
+            self._free,
             replace(FIRST_PENALTY, **given),
             effective_weight(rows),
             self.max_rules,
@@ -110,9 +110,9 @@ class StructureRequest:
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
         """A start found on a sample, with the weights that were not given those of all rows."""
-        free = [key for key in FREE if key not in self.weights]
         ratio = effective_weight(sample) / effective_weight(rows)
-        return replace(start, penalty=scaled(start.penalty, free, ratio, start.agreement_is_raised))
+        penalty = scaled(start.penalty, self._free, ratio, start.agreement_is_raised)
+        return replace(start, penalty=penalty)
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""
@@ -145,13 +145,13 @@ class StructureRequest:
             labels = np.asarray(label(table, weight))
             n_rules = np.unique(labels[labels >= 0]).size
             self._check_number(n_rules)
-            check_clusters_fit(
-                f"partition={self.partition!r}",
+            check_rules_fit(
+                f"partition={self.partition!r} makes",
                 n_rules,
-                self.premise_inputs.size,
+                n_rules * self.premise_inputs.size,
                 1 + self.consequent_inputs.size,
                 rows.y.shape[1],
-                _memory_limit(),
+                "Use fewer clusters, or constants as consequents (order=0).",
             )
             return labels
 
@@ -159,9 +159,8 @@ class StructureRequest:
 
     def _grid(self, rows):
         counts = self._grid_counts(rows)
-        n_basis, n_outputs = 1 + self.consequent_inputs.size, rows.y.shape[1]
         self._check_number(prod(counts))
-        check_grid_fits(self.n_mfs, counts, n_basis, n_outputs, _memory_limit(), self.names)
+        check_grid_fits(self.n_mfs, counts, 1 + self.consequent_inputs.size, rows.y.shape[1])
         return grid_antecedent(self.families, counts, Spacing(rows))
 
     def _grid_counts(self, rows):
@@ -197,11 +196,6 @@ class StructureRequest:
                 f"use fewer {'rules' if n_rules > 1 else 'inputs'}.",
                 UnderdeterminedWarning,
             )
-
-
-def _memory_limit():
-    """Bytes that training may take."""
-    return get_config()["working_memory"] * _MIB
 
 
 def _labeller(clusterer, weighted):
