@@ -22,7 +22,7 @@ _TINY = np.finfo(float).tiny
 class Design:
     """The columns of the design: its basis functions, and what its Gram matrix is made of."""
 
-    consequent_inputs: np.ndarray | None  # that the consequents are linear in; None is all
+    consequent_inputs: np.ndarray  # that the consequents are linear in
     n_basis: int
     n_outputs: int
     moments: DesignMoments
@@ -30,7 +30,7 @@ class Design:
 
     def basis(self, Z):
         """Basis functions of the consequents at a block of rows."""
-        return basis(Z if self.consequent_inputs is None else Z[self.consequent_inputs])
+        return basis(Z[self.consequent_inputs])
 
     def by_rule(self, coefficients):
         """Coefficients (n_columns, n_outputs) as (n_rules, n_basis, n_outputs)."""
