@@ -90,7 +90,11 @@ class Laplace:
     prior: NormalFactor  # of P, its null space joined in at P's own size
     factor: NormalFactor  # of M
     curvature: np.ndarray  # eigenvalues of H
-    n_columns: int  # consequent parameters of one output
+
+    @property
+    def n_columns(self):
+        """Consequent parameters of one output."""
+        return self.line.height.size - self.penalty.n_held
 
     @cached_property
     def trace_before(self):
@@ -165,16 +169,14 @@ def laplace(
     mean_squared_error: float,
     penalty: Penalty,
     n_rows: float,
-    n_rules: int,
+    n_outputs: int,
     displacement=None,
     curvature=None,
-    n_outputs=None,
 ):
     """The posterior at fixed premises, for a penalty of any weights.
 
     ``normal`` and ``mean_squared_error`` are those of an evaluation, at weights of its own;
-    ``n_outputs`` are those that vary, if not all do: a constant target says nothing about the noise
-    of another.
+    ``n_outputs`` are those that vary: a constant target says nothing about the noise of another.
     """
     matrix = penalty.agreement * normal.disagreement
     matrix += line.pull(penalty)
@@ -195,19 +197,18 @@ def laplace(
         penalty,
         n_rows,
         max(error + float(np.vdot(solved, matrix @ solved) + paid[_STIFFNESS]), _LEAST_ERROR),
-        normal.coefficients.shape[1] if n_outputs is None else n_outputs,
-        factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
+        n_outputs,
+        factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(line.n_rules),
         paid,
         normal.disagreement,
         line,
         prior,
         factor,
         curvature if has_premises else np.empty(0),
-        matrix.shape[0] - penalty.n_held,
     )
 
 
-def least_weights(posterior: Laplace, n_rules, n_distinct):
+def least_weights(posterior: Laplace, n_distinct):
     """The penalty below whose weights the prior expects what no rule that can be read does.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
@@ -220,7 +221,7 @@ def least_weights(posterior: Laplace, n_rules, n_distinct):
     """
     rows_each = n_distinct / posterior.n_columns
     least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)
-    if n_rules == 1:
+    if posterior.line.n_rules == 1:
         return Penalty(least, least, least)
     noise = posterior.noise_variance / posterior.n_rows
     agreement = max(least, posterior.n_columns * noise / _FAR**2)

@@ -61,11 +61,6 @@ class Plan:
     most_rules: int | None
     held: Held | None = None
 
-    @property
-    def n_basis(self):
-        """Coefficients of a rule."""
-        return 1 + (self.consequent_inputs.size if self.order else 0)
-
 
 class Trials:
     """Trainings on one set of rows, whose order says nothing."""
@@ -112,7 +107,8 @@ class Trials:
             splits = best_splits(self.tuned(candidate), self.plan.inputs, _TRIED)
             grown = [candidate.with_split(split) for split in splits]
         else:
-            grown = [candidate.with_more_terms(j) for j in self._asking(candidate)]
+            asking = np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]
+            grown = [candidate.with_more_terms(j) for j in self.plan.inputs[asking]]
         smaller = self.tuned(candidate)
         promising = [
             (one, self._train(self._problem(one, smaller), turns=0))
@@ -126,14 +122,10 @@ class Trials:
         self._begun[best] = begun
         return best
 
-    def _asking(self, candidate):
-        """The inputs of whose terms the residual says most."""
-        return self.plan.inputs[np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]]
-
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
-        n_terms = candidate.n_terms(self.scattered_inputs)
-        return candidate.n_rules * self.plan.n_basis + 2 * n_terms
+        n_basis = 1 + (self.plan.consequent_inputs.size if self.plan.order else 0)
+        return candidate.n_rules * n_basis + 2 * candidate.n_terms(self.scattered_inputs)
 
     def _is_small(self, candidate):
         most = self.plan.most_rules or np.inf
@@ -156,7 +148,7 @@ class Trials:
                 found = with_sparse_slopes(trained, self.plan.free)
             else:
                 begun = self._begun[candidate]
-                found = self._train(begun.problem, begun=begun)
+                found = self._train(begun.problem, evaluation=begun.evaluation)
             self._found[candidate] = found
         return self._found[candidate]
 
@@ -184,10 +176,11 @@ class Trials:
         )
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
 
-    def _train(self, problem, turns=_TURNS, first_steps=_STEPS_TO_PROMISE, begun=None):
+    def _train(self, problem, turns=_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
         inputs, weight = problem.rows.inputs, effective_weight(problem.rows)
         premise = Premise.of(problem.antecedent, inputs.minimum, inputs.maximum)
-        return tune(problem, premise, self.plan.free, weight, turns, first_steps, begun=begun)
+        free = self.plan.free
+        return tune(problem, premise, free, weight, turns, first_steps, evaluation)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
         """Of rows that were not trained on, as predict answers; summed over outputs."""

@@ -77,11 +77,6 @@ class Tuned:
         """-2 log p."""
         return self.posterior.minus_twice_log
 
-    @property
-    def is_trained(self):
-        """Whether premises have moved, or looked where to."""
-        return self.posterior.curvature.size > 0
-
     @cached_property
     def solved(self):
         """The evaluation at the weights found, where those it was made at are others."""
@@ -122,37 +117,21 @@ def tune(
     n_rows: float,
     turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
-    begun: Tuned | None = None,
+    evaluation: Evaluation | None = None,
 ) -> Tuned:
-    """Find the free weights, and the premises that go with them.
+    """Find the ``free`` weights, of ``evidence.FREE``, and the premises that go with them.
 
-    Parameters
-    ----------
-    problem : SeparableProblem
-        Its penalty is where the weights start.
-    premise : Premise
-    free : collection of str
-        Weights to be found, of ``evidence.FREE``.
-    n_rows : float
-        Rows by weight.
-    turns : int
-        Most turns of the premises; with 0 they stay where they are.
-    first_steps : int
-        Steps of the weights before the premises move.
-    begun : Tuned, optional
-        What earlier turns have found: these go on from there.
+    The weights start at those of the problem's penalty and take ``first_steps`` before the premises
+    move, in so many ``turns`` at most; with 0 these stay where they are. ``n_rows`` are rows by
+    weight; ``evaluation`` is that of the start, where it is known.
     """
     steps = _STEPS
     if problem.n_columns > MOST_COLUMNS:
         first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
-    if begun is not None and begun.is_trained:
-        return _risen(begun, premise, free, turns, steps)
-    if begun is not None:
-        x, evaluation = begun.displacement, begun.evaluation
-    else:
-        x = np.zeros(premise.size)
+    x = np.zeros(premise.size)
+    if evaluation is None:
         evaluation = problem.evaluate(premise.parameters(x))
     start = _improved(problem, evaluation, x, problem.penalty, first_steps, free, n_rows)
     if premise.size == 0 or turns == 0:
@@ -224,19 +203,18 @@ def _improved(
     Steps that are alike are taken on to where they lead, if the evidence rises there; the last is
     always a plain one.
     """
-    line, n_rules = problem.common_line, problem.antecedent.n_rules
+    line = problem.common_line
     n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
     n_distinct = problem.rows.n_rows  # a search sample has no row twice
 
     def posterior_at(weights):
         error = evaluation.mean_squared_error
-        return laplace(
-            evaluation.normal, line, error, weights, n_rows, n_rules, x, curvature, n_outputs
-        )
+        normal = evaluation.normal
+        return laplace(normal, line, error, weights, n_rows, n_outputs, x, curvature)
 
     posterior, before = posterior_at(penalty), None
     for left in reversed(range(steps)):
-        least = least_weights(posterior, n_rules, n_distinct) if has_least else None
+        least = least_weights(posterior, n_distinct) if has_least else None
         plain = reestimated(posterior, free, least, n_distinct)
         far = extrapolated(line, before, posterior.penalty, plain, free, least)
         if before is not None and is_settled(line, posterior.penalty, far):

@@ -42,7 +42,7 @@ def laplace_at(problem, evaluation, penalty, **premises):
         evaluation.mean_squared_error,
         penalty,
         problem.rows.total_weight,
-        problem.antecedent.n_rules,
+        problem.n_outputs,
         **premises,
     )
 
