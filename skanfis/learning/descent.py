@@ -29,12 +29,11 @@ import numpy as np
 from .._sklearn import Interval, StrOptions
 from .objective import Evaluation, JointGradient
 from .solver import LeastSquares, Solver, SolverResult
+from .varpro import GRADIENT_FACTOR
 
 _RISE, _FALL = 1.0, -1.0
 # His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
 _CHANGES = [([_FALL, _FALL, _FALL, _FALL], 1.1), ([_RISE, _FALL, _RISE, _FALL], 0.9)]
-# Gradients below this part of tol times the cost are zero, as in ``varpro``.
-_GRADIENT_FACTOR = 1e-2
 
 
 class StepSize:
@@ -78,23 +77,17 @@ class NaturalPremise:
         parameters = self.premise.parameters(x)[self._first]
         return np.where(self._is_log, np.exp(parameters * self._is_log), parameters)
 
-    def _by_parameters(self, x):
-        """The derivatives of n by the antecedent's parameters, each by its own alone."""
-        return np.where(self._is_log, self._natural(x), 1.0)
-
-    def _jacobian(self, x):
-        """dn / dx."""
-        every = np.eye(self._tied.size)
-        transposed, _ = self.premise.pull_back(x, every, every)
-        return self._by_parameters(x)[:, None] * transposed.T[self._first]
-
     def slope(self, x, by_parameters, stiffness):
         """Gradient of F + stiffness/2 |x|^2 by n, out of dF / d parameters.
 
         Also the largest entry of the gradient by x, projected on the box.
         """
-        jacobian = self._jacobian(x)
-        gradient = np.bincount(self._tied, by_parameters) / self._by_parameters(x)
+        # The derivatives of n by the antecedent's parameters, each by its own alone.
+        natural = np.where(self._is_log, self._natural(x), 1.0)
+        every = np.eye(self._tied.size)
+        transposed, _ = self.premise.pull_back(x, every, every)
+        jacobian = natural[:, None] * transposed.T[self._first]  # dn / dx
+        gradient = np.bincount(self._tied, by_parameters) / natural
         by_displacement = jacobian.T @ gradient + stiffness * x
         gradient += np.linalg.solve(jacobian.T, stiffness * x)
         inside = np.clip(x - by_displacement, self.premise.lower, self.premise.upper)
@@ -158,7 +151,8 @@ class _Descent(Solver):
         length = StepSize(self.step_size, point.cost)
         loss_curve, n_iter = [point.evaluation.mean_squared_error], 0
         while True:
-            if self.error_goal is not None and _rms_error(point) <= self.error_goal:
+            rms_error = np.sqrt(point.evaluation.mean_squared_error / problem.n_outputs)
+            if self.error_goal is not None and rms_error <= self.error_goal:
                 best, status = point, "error_goal"
                 break
             if n_iter == max_iter:
@@ -167,7 +161,7 @@ class _Descent(Solver):
             by_premises, by_coefficients = self._gradient(problem, point)
             slope, steepest = natural.slope(point.x, by_premises, stiffness)
             steepest = max(steepest, np.abs(by_coefficients).max(initial=0.0))
-            if steepest <= _GRADIENT_FACTOR * self.tol * point.cost:
+            if steepest <= GRADIENT_FACTOR * self.tol * point.cost:
                 status = "gradient"
                 break
             whole = np.concatenate([slope, by_coefficients])
@@ -193,11 +187,6 @@ class _Descent(Solver):
     def _gradient(problem, point):
         """By the antecedent's parameters, and by the coefficients that take steps."""
         raise NotImplementedError
-
-
-def _rms_error(point):
-    n_outputs = point.evaluation.coefficients.shape[1]
-    return np.sqrt(point.evaluation.mean_squared_error / n_outputs)
 
 
 class Hybrid(_Descent):

@@ -43,8 +43,8 @@ from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
 # The weights that the evidence can find.
 FREE = ("agreement", "alpha", "slope", "stiffness")
 # Beyond these the weights mean nothing: rounding, and rules that are one line to every digit.
-_SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
-_LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
+SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
+LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
 _AGREEMENT, _STIFFNESS = range(len(WEIGHTS))
 _OTHERS = slice(len(WEIGHTS), None)
 # The premises' weight has a prior of its own, as if so many displacements of such a size had been
@@ -54,13 +54,13 @@ _PRIOR_NUMBER = 100.0
 # The pulls on components of the departures, and those on slopes, are expected to be within a factor
 # of three of their mean, as one standard deviation s: 1 / s^2.
 _LIKENESS = 1.0 / np.log(3.0) ** 2
-# Least weights where there are fewer distinct rows than this per consequent.
-_UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
 # Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone;
 # and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
 # count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
 # noise is fitted.
 ROWS_EACH = 2.0
+# Least weights where there are fewer distinct rows than this per consequent.
+_UNDERDETERMINED = ((1.0, 1e-4), (ROWS_EACH, 1e-6))
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
@@ -68,7 +68,7 @@ _LONGEST_STEP = np.log(100.0)
 # Successive steps of a weight are alike from this ratio on; next to one, all the way is open.
 _ALIKE, _MOST_ALIKE = 0.5, 0.99
 # Below all weights: a logarithm can be taken of it.
-_NOTHING = 1e-30
+_NOTHING = np.finfo(float).tiny
 # What changes a weight by less leaves its second digit as it is.
 _SETTLED = 5e-3
 # The target of a fit that is exact to rounding has no more digits than this, squared.
@@ -293,7 +293,7 @@ def _limited(penalty, line, weights, moves, others, least):
     slopes, components = _blocks(line)
     # All of a block, or none.
     moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
-    low, high = line.weights(_SMALLEST), line.weights(_LARGEST)
+    low, high = line.weights(SMALLEST), line.weights(LARGEST)
     if least is not None:
         low = np.maximum(low, line.weights(least))
     found = np.where(moves, np.clip(weights, low, high), others)

@@ -28,10 +28,10 @@ LOG_FACTOR = np.log(4.0)
 # A shape that makes the top of an ordered term flat, and so truer next to a neighbour, by this.
 LOG_FLATTER = np.log(1.5)
 # Terms may leave the data by this part of their mean distance: a term as narrow as may be is still
-# more than half true at the edge. Where they are free, by the second.
-_BEYOND, _FREE_BEYOND = 0.25, 1.0
-# A gap that a step has closed, as part of the range.
-_SMALLEST_GAP = 1e-9
+# more than half true at the edge. Where they are free, by all of it.
+_BEYOND = 0.25
+# Less than rounding leaves: of displacements, and of gaps as parts of the range.
+NEXT_TO_NOTHING = 1e-9
 # Between two terms one is at least so true, and at most so true is the smaller: more, and no reader
 # can say which of the two is meant.
 _LEAST_TRUTH, _GREATEST_CROSSING = 0.5, 0.9
@@ -98,7 +98,7 @@ class OrderedTerms:
             # Where the data go on further, as in a heavy tail, there is hardly a row.
             low = max(low, 2.0 * values[0] - values[1])
             high = min(high, 2.0 * values[-1] - values[-2])
-        margin = (_FREE_BEYOND if is_free else _BEYOND) * spacing
+        margin = spacing if is_free else _BEYOND * spacing
         low, high = low - margin, high + margin
         gaps = np.diff(np.concatenate([[low], values, [high]]))
         n = gaps.size
@@ -136,7 +136,7 @@ class OrderedTerms:
     def gaps_of(self, values):
         """Gaps of any locations; where these are out of order, as little as can be."""
         gaps = np.diff(np.concatenate([[self.low], values, [self.high]]))
-        return np.maximum(gaps, _SMALLEST_GAP * (self.high - self.low))
+        return np.maximum(gaps, NEXT_TO_NOTHING * (self.high - self.low))
 
     def from_gaps(self, gaps):
         """The displacements of the locations at which the gaps are these."""

@@ -16,10 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..antecedent import Antecedent
-from .ordered_terms import LOG_FACTOR, LOG_FLATTER, OrderedTerms, terms_of
-
-# Displacements this near to an edge of the box are on it.
-_ON_EDGE = 1e-9
+from .ordered_terms import LOG_FACTOR, LOG_FLATTER, NEXT_TO_NOTHING, OrderedTerms, terms_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +96,7 @@ class Premise:
             x[row.widths] -= row.widening(gaps)
         # What stands on an edge stays there whatever rounding says: it is what does not move.
         for edge in (self.lower, self.upper):
-            x = np.where(np.abs(x - edge) < _ON_EDGE, edge, x)
+            x = np.where(np.abs(x - edge) < NEXT_TO_NOTHING, edge, x)
         return x
 
     def pull_back(self, displacement, gradient, gauss_newton):

@@ -59,10 +59,10 @@ class Membership(ABC):
         that a derivative is the imaginary part at a complex step.
         """
 
-    @staticmethod
-    @abstractmethod
-    def log_value(x, theta):
+    @classmethod
+    def log_value(cls, x, theta):
         """log mu(x), shape (n_terms, n_rows), finite, without overflow or underflow."""
+        return cls.log_value_and_gradient(x, theta)[0]
 
     @staticmethod
     @abstractmethod

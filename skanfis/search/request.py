@@ -58,6 +58,7 @@ class StructureRequest:
         if isinstance(self.partition, TSKModel):
             model = self.partition
             antecedent = imported_antecedent(model, rows)
+            self._check_number(antecedent.n_rules)
             default = default_term_names(model.antecedent, model.minimum, model.maximum)
             # Names that say where terms stand are made anew when these have moved.
             names = () if model.term_names == default else model.term_names
@@ -97,13 +98,15 @@ class StructureRequest:
 
     def _antecedent(self, rows):
         """The rules that were asked for."""
-        if not isinstance(self.n_mfs, str):
-            return self._grid(rows)
-        label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
-        return clustered_antecedent(self.families, rows, label, self.premise_inputs)
+        if isinstance(self.n_mfs, str):
+            label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
+            return clustered_antecedent(self.families, rows, label, self.premise_inputs)
+        counts = self._grid_counts(rows)
+        self._check_number(prod(counts))
+        check_grid_fits(self.n_mfs, counts, 1 + self.consequent_inputs.size, rows.y.shape[1])
+        return grid_antecedent(self.families, counts, Spacing(rows))
 
     def _tuned(self, antecedent, rows):
-        self._check_number(antecedent.n_rules)
         self._warn_if_underdetermined(antecedent.n_rules, rows)
         plan = self._plan(rows)
         return tuned_start(antecedent, rows, plan, self.premises_move, self.simplicity)
@@ -157,16 +160,10 @@ class StructureRequest:
 
         return checked
 
-    def _grid(self, rows):
-        counts = self._grid_counts(rows)
-        self._check_number(prod(counts))
-        check_grid_fits(self.n_mfs, counts, 1 + self.consequent_inputs.size, rows.y.shape[1])
-        return grid_antecedent(self.families, counts, Spacing(rows))
-
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""
         has_terms = ~rows.inputs.is_constant
-        has_terms[np.setdiff1d(np.arange(has_terms.size), self.premise_inputs)] = False
+        has_terms &= np.isin(np.arange(has_terms.size), self.premise_inputs)
         counts = term_counts(self.n_mfs, self.names)
         if np.ndim(self.n_mfs) == 0:
             return [count if has else 1 for has, count in zip(has_terms, counts, strict=True)]

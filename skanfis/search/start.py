@@ -18,7 +18,7 @@ from ..learning.premise import Premise
 from ..model import TSKModel
 from .choice import tolerated
 from .sample import effective_weight, search_sample
-from .trials import Plan
+from .trials import FEWEST_ROWS, Plan
 from .tuning import (
     ARRIVING,
     FIRST_STEPS,
@@ -35,8 +35,6 @@ from .tuning import (
 
 # What terms without bounds must leave of the expected squared error: nearer, chance decides.
 _LESS_ERROR = 0.9
-# The weights of rules that are given are found on at most so many representative rows.
-_MOST_ROWS = 1000
 # Of displacements, in spacings of terms: rounding errors stay below.
 _DIGITS = 5
 
@@ -83,7 +81,7 @@ def tuned_start(
     if not premises_move and "stiffness" in free:
         free = [key for key in free if key != "stiffness"]
         penalty = replace(penalty, stiffness=0.0)
-    sample = search_sample(rows, _MOST_ROWS)
+    sample = search_sample(rows, FEWEST_ROWS)
     slopes = plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.order, penalty, consequent_inputs=slopes)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box

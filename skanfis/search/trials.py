@@ -26,16 +26,14 @@ from .candidates import Candidate, rule_base, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
 from .splits import best_splits
-from .tuning import FIRST_STEPS, Tuned, tune, with_sparse_slopes
+from .tuning import FEW_TURNS, FIRST_STEPS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters, and at least.
-_ROWS_EACH, _FEWEST_ROWS = 40, 1000
+_ROWS_EACH, FEWEST_ROWS = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
 # Of a pass over the rows of a training.
 _MOST_OPERATIONS = 1e9
-# Turns of weights and premises of a candidate.
-_TURNS = 2
 # Of the inputs, or splits, that the residual asks for most, so many are tried.
 _TRIED = 4
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
@@ -90,10 +88,9 @@ class Trials:
 
     def rows_for(self, candidate):
         """As many as its parameters need; powers of two, for few sets of rows serve them all."""
-        needed = max(_ROWS_EACH * self.n_parameters(candidate), _FEWEST_ROWS)
-        n_rows = min(
-            _FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / _FEWEST_ROWS))), self.rows.n_rows
-        )
+        needed = max(_ROWS_EACH * self.n_parameters(candidate), FEWEST_ROWS)
+        n_rows = FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / FEWEST_ROWS)))
+        n_rows = min(n_rows, self.rows.n_rows)
         if n_rows not in self._parts:
             part = self.rows.part(slice(n_rows))
             self._parts[n_rows] = replace(part, inputs=unit_scale(part.X))
@@ -176,7 +173,7 @@ class Trials:
         )
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
 
-    def _train(self, problem, turns=_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
+    def _train(self, problem, turns=FEW_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
         inputs, weight = problem.rows.inputs, effective_weight(problem.rows)
         premise = Premise.of(problem.antecedent, inputs.minimum, inputs.maximum)
         free = self.plan.free

@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from ..learning.evidence import (
+    LARGEST,
     PRIOR_DISPLACEMENT,
+    SMALLEST,
     Laplace,
     extrapolated,
     is_settled,
@@ -40,7 +42,7 @@ FIRST_STEPS = 5
 ARRIVING = 50
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 MOST_COLUMNS = 512
-_FEW_STEPS, _FEW_TURNS = 3, 2
+_FEW_STEPS, FEW_TURNS = 3, 2
 # Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
 # A turn: a few iterations of the premises, and steps of the weights to follow them. Neither is
@@ -49,12 +51,10 @@ _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
 _TOLERANCE = 1e-3
 # The smallest rise of the evidence, in -2 log p, after which another turn follows.
 _RISE = 0.5
-# Of terms without bounds: weights next to nothing, which rounding errors need, and a first turn
-# that goes far.
-_NO_WEIGHT, _UNBOUNDED_ITERATIONS = 1e-12, 25
-# Agreement: beyond the last weight, all rules are one line; less of a rise is not worth a training.
+# The first turn of terms without bounds goes far.
+_UNBOUNDED_ITERATIONS = 25
+# Of agreement: less of a rise is not worth a training.
 _MOST_RAISES, _HALVINGS, _LEAST_RAISE = 3, 8, 2.0
-_MOST_AGREEMENT = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ def tune(
     """
     steps = _STEPS
     if problem.n_columns > MOST_COLUMNS:
-        first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
+        first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
     x = np.zeros(premise.size)
@@ -150,8 +150,8 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: fl
     What the premises of the start leave of data without noise would be taken for noise.
     """
     x = np.zeros(premise.size)
-    nothing: dict[str, Any] = dict.fromkeys(free, _NO_WEIGHT)
-    penalty = replace(problem.penalty, **nothing)
+    least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
+    penalty = replace(problem.penalty, **least)
     evaluation = problem.evaluate(premise.parameters(x))
     start = _improved(problem, evaluation, x, penalty, 0, free, n_rows)
     first = _turned(start, premise, penalty, free, FIRST_STEPS, _UNBOUNDED_ITERATIONS, False)
@@ -271,7 +271,7 @@ def with_sparse_slopes(tuned: Tuned, free) -> Tuned:
 
 def _most_agreement(tuned: Tuned, most: float) -> float:
     """The largest agreement at which the consequents alone keep the error, by bisection."""
-    low, high = np.log(tuned.penalty.agreement), np.log(_MOST_AGREEMENT)
+    low, high = np.log(tuned.penalty.agreement), np.log(LARGEST.agreement)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
         penalty = replace(tuned.penalty, agreement=float(np.exp(middle)))

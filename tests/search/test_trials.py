@@ -14,7 +14,7 @@ from skanfis.membership import Gaussian
 from skanfis.search.candidates import Candidate
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
-from skanfis.search.trials import _FEWEST_ROWS, _ROWS_EACH, Plan, Trials
+from skanfis.search.trials import _ROWS_EACH, FEWEST_ROWS, Plan, Trials
 from skanfis.search.tuning import FIRST_PENALTY
 
 from .. import oracles
@@ -153,8 +153,8 @@ def test_a_candidate_sees_as_many_rows_as_its_parameters_need(rng):
     X, y = surface(rng, 9000, 2)
     trials = trials_of(X, y)
     for n_clusters, n_rows in (
-        (0, _FEWEST_ROWS),
-        (3, _FEWEST_ROWS),
+        (0, FEWEST_ROWS),
+        (3, FEWEST_ROWS),
         (12, 4000),
         (20, 8000),
         (90, 9000),
