@@ -69,21 +69,16 @@ def terms_of(antecedent):
 
 @dataclass(frozen=True, eq=False)
 class OrderedTerms:
-    """The terms of one input, one after another.
+    """The terms of one input, one after another."""
 
-    ``locations`` are their positions in the vector, ``widths`` those of all their widths, ``terms``
-    which term each of these belongs to; ``low`` and ``high`` the ends of the range. ``basis`` and
-    ``inverse`` lead from displacements to logarithms of gaps, but for a constant, and back.
-    """
-
-    locations: np.ndarray
-    widths: np.ndarray
-    terms: np.ndarray
-    low: float
+    locations: np.ndarray  # their positions in the vector of all parameters
+    widths: np.ndarray  # those of all their widths
+    terms: np.ndarray  # which term each of these belongs to
+    low: float  # the ends of the range
     high: float
-    log_gaps: np.ndarray
-    basis: np.ndarray
-    inverse: np.ndarray
+    log_gaps: np.ndarray  # at the start
+    basis: np.ndarray  # from displacements to logarithms of gaps, but for a constant
+    inverse: np.ndarray  # and back
 
     @classmethod
     def of(cls, own, parameters, low, high, is_free):
@@ -133,14 +128,11 @@ class OrderedTerms:
         gaps = np.exp(logs - logs.max())
         return gaps * ((self.high - self.low) / gaps.sum())
 
-    def gaps_of(self, values):
-        """Gaps of any locations; where these are out of order, as little as can be."""
+    def of_locations(self, values):
+        """Gaps of any locations, next to nothing where out of order; displacements at these."""
         gaps = np.diff(np.concatenate([[self.low], values, [self.high]]))
-        return np.maximum(gaps, NEXT_TO_NOTHING * (self.high - self.low))
-
-    def from_gaps(self, gaps):
-        """The displacements of the locations at which the gaps are these."""
-        return self.inverse @ (np.log(gaps) - self.log_gaps)
+        gaps = np.maximum(gaps, NEXT_TO_NOTHING * (self.high - self.low))
+        return gaps, self.inverse @ (np.log(gaps) - self.log_gaps)
 
     @staticmethod
     def _beside(gaps):

@@ -40,7 +40,7 @@ class Penalty:
 
     agreement: float = 0.0  # lambda
     alpha: float = 0.0  # pull of each rule to the common line, the mean of all components
-    slope: float | None = None  # rho, on the slopes of the common line, their mean; None is alpha
+    slope: float = 0.0  # rho, on the slopes of the common line, their mean
     stiffness: float = 0.0  # kappa, on the displacements of the premises
     # Of each component of the departures in alphas, and of the slope by each input in rhos; one
     # where there is none. Those of some rows hold for others, where other inputs are constant.
@@ -56,11 +56,6 @@ class Penalty:
         """How many coefficients less there are: of every common slope, one is left."""
         n_common = sum(len(rules) - 1 for _, rules in self.common)
         return n_common + sum(len(rules) for _, rules in self.absent)
-
-    @property
-    def rho(self):
-        """The weight of the common line's slopes."""
-        return self.alpha if self.slope is None else self.slope
 
 
 def mean_and_parts(weights, names):
@@ -92,18 +87,7 @@ class CommonLine:
 
     ``extent`` (n_rules, n_basis - 1) is how far from its centre each rule stands for rows, along
     every input; ``slopes`` are the inputs that the consequents are linear in, None for those that
-    are constant.
-
-    Attributes
-    ----------
-    departures : Departures
-        From the line, of the local coefficients u.
-    slopes : list of int
-        The inputs, those that vary, by which b has slopes.
-    to_slopes : ndarray of shape (n_slopes, n_columns)
-        These slopes out of u.
-    height : ndarray of shape (n_columns,)
-        The unit vector along which all rules rise alike: the null space of the whole penalty.
+    are constant. By the others, which the attribute lists, the line has slopes.
     """
 
     def __init__(
@@ -127,7 +111,7 @@ class CommonLine:
         scale = scale.ravel()
         along = orthonormal * scale[:, None]
         self.departures = Departures(scale, orthonormal, along, antecedent, slopes)
-        # b = triangle^-1 along' u
+        # The slopes of b = triangle^-1 along' u.
         is_varying = np.array([j is not None for j in slopes], dtype=bool)
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
         self.slopes, self.to_slopes = [j for j in slopes if j is not None], to_slopes[is_varying]
@@ -140,6 +124,7 @@ class CommonLine:
         self._per_unit = extent.mean(axis=0) / local.spread
         self._function = {j: k for k, j in enumerate(slopes) if j is not None}
         self._free: dict[tuple, np.ndarray] = {}
+        # Along which all rules rise alike: the null space of the whole penalty.
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
 
@@ -151,15 +136,11 @@ class CommonLine:
     def pull(self, penalty: Penalty):
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
         weights = self.weights(penalty)[len(WEIGHTS) :]
-        if penalty.pulls:
-            rooted = np.sqrt(weights)[self._part, None] * self._rows
-            matrix = rooted.T @ rooted
-        else:
-            rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
-            matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
+        rooted = np.sqrt(weights)[self._part, None] * self._rows
+        matrix = rooted.T @ rooted
         if self._to_none.size:
             # What is constant has no slope to learn, but one that is held.
-            matrix += penalty.rho * self._to_none.T @ self._to_none
+            matrix += penalty.slope * self._to_none.T @ self._to_none
         return matrix
 
     def free(self, penalty: Penalty):
@@ -197,7 +178,7 @@ class CommonLine:
 
     def weights(self, penalty: Penalty):
         """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
-        rho, alpha = penalty.rho, penalty.alpha
+        rho, alpha = penalty.slope, penalty.alpha
         slopes = [rho * penalty.slope_pulls.get(j, 1.0) for j in self.slopes]
         components = [alpha * penalty.pulls.get(one, 1.0) for one in self.departures.components]
         return np.array([penalty.agreement, penalty.stiffness, *slopes, *components], dtype=float)

@@ -91,8 +91,7 @@ class Premise:
         """The displacement at which the antecedent has these parameters."""
         x = ((parameters - self.antecedent.parameters) / self._unit)[: self.size]
         for row in self._ordered:
-            gaps = row.gaps_of(parameters[row.locations])
-            x[row.locations] = row.from_gaps(gaps)
+            gaps, x[row.locations] = row.of_locations(parameters[row.locations])
             x[row.widths] -= row.widening(gaps)
         # What stands on an edge stays there whatever rounding says: it is what does not move.
         for edge in (self.lower, self.upper):

@@ -50,13 +50,6 @@ def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
 
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
     Neither the order of the rows nor whether one is repeated or weighted makes any difference.
-
-    Returns
-    -------
-    table : ndarray of shape (n_distinct, n_inputs + n_outputs)
-    weight : ndarray of shape (n_distinct,)
-    indices : ndarray of shape (n_distinct,)
-        The first row of each.
     """
     weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     numbers = rows.fingerprints()

@@ -167,10 +167,8 @@ class Trials:
         known, penalty = None, plan.first
         if smaller is not None:
             known, penalty = smaller.evaluation.antecedent, smaller.penalty
-        inputs, slopes = self.scattered_inputs, plan.consequent_inputs
-        antecedent = rule_base(
-            candidate, rows, plan.families, inputs, self.spacing, plan.seed, known
-        )
+        inputs, spacing, slopes = self.scattered_inputs, self.spacing, plan.consequent_inputs
+        antecedent = rule_base(candidate, rows, plan.families, inputs, spacing, plan.seed, known)
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
 
     def _train(self, problem, turns=FEW_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
@@ -185,17 +183,12 @@ class Trials:
         antecedent, coefficients = tuned.evaluation.antecedent, tuned.solved.coefficients
         if held is not None:
             antecedent, coefficients = held(tuned.problem, tuned.solved)
-        n_inputs, low, high = seen.X.shape[1], seen.y.min(axis=0), seen.y.max(axis=0)
+        n_inputs, targets = seen.X.shape[1], unit_scale(seen.y)
+        slopes, order = tuned.problem.consequent_inputs, self.plan.order
         model = TSKModel(
             antecedent=antecedent,
             initial_antecedent=antecedent,
-            coefficients=in_user_units(
-                coefficients,
-                seen.inputs,
-                unit_scale(seen.y),
-                tuned.problem.consequent_inputs,
-                self.plan.order,
-            ),
+            coefficients=in_user_units(coefficients, seen.inputs, targets, slopes, order),
             reference=np.zeros(n_inputs),
             spread=np.ones(n_inputs),
             minimum=seen.inputs.minimum,
@@ -203,6 +196,6 @@ class Trials:
             rule_weights=tuned.evaluation.masses,
             rule_rows=tuned.evaluation.masses,
             input_names=tuple(f"x{j}" for j in range(n_inputs)),
-            target=TargetRange(low, high, np.ones(low.size)),
+            target=TargetRange(targets.minimum, targets.maximum, targets.scale),
         )
         return np.sum((model.predict(rows.X) - rows.y) ** 2, axis=1)

@@ -293,7 +293,7 @@ def scaled(penalty: Penalty, free, ratio, agreement_is_raised=False):
     own = {
         "agreement": penalty.agreement / (ratio if agreement_is_raised else 1.0),
         "alpha": penalty.alpha,
-        "slope": penalty.rho,
+        "slope": penalty.slope,
         "stiffness": penalty.stiffness,
     }
     weights: dict[str, Any] = {key: _in_digits(own[key] * ratio) for key in free}

@@ -19,7 +19,7 @@ from skanfis.membership import Bell, Gaussian
 from .. import oracles
 
 # Of the two: the ridge that every problem has, and all that there is at once.
-PLAIN = Penalty(alpha=1e-4)
+PLAIN = Penalty(alpha=1e-4, slope=1e-4)
 FULL = Penalty(agreement=0.3, alpha=1e-3, slope=1e-2)
 
 
@@ -147,7 +147,9 @@ def test_gauss_newton_is_the_schur_complement(case):
 def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
     # Solving with one factorisation and projecting with another is 4 % wrong here (anchors.md).
     g = np.random.default_rng(3)
-    case = Case(duplicated_rule(g), 1, oracles.bumpy_rows(g, 250), Penalty(alpha=alpha))
+    case = Case(
+        duplicated_rule(g), 1, oracles.bumpy_rows(g, 250), Penalty(alpha=alpha, slope=alpha)
+    )
     point = case.problem.antecedent.parameters  # the two rules are the same still
     linearisation = case.problem.linearise(case.problem.evaluate(point))
     # Rounding grows by 1 / alpha along what the two rules leave open, in the dense problem too.

@@ -80,8 +80,8 @@ def test_a_candidate_begins_where_its_trial_ended(rng, left):
     assert found.candidates == ["told"]
     assert found.antecedent is tuned.problem.antecedent
     assert found.agreement_is_raised is (left > 1.0)
-    weights = [found.penalty.alpha, found.penalty.rho, found.penalty.stiffness]
-    own = [tuned.penalty.alpha, tuned.penalty.rho, tuned.penalty.stiffness]
+    weights = [found.penalty.alpha, found.penalty.slope, found.penalty.stiffness]
+    own = [tuned.penalty.alpha, tuned.penalty.slope, tuned.penalty.stiffness]
     assert_allclose(weights, np.multiply(own, 0.2), rtol=5e-3)
     if left == 1.0:
         assert_allclose(found.displacement, tuned.displacement, atol=1e-5)
