@@ -6,12 +6,11 @@ consequents that least squares gives, and solves for these again. The step's len
 
     n -> n - kappa g / |g| ,    g = dF / dn ,
 
-and follows the error: kappa grows by 10 % where the error has fallen four times in a row, and
-shrinks by 10 % where it has twice risen and fallen. Centers and widths are in standard deviations
-of their input, so that a fit does not depend on units. His rule has no bounds: a step can make a
-width negative. Here a step that would leave the premises' box ends on its edge, displacement by
-displacement. By the envelope theorem the gradient at solved consequents is that of the joint cost,
-which a pass without square matrices gives (``SeparableProblem.joint``).
+and follows the error (``StepSize``). Centers and widths are in standard deviations of their input,
+so that a fit does not depend on units. His rule has no bounds: a step can make a width negative.
+Here a step that would leave the premises' box ends on its edge, displacement by displacement. By
+the envelope theorem the gradient at solved consequents is that of the joint cost, which a pass
+without square matrices gives (``SeparableProblem.joint``).
 
 **Gradient.** Premises and consequents beta on [1, z] take one such step together, down the gradient
 (dE / dn, dE / dbeta) of the cost E at these consequents (Liu et al. 2009). They start as the

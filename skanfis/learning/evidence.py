@@ -1,6 +1,6 @@
 r"""The evidence of a model: how probable the data are, with all that was learnt averaged out.
 
-By Laplace's method (docs/mathematics.rst), up to what is the same for all models of the same data,
+By Laplace's method, up to what is the same for all models of the same data,
 
     -2 log p = (n - 1) m log 2F + m [log |M| - log |P|+ + log R] + log |I + H / kappa| ,
 
@@ -10,23 +10,11 @@ n is the number of rows by weight, m that of outputs, R that of rules; x are the
 the premises, kappa is their stiffness, H the reduced Gauss-Newton matrix by x. |P|+ leaves out the
 one direction on which no penalty acts, that in which all rules rise alike.
 
-The weights tau of the penalty, P = sum_k tau_k P_k, are where the evidence is largest, which is
-where, for each, as much is paid as is determined (Fellner and Schall; Wood and Fasiolo 2017):
-
-    n / sigma^2  beta' tau_k P_k beta = m [ tr(P^- tau_k P_k) - tr(M^-1 tau_k P_k) ] ,
-
-    n / sigma^2  kappa (|x|^2 + nu x0^2) = tr H (H + kappa)^-1 + nu ,
-
-    sigma^2 = n 2F / ((n - 1) m) ,
-
-each weight being multiplied by the ratio of the right side to the left. nu and x0 are the prior of
-the stiffness, as if nu displacements of size x0 had been seen before, which adds nu (t - log t - 1)
-to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this takes no pass
-over the rows: for any weights, beta is one solve away.
-
-The alpha_c, and the rho_j, are expected to be alike: the logarithm of each is normally distributed
-about their mean, with the standard deviation s = log 3, which adds sum_c (log alpha_c / alpha)^2 /
-s^2 to -2 log p (see ``_step_to_likeness``).
+A weight is the largest evidence's where as much is paid for it as it determines; each is multiplied
+by the ratio of the two (Fellner and Schall; Wood and Fasiolo 2017). At fixed premises this takes no
+pass over the rows: for any weights, beta is one solve away. docs/mathematics.rst has the whole of
+it, with the priors of the stiffness, which is expected as if nu displacements of size x0 had been
+seen before, and of the alpha_c and the rho_j, which are expected to be alike.
 """
 
 from dataclasses import dataclass, replace
@@ -47,12 +35,10 @@ SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
 LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
 _AGREEMENT, _STIFFNESS = range(len(WEIGHTS))
 _OTHERS = slice(len(WEIGHTS), None)
-# The premises' weight has a prior of its own, as if so many displacements of such a size had been
-# seen before: a fifth of a spacing is what a term is expected to move.
+# x0 and nu: a fifth of a spacing is what a term is expected to move.
 PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
-# The pulls on components of the departures, and those on slopes, are expected to be within a factor
-# of three of their mean, as one standard deviation s: 1 / s^2.
+# One standard deviation s of alpha_c, and of rho_j, is a factor of three of their mean: 1 / s^2.
 _LIKENESS = 1.0 / np.log(3.0) ** 2
 # Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone;
 # and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
@@ -213,11 +199,9 @@ def least_weights(posterior: Laplace, n_distinct):
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
     from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the square
-    of what is far for a target, two of its standard deviations.
-
-    Where there are hardly more distinct rows than consequents, a model that passes through every
-    row explains them without noise, and nothing in the data speaks against it. And rounding errors
-    grow by 1 / alpha along what the data leave open. There the weights are never next to nothing.
+    of what is far for a target. Where there are hardly more distinct rows than consequents, a model
+    that passes through every row explains them without noise, and rounding errors grow by 1 / alpha
+    along what the data leave open: there the weights are never next to nothing.
     """
     rows_each = n_distinct / posterior.n_columns
     least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)

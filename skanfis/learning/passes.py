@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..antecedent import Antecedent, by_group, by_parameter
+from ..antecedent import Antecedent, by_parameter
 from ..consequent import basis, rule_outputs
 from .gram import DesignMoments
 from .ordered_terms import terms_of
@@ -185,12 +185,7 @@ class JointPass:
                 change = antecedent.sum_over_rules(squares)
                 change -= antecedent.sum_over_rules(strengths) * total
                 by_term -= (0.5 * agreement) * own * change
-            # Not by ``by_parameter``: there is no need of an array of every parameter's rows.
-            parts = [
-                np.einsum("pti,ti->pt", gradient, own).ravel()
-                for gradient, own in by_group(gradients, by_term)
-            ]
-            premises += np.concatenate(parts or [premises[:0]])
+            premises += by_parameter(gradients, by_term).sum(axis=1)
 
 
 def own_parameters(antecedent):

@@ -7,9 +7,7 @@ The cost of a model is, as docs/mathematics.rst explains,
 and every part is quadratic in the consequents beta.
 
 *Agreement*, lambda. V, the mean over rows of sum_r w_r (f_r - y_hat)^2, is the disagreement of
-rules that fire on the same row. With G the Gram matrix of the design, V = beta' Q beta with
-Q = B - G, where B is block diagonal and its block of rule r the row sum over r' of the blocks
-G_(r, r'): nothing else is accumulated.
+rules that fire on the same row.
 
 *The rules' common line* b, alpha_c. It is the line of least squares through all rules. delta_r is
 how much rule r differs from it, in its value at its own centre and in its slopes times the distance
@@ -69,7 +67,8 @@ def mean_and_parts(weights, names):
 def disagreement_matrix(gram, n_rules, local: LocalBasis):
     """Q = B - G of the disagreement V = beta' Q beta, and G itself, in the local basis.
 
-    ``gram`` is that of the design on [1, z].
+    B is block diagonal, its block of rule r the sum over r' of the blocks G_(r, r'); ``gram`` is
+    that of the design on [1, z].
     """
     n_columns = gram.shape[0]
     n_basis = n_columns // n_rules

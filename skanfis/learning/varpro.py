@@ -32,6 +32,7 @@ _SMALLEST_CURVATURE = 1e-6
 _WORTH = 0.1
 # The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.
 GRADIENT_FACTOR = 1e-2
+TOLERANCE = 1e-3
 
 
 def trust_region_step(gradient, hessian, radius, damping=0.0):
@@ -52,13 +53,6 @@ def trust_region_step(gradient, hessian, radius, damping=0.0):
         values += (length / radius - 1.0) * length**2 / np.sum(step**2 / values)
         step = slope / values
     return -vectors @ step
-
-
-def _free(x, gradient, premise):
-    """Displacements that a descent may move without leaving the box."""
-    stuck_low = (x <= premise.lower) & (gradient > 0.0)
-    stuck_high = (x >= premise.upper) & (gradient < 0.0)
-    return ~(stuck_low | stuck_high)
 
 
 def _propose(x, gradient, hessian, premise, free, radius, damping):
@@ -101,7 +95,8 @@ def varpro(
         gradient, curvature = premise.pull_back(x, raw.gradient, raw.gauss_newton)
         gradient = gradient + stiffness * x
         hessian = curvature + stiffness * np.eye(x.size)
-        free = _free(x, gradient, premise)
+        # What a descent may move without leaving the box.
+        free = np.where(gradient > 0.0, x > premise.lower, x < premise.upper) | (gradient == 0.0)
         steepest = float(np.max(np.abs(gradient[free]), initial=0.0))
         if steepest <= GRADIENT_FACTOR * tol * cost:
             status = "gradient"
@@ -180,7 +175,7 @@ class VariableProjection(Solver):
         "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
     }
 
-    def __init__(self, *, tol: float = 1e-3, stiffness: str | float = "auto") -> None:
+    def __init__(self, *, tol: float = TOLERANCE, stiffness: str | float = "auto") -> None:
         self.tol = tol
         self.stiffness = stiffness
 

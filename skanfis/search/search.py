@@ -70,7 +70,7 @@ class StructureSearch:
                 return
             now = self._judge(larger, in_folds)
             n_further += 1
-            if self.judges.prefer(now, best):
+            if self.judges.are_less(now.squares, best.squares):
                 best, n_further = now, 0
             if self.judges.are_less(now.free_squares, best_free.free_squares):
                 best_free, n_further = now, 0

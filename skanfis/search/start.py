@@ -61,14 +61,15 @@ def started(tuned: Tuned, plan: Plan, left: float, candidates, is_free=False) ->
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
     low, high = problem.rows.inputs.box
     premise = Premise.of(problem.antecedent, low, high, is_free)
-    tuned = with_most_agreement(tuned, premise, plan.free, left)
+    agreeing = with_most_agreement(tuned, premise, plan.free, left)
+    is_raised = agreeing is not tuned
     return Start(
         problem.antecedent,
-        scaled(tuned.penalty, plan.free, n_rows / plan.n_all, tuned.agreement_is_raised),
+        scaled(agreeing.penalty, plan.free, n_rows / plan.n_all, is_raised),
         # Training goes on from there, without the digits that rounding errors reach.
-        np.round(tuned.displacement, _DIGITS),
+        np.round(agreeing.displacement, _DIGITS),
         is_free,
-        tuned.agreement_is_raised,
+        is_raised,
         candidates,
     )
 

@@ -30,7 +30,7 @@ from ..learning.objective import Evaluation, SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..learning.sparse_slopes import sparse_slopes
-from ..learning.varpro import varpro
+from ..learning.varpro import TOLERANCE, varpro
 from ..reading_cost import reading_cost
 
 # In the middle of what data of every kind ask for; from there the first steps find their way.
@@ -48,7 +48,6 @@ _MOST_EFFECTIVE = 0.5
 # A turn: a few iterations of the premises, and steps of the weights to follow them. Neither is
 # finished while the other moves: what is left is done in the training that follows.
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
-_TOLERANCE = 1e-3
 # The smallest rise of the evidence, in -2 log p, after which another turn follows.
 _RISE = 0.5
 # The first turn of terms without bounds goes far.
@@ -65,7 +64,6 @@ class Tuned:
     evaluation: Evaluation
     displacement: np.ndarray
     posterior: Laplace
-    agreement_is_raised: bool = False  # as far as the tolerance allows
 
     @property
     def penalty(self):
@@ -182,7 +180,7 @@ def _turned(
         problem,
         premise,
         max_iter=iterations,
-        tol=_TOLERANCE,
+        tol=TOLERANCE,
         stiffness=penalty.stiffness,
         start=tuned.displacement,
         evaluation=problem.solved_again(tuned.evaluation),
@@ -255,7 +253,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, left: float) -> Tu
             best, agreement = found, 0.0
         else:
             agreement = float(np.sqrt(best.penalty.agreement * agreement))
-    return best if best is tuned else replace(best, agreement_is_raised=True)
+    return best
 
 
 def with_sparse_slopes(tuned: Tuned, free) -> Tuned:
