@@ -12,8 +12,7 @@ from sklearn.utils.validation import has_fit_parameter
 from .._validation import warn_user
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..learning.data import StandardisedData
-from ..learning.evidence import FREE
-from ..membership import Gaussian, Membership
+from ..membership import Gaussian
 from ..model import TSKModel
 from ..naming import default_term_names
 from .candidates import KINDS
@@ -23,30 +22,22 @@ from .sample import effective_weight, n_distinct_inputs
 from .search import StructureSearch
 from .size import check_columns_fit, check_grid_fits, check_rules_fit, term_counts
 from .start import Start, imported_antecedent, tuned_start
-from .trials import Held, Plan
-from .tuning import FIRST_PENALTY, scaled
+from .trials import Plan
+from .tuning import scaled
 
 # Columns that a warning names; it counts the others.
 _MOST_NAMED = 10
 
 
-@dataclass(frozen=True, eq=False)
-class StructureRequest:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StructureRequest(Plan):
     """What was asked for."""
 
     n_mfs: Any
     partition: Any  # as given; a model in place of the estimator that holds it
-    families: Sequence[type[Membership]]  # one per input
-    order: int
-    premise_inputs: np.ndarray
-    consequent_inputs: np.ndarray
-    weights: dict[str, float]  # of the penalty, those that are given, of ``evidence.FREE``
     premises_move: bool  # whether what is trained afterwards moves them
-    seed: int  # of clusterings that have none of their own
     names: Sequence[str]  # of the inputs
     simplicity: float  # what may be given up for a model that costs less to read
-    max_rules: int | None
-    held: Held | None = None
 
     def start(self, rows: StandardisedData) -> Start:
         """Where to start from, for these rows."""
@@ -75,26 +66,10 @@ class StructureRequest:
             left_out.append("scattered")
         return [kind for kind in KINDS if kind not in left_out]
 
-    @property
-    def _free(self):
-        """Weights that were not given."""
-        return [key for key in FREE if key not in self.weights]
-
     def _plan(self, rows):
-        given: dict[str, Any] = {**self.weights}
-        is_constant = rows.inputs.is_constant
-        return Plan(
-            self.families,
-            self.order,
-            self.premise_inputs[~is_constant[self.premise_inputs]],
-            self.consequent_inputs,
-            self.seed,
-            self._free,
-            replace(FIRST_PENALTY, **given),
-            effective_weight(rows),
-            self.max_rules,
-            self.held,
-        )
+        """The same for these rows: what never changes has no terms."""
+        varying = self.premise_inputs[~rows.inputs.is_constant[self.premise_inputs]]
+        return replace(self, premise_inputs=varying, n_all=effective_weight(rows))
 
     def _antecedent(self, rows):
         """The rules that were asked for."""
@@ -114,7 +89,7 @@ class StructureRequest:
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
         """A start found on a sample, with the weights that were not given those of all rows."""
         ratio = effective_weight(sample) / effective_weight(rows)
-        penalty = scaled(start.penalty, self._free, ratio, start.agreement_is_raised)
+        penalty = scaled(start.penalty, self.free, ratio, start.agreement_is_raised)
         return replace(start, penalty=penalty)
 
     def _check_combination(self):

@@ -78,13 +78,10 @@ def tuned_start(
     antecedent: Antecedent, rows: StandardisedData, plan: Plan, premises_move, simplicity
 ) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows."""
-    free, penalty = plan.free, plan.first
-    if not premises_move and "stiffness" in free:
-        free = [key for key in free if key != "stiffness"]
-        penalty = replace(penalty, stiffness=0.0)
-    sample = search_sample(rows, FEWEST_ROWS)
-    slopes = plan.consequent_inputs
-    problem = SeparableProblem(sample, antecedent, plan.order, penalty, consequent_inputs=slopes)
+    if not premises_move:
+        plan = replace(plan, weights={"stiffness": 0.0} | plan.weights)
+    sample, free, slopes = search_sample(rows, FEWEST_ROWS), plan.free, plan.consequent_inputs
+    problem = SeparableProblem(sample, antecedent, plan.order, plan.first, consequent_inputs=slopes)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box
     premise, is_free = Premise.of(antecedent, low, high), False
     turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move and free else (0, ARRIVING)
@@ -104,7 +101,7 @@ def tuned_start(
         most = tolerated(error, variance, simplicity)
         best = simpler if simpler.expected_error <= most else best
         left = most / best.expected_error
-    return started(best, replace(plan, free=free), left, [_as_given(best)], is_free)
+    return started(best, plan, left, [_as_given(best)], is_free)
 
 
 def _as_given(tuned: Tuned):

@@ -10,14 +10,15 @@ A candidate sees as many rows as its parameters need, and not more.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..antecedent import Antecedent
 from ..consequent import in_user_units
 from ..learning.data import StandardisedData
+from ..learning.evidence import FREE
 from ..learning.objective import Evaluation, SeparableProblem
-from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..membership import Membership
 from ..model import TSKModel
@@ -26,7 +27,7 @@ from .candidates import Candidate, rule_base, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
 from .splits import best_splits
-from .tuning import FEW_TURNS, FIRST_STEPS, Tuned, tune, with_sparse_slopes
+from .tuning import FEW_TURNS, FIRST_PENALTY, FIRST_STEPS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters, and at least.
 _ROWS_EACH, FEWEST_ROWS = 40, 1000
@@ -44,20 +45,29 @@ _SIGNIFICANT = 2.0
 Held = Callable[[SeparableProblem, Evaluation], tuple[Antecedent, np.ndarray]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
     """What all trainings of a search have in common."""
 
     families: Sequence[type[Membership]]  # one per input
     order: int
-    inputs: np.ndarray  # those that may have terms
+    premise_inputs: np.ndarray  # those that may have terms
     consequent_inputs: np.ndarray
-    seed: int  # of the clustering
-    free: list[str]  # weights of the penalty that the evidence finds, of ``evidence.FREE``
-    first: Penalty  # where they start
-    n_all: float  # rows by weight that the final model will be trained on
-    most_rules: int | None
+    weights: dict[str, Any]  # of the penalty, those that are given, of ``evidence.FREE``
+    seed: int  # of clusterings that have none of their own
+    max_rules: int | None
     held: Held | None = None
+    n_all: float = np.nan  # rows by weight that the final model will be trained on
+
+    @property
+    def free(self):
+        """Weights that the evidence finds."""
+        return [key for key in FREE if key not in self.weights]
+
+    @property
+    def first(self):
+        """The penalty at the start."""
+        return replace(FIRST_PENALTY, **self.weights)
 
 
 class Trials:
@@ -70,21 +80,21 @@ class Trials:
         self._parts: dict[int, StandardisedData] = {}
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
-        self.scattered_inputs = plan.inputs
+        self.scattered_inputs = plan.premise_inputs
         # A line has no premises to move: begun is done.
         line = self._train(self._problem(self.one_rule), first_steps=FIRST_STEPS)
         self._begun[self.one_rule] = self._found[self.one_rule] = line
         # Scattered rules have terms on those inputs of which the line's residual says something.
         scores = self._scores(self.one_rule)
         asked = scores > _SIGNIFICANT
-        self.scattered_inputs = plan.inputs[
+        self.scattered_inputs = plan.premise_inputs[
             asked if asked.any() else scores == scores.max(initial=0)
         ]
 
     def _scores(self, candidate):
         # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
-        counts = [candidate.counts[j] + 2 for j in self.plan.inputs]
-        return term_scores(self.tuned(candidate), self.plan.inputs, counts, self.spacing)
+        counts = [candidate.counts[j] + 2 for j in self.plan.premise_inputs]
+        return term_scores(self.tuned(candidate), self.plan.premise_inputs, counts, self.spacing)
 
     def rows_for(self, candidate):
         """As many as its parameters need; powers of two, for few sets of rows serve them all."""
@@ -101,11 +111,11 @@ class Trials:
         if kind == "scattered":
             grown = [candidate.with_more_clusters()] if self.scattered_inputs.size else []
         elif kind == "tree":
-            splits = best_splits(self.tuned(candidate), self.plan.inputs, _TRIED)
+            splits = best_splits(self.tuned(candidate), self.plan.premise_inputs, _TRIED)
             grown = [candidate.with_split(split) for split in splits]
         else:
             asking = np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]
-            grown = [candidate.with_more_terms(j) for j in self.plan.inputs[asking]]
+            grown = [candidate.with_more_terms(j) for j in self.plan.premise_inputs[asking]]
         smaller = self.tuned(candidate)
         promising = [
             (one, self._train(self._problem(one, smaller), turns=0))
@@ -125,7 +135,7 @@ class Trials:
         return candidate.n_rules * n_basis + 2 * candidate.n_terms(self.scattered_inputs)
 
     def _is_small(self, candidate):
-        most = self.plan.most_rules or np.inf
+        most = self.plan.max_rules or np.inf
         if candidate.n_rules > most or self.n_parameters(candidate) > self.rows.n_rows:
             return False
         if any(count > self.spacing.n_values(j) for j, count in enumerate(candidate.counts)):
