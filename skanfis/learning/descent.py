@@ -21,7 +21,7 @@ solution of least squares and are never solved for again (the second of the four
 from collections import deque
 from dataclasses import dataclass
 from numbers import Real
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -116,8 +116,13 @@ class _Descent(Solver):
 
     There is no other end than ``max_iter``, ``error_goal`` and a projected gradient of zero;
     without the last the error may rise and fall for ever. The result is the epoch of least cost.
+
+    ``_at`` gives the point at some displacements, after a step of the coefficients or at their
+    solution; ``_gradient`` that by the antecedent's parameters and by coefficients that take steps.
     """
 
+    _at: ClassVar[Any]
+    _gradient: ClassVar[Any]
     _parameter_constraints: ClassVar[dict] = {
         "step_size": [Interval(Real, 0, None, closed="neither")],
         "error_goal": [Interval(Real, 0, None, closed="left"), None],
@@ -176,16 +181,6 @@ class _Descent(Solver):
                 status = "stopped"
                 break
         return SolverResult(best.evaluation, np.array(loss_curve), n_iter, status)
-
-    @staticmethod
-    def _at(problem, premise, stiffness, x, coefficients):
-        """The point at some displacements, after a step of the coefficients or their solution."""
-        raise NotImplementedError
-
-    @staticmethod
-    def _gradient(problem, point):
-        """By the antecedent's parameters, and by the coefficients that take steps."""
-        raise NotImplementedError
 
 
 class Hybrid(_Descent):

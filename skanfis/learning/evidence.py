@@ -229,26 +229,19 @@ def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
         determined[_STIFFNESS] += _PRIOR_NUMBER
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = _log_ratio(determined, cost)
-    slopes, components = _blocks(line)
+    slopes, components = line.kinds == "slope", line.kinds == "alpha"
     if n_distinct < ROWS_EACH * posterior.n_columns:
         step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
-    moves = _is_free(free, line, now.size) & (before > 0.0)
+    moves = np.isin(line.kinds, free) & (before > 0.0)
     ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
     return _limited(penalty, line, now * ratio, moves, now, least)
 
 
 def _log_ratio(determined, cost):
     return np.log((determined + 1e-12) / (cost + 1e-12))
-
-
-def _blocks(line):
-    """Where the weights on slopes are in a row, and where those on components."""
-    first = len(WEIGHTS)
-    after = first + len(line.slopes)
-    return slice(first, after), slice(after, None)
 
 
 def _step_to_likeness(cost, determined, weights):
@@ -264,18 +257,10 @@ def _step_to_likeness(cost, determined, weights):
     return z - wrightomega(z + np.log(cost / (2.0 * _LIKENESS) + _NOTHING))
 
 
-def _is_free(free, line, size):
-    """Of a row of weights, which of them may be found."""
-    found = np.full(size, "alpha" in free)
-    found[_AGREEMENT], found[_STIFFNESS] = "agreement" in free, "stiffness" in free
-    found[_blocks(line)[0]] = "slope" in free
-    return found
-
-
 def _limited(penalty, line, weights, moves, others, least):
     """The penalty of weights within their limits where they move, and of others where not."""
-    slopes, components = _blocks(line)
-    # All of a block, or none.
+    slopes, components = line.kinds == "slope", line.kinds == "alpha"
+    # All of a kind, or none.
     moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
     low, high = line.weights(SMALLEST), line.weights(LARGEST)
     if least is not None:
@@ -303,7 +288,7 @@ def extrapolated(line, before, now, after, free, least):
     weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
     first, second, third = np.log(np.maximum(weights, _NOTHING))
     step, last = third - second, second - first
-    moves = _is_free(free, line, step.size)
+    moves = np.isin(line.kinds, free)
     moves &= (step * last > 0.0) & (np.abs(step) >= _ALIKE * np.abs(last))
     if not moves.any():
         return after

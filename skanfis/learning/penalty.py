@@ -118,6 +118,8 @@ class CommonLine:
         self._part = np.concatenate(
             [np.arange(len(self.slopes)), len(self.slopes) + self.departures.component]
         )
+        parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.departures.components)
+        self.kinds = np.array([*WEIGHTS, *parts])
         self.n_rules, self._n_basis = n_rules, n_basis
         # Slopes per unit of z out of local ones, in units of a typical extent; where each stands.
         self._per_unit = extent.mean(axis=0) / local.spread
@@ -176,7 +178,7 @@ class CommonLine:
         return linalg.helmert(rules.size) @ self.of_slopes(j, rules)
 
     def weights(self, penalty: Penalty):
-        """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
+        """All weights in a row, of these ``kinds``: of ``WEIGHTS``, every slope and component."""
         rho, alpha = penalty.slope, penalty.alpha
         slopes = [rho * penalty.slope_pulls.get(j, 1.0) for j in self.slopes]
         components = [alpha * penalty.pulls.get(one, 1.0) for one in self.departures.components]

@@ -55,16 +55,6 @@ def trust_region_step(gradient, hessian, radius, damping=0.0):
     return -vectors @ step
 
 
-def _propose(x, gradient, hessian, premise, free, radius, damping):
-    """A point within box and region, the step to it, and the decrease that the model promises."""
-    step = np.zeros_like(x)
-    step[free] = trust_region_step(gradient[free], hessian[np.ix_(free, free)], radius, damping)
-    # The point and not the step is what meets an edge of the box to the last bit.
-    trial_x = np.clip(x + step, premise.lower, premise.upper)
-    step = trial_x - x
-    return trial_x, step, -(gradient @ step + 0.5 * step @ hessian @ step)
-
-
 def varpro(
     problem,
     premise,
@@ -102,9 +92,13 @@ def varpro(
             status = "gradient"
             break
         while True:
-            damping = _WORTH * cost
-            trial_x, step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
+            step, own = np.zeros_like(x), hessian[np.ix_(free, free)]
+            step[free] = trust_region_step(gradient[free], own, radius, _WORTH * cost)
+            # The point and not the step is what meets an edge of the box to the last bit.
+            trial_x = np.clip(x + step, premise.lower, premise.upper)
+            step = trial_x - x
             length = float(np.linalg.norm(step))
+            expected = -(gradient @ step + 0.5 * step @ hessian @ step)
             trial = problem.evaluate(premise.parameters(trial_x), current.coefficients)
             trial_cost = trial.cost + 0.5 * stiffness * (trial_x @ trial_x)
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf

@@ -28,8 +28,6 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-__all__ = ["Membership", "Parameter"]
-
 # exp(-u^2 / 2) = 1/2 at this u.
 _HALF_HEIGHT = np.sqrt(2.0 * np.log(2.0))
 

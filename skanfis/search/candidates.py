@@ -69,10 +69,6 @@ class Candidate:
         counts[j] += 1
         return replace(self, counts=tuple(counts))
 
-    def with_split(self, split):
-        """The tree with one leaf more."""
-        return replace(self, splits=(*self.splits, split))
-
     def with_more_clusters(self):
         """Half as many scattered rules again, two at least."""
         number = max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters)))

@@ -112,7 +112,7 @@ class Trials:
             grown = [candidate.with_more_clusters()] if self.scattered_inputs.size else []
         elif kind == "tree":
             splits = best_splits(self.tuned(candidate), self.plan.premise_inputs, _TRIED)
-            grown = [candidate.with_split(split) for split in splits]
+            grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
         else:
             asking = np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]
             grown = [candidate.with_more_terms(j) for j in self.plan.premise_inputs[asking]]
