@@ -25,10 +25,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from .._sklearn import Interval, StrOptions
-from .objective import Evaluation, JointGradient
+from .._sklearn import Interval
+from .objective import Evaluation
 from .solver import LeastSquares, Solver, SolverResult
-from .varpro import GRADIENT_FACTOR
+from .varpro import GRADIENT_FACTOR, TOLERANCE, VariableProjection
 
 _RISE, _FALL = 1.0, -1.0
 # His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
@@ -108,7 +108,7 @@ class _Point:
     x: np.ndarray
     evaluation: Evaluation
     cost: float
-    joint: JointGradient | None = None  # where the pass that gives the cost gives it too
+    gradient: tuple = ()  # where the pass that gives the cost gives it too
 
 
 class _Descent(Solver):
@@ -123,11 +123,9 @@ class _Descent(Solver):
 
     _at: ClassVar[Any]
     _gradient: ClassVar[Any]
-    _parameter_constraints: ClassVar[dict] = {
+    _parameter_constraints: ClassVar[dict] = VariableProjection._parameter_constraints | {
         "step_size": [Interval(Real, 0, None, closed="neither")],
         "error_goal": [Interval(Real, 0, None, closed="left"), None],
-        "tol": [Interval(Real, 0, None, closed="left")],
-        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
     }
 
     def __init__(
@@ -135,7 +133,7 @@ class _Descent(Solver):
         *,
         step_size: float = 0.01,
         error_goal: float | None = None,
-        tol: float = 1e-3,
+        tol: float = TOLERANCE,
         stiffness: str | float = "auto",
     ) -> None:
         self.step_size = step_size
@@ -224,8 +222,8 @@ class Hybrid(_Descent):
     @staticmethod
     def _gradient(problem, point):
         evaluation = point.evaluation
-        joint = problem.joint(evaluation.antecedent.parameters, evaluation.coefficients)
-        return joint.premises, np.empty(0)
+        at = evaluation.antecedent.parameters, evaluation.coefficients
+        return problem.joint(*at)[1], np.empty(0)
 
 
 class GradientDescent(_Descent):
@@ -259,10 +257,10 @@ class GradientDescent(_Descent):
 
     @staticmethod
     def _at(problem, premise, stiffness, x, coefficients):
-        joint = problem.joint(premise.parameters(x), coefficients)
-        cost = joint.evaluation.cost + 0.5 * stiffness * (x @ x)
-        return _Point(x, joint.evaluation, cost, joint)
+        evaluation, *gradient = problem.joint(premise.parameters(x), coefficients)
+        return _Point(x, evaluation, evaluation.cost + 0.5 * stiffness * (x @ x), tuple(gradient))
 
     @staticmethod
     def _gradient(problem, point):
-        return point.joint.premises, point.joint.coefficients.ravel()
+        by_premises, by_coefficients = point.gradient
+        return by_premises, by_coefficients.ravel()

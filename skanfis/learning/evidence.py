@@ -25,7 +25,7 @@ import numpy as np
 from scipy.special import wrightomega
 
 from ..consequent import NormalFactor
-from .objective import NormalEquations
+from .objective import Evaluation
 from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
 
 # The weights that the evidence can find.
@@ -150,9 +150,8 @@ class Laplace:
 
 
 def laplace(
-    normal: NormalEquations,
+    evaluation: Evaluation,
     line: CommonLine,
-    mean_squared_error: float,
     penalty: Penalty,
     n_rows: float,
     n_outputs: int,
@@ -161,16 +160,18 @@ def laplace(
 ):
     """The posterior at fixed premises, for a penalty of any weights.
 
-    ``normal`` and ``mean_squared_error`` are those of an evaluation, at weights of its own;
-    ``n_outputs`` are those that vary: a constant target says nothing about the noise of another.
+    The ``evaluation`` is at weights of its own; ``n_outputs`` are those that vary: a constant one
+    says nothing about the noise of another.
     """
+    normal = evaluation.normal
+    assert normal is not None
     matrix = penalty.agreement * normal.disagreement
     matrix += line.pull(penalty)
     # Of one constant there is no penalty at all: any size will do.
     size = np.trace(matrix) / matrix.shape[0] or 1.0
     # ``matrix`` takes on the factor's shift.
     free = line.free(penalty)
-    own, _, error = normal.with_penalty(matrix, mean_squared_error, free)
+    own, _, error = normal.with_penalty(matrix, evaluation.mean_squared_error, free)
     factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), free)

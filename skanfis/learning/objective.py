@@ -102,15 +102,6 @@ class Linearisation:
     cross: tuple[np.ndarray, ...]  # L^-1 C' / W of every output, L the factor of the consequents
 
 
-@dataclass(frozen=True, eq=False)
-class JointGradient:
-    """The cost at given coefficients, and its gradient by premises and coefficients together."""
-
-    evaluation: Evaluation
-    premises: np.ndarray  # by the antecedent's parameters
-    coefficients: np.ndarray  # by those on [1, z]
-
-
 class SeparableProblem:
     """The reduced problem of one set of rows.
 
@@ -291,7 +282,7 @@ class SeparableProblem:
         return sample.linearise(replace(own, coefficients=coefficients))
 
     def joint(self, parameters, coefficients):
-        """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""
+        """Evaluation, and slopes by both, at ``parameters`` and any ``coefficients`` on [1, z]."""
         antecedent = self.antecedent.with_parameters(parameters)
         premises, slope, square, apart, masses = self._sum(
             JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
@@ -299,11 +290,8 @@ class SeparableProblem:
         local = self.local.to_local(coefficients)
         pull = self._pull @ local
         cost = 0.5 * (square.sum() + self.penalty.agreement * apart.sum() + np.sum(local * pull))
-        return JointGradient(
-            Evaluation(antecedent, cost, coefficients, masses, float(square.sum()), None),
-            -premises,
-            self._by_global(pull) - slope,
-        )
+        evaluation = Evaluation(antecedent, cost, coefficients, masses, float(square.sum()), None)
+        return evaluation, -premises, self._by_global(pull) - slope
 
     def residuals(self, evaluation):
         """Blocks of rows in order: slice, residual of the standardised target, weights or None."""

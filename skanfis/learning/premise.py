@@ -50,22 +50,21 @@ class Premise:
                     upper[np.concatenate([term.shapes for term in own])] = LOG_FLATTER
                 ordered.append(row)
                 continue
-            widths = np.exp([raw[term.widths[0]] for term in own])
+            first = np.array([term.widths[0] for term in own])
+            widths = np.exp(raw[first])
             unit[locations] = widths
             # Up to one width beyond the data, or where the term stands already.
             lower[locations] = np.minimum((minimum[j] - raw[locations]) / widths - 1.0, 0.0)
             upper[locations] = np.maximum((maximum[j] - raw[locations]) / widths + 1.0, 0.0)
-            first = np.array([term.widths[0] for term in own])
-            # What is as narrow as may be is so but for rounding; what is crisp is half of it.
-            is_crisp = widths < 0.75 * antecedent.least_width
-            with np.errstate(divide="ignore"):
-                least = np.log(antecedent.least_width) - raw[first]
-            lower[first] = np.minimum(np.maximum(lower[first], least), 0.0)
             if antecedent.least_width > 0.0:
                 # A cut may become sharper, and no softer: a rule is to be told from the next.
+                least = np.log(antecedent.least_width) - raw[first]
+                lower[first] = np.minimum(np.maximum(lower[first], least), 0.0)
                 upper[first] = 0.0
-            for still in (locations[is_crisp], first[is_crisp]):
-                lower[still] = upper[still] = 0.0
+                # What is as narrow as may be is so but for rounding; what is crisp is half of it.
+                is_crisp = widths < 0.75 * antecedent.least_width
+                for still in (locations[is_crisp], first[is_crisp]):
+                    lower[still] = upper[still] = 0.0
         tied = antecedent.tied
         size = np.unique(tied).size
         return cls(antecedent, lower[:size], upper[:size], unit, tied, tuple(ordered))

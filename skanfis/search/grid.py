@@ -81,9 +81,10 @@ def grid_antecedent(families, counts, spacing: Spacing, known=None):
         if j in terms and terms[j].shape[1] == counts[j]:
             thetas.append(terms[j])
             continue
-        centers = spacing.centers(j, counts[j])
         if j in terms:
             centers = _with_more(np.sort(terms[j][0]), counts[j])
+        else:
+            centers = spacing.centers(j, counts[j])
         thetas.append(families[j].start(centers, _distance(np.diff(centers)), OVERLAP))
     return GridAntecedent.build([families[j] for j in inputs], inputs, thetas)
 

@@ -77,7 +77,6 @@ class Trials:
         self.rows, self.plan = rows, plan
         self.spacing = Spacing(rows)
         self.one_rule = Candidate((1,) * rows.X.shape[1])
-        self._parts: dict[int, StandardisedData] = {}
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
         self.scattered_inputs = plan.premise_inputs
@@ -97,14 +96,11 @@ class Trials:
         return term_scores(self.tuned(candidate), self.plan.premise_inputs, counts, self.spacing)
 
     def rows_for(self, candidate):
-        """As many as its parameters need; powers of two, for few sets of rows serve them all."""
+        """As many as its parameters need, by powers of two: most candidates see the same."""
         needed = max(_ROWS_EACH * self.n_parameters(candidate), FEWEST_ROWS)
         n_rows = FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / FEWEST_ROWS)))
-        n_rows = min(n_rows, self.rows.n_rows)
-        if n_rows not in self._parts:
-            part = self.rows.part(slice(n_rows))
-            self._parts[n_rows] = replace(part, inputs=unit_scale(part.X))
-        return self._parts[n_rows]
+        part = self.rows.part(slice(n_rows))
+        return replace(part, inputs=unit_scale(part.X))
 
     def larger(self, kind, candidate) -> Candidate | None:
         """The next of a kind; None where there are not the rows."""
@@ -131,7 +127,7 @@ class Trials:
 
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
-        n_basis = 1 + (self.plan.consequent_inputs.size if self.plan.order else 0)
+        n_basis = 1 + self.plan.consequent_inputs.size
         return candidate.n_rules * n_basis + 2 * candidate.n_terms(self.scattered_inputs)
 
     def _is_small(self, candidate):

@@ -206,9 +206,7 @@ def _improved(
     n_distinct = problem.rows.n_rows  # a search sample has no row twice
 
     def posterior_at(weights):
-        error = evaluation.mean_squared_error
-        normal = evaluation.normal
-        return laplace(normal, line, error, weights, n_rows, n_outputs, x, curvature)
+        return laplace(evaluation, line, weights, n_rows, n_outputs, x, curvature)
 
     posterior, before = posterior_at(penalty), None
     for left in reversed(range(steps)):
@@ -269,17 +267,14 @@ def with_sparse_slopes(tuned: Tuned, free) -> Tuned:
 
 def _most_agreement(tuned: Tuned, most: float) -> float:
     """The largest agreement at which the consequents alone keep the error, by bisection."""
-    low, high = np.log(tuned.penalty.agreement), np.log(LARGEST.agreement)
+    low, high = tuned.penalty.agreement, LARGEST.agreement
     for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        penalty = replace(tuned.penalty, agreement=float(np.exp(middle)))
+        middle = float(np.sqrt(low * high))
+        penalty = replace(tuned.penalty, agreement=middle)
         # The consequents of another penalty take no pass over the rows but for their error.
         raised = replace(tuned, problem=tuned.problem.with_penalty(penalty))
-        if raised.expected_error <= most:
-            low = middle
-        else:
-            high = middle
-    return float(np.exp(low))
+        low, high = (middle, high) if raised.expected_error <= most else (low, middle)
+    return low
 
 
 def scaled(penalty: Penalty, free, ratio, agreement_is_raised=False):
@@ -288,13 +283,9 @@ def scaled(penalty: Penalty, free, ratio, agreement_is_raised=False):
     But agreement that makes rules hold one by one does so for any number of rows. More digits than
     three say nothing, and would carry rounding errors into the model.
     """
-    own = {
-        "agreement": penalty.agreement / (ratio if agreement_is_raised else 1.0),
-        "alpha": penalty.alpha,
-        "slope": penalty.slope,
-        "stiffness": penalty.stiffness,
-    }
-    weights: dict[str, Any] = {key: _in_digits(own[key] * ratio) for key in free}
+    weights: dict[str, Any] = {key: _in_digits(getattr(penalty, key) * ratio) for key in free}
+    if agreement_is_raised:
+        weights["agreement"] = _in_digits(penalty.agreement)
     for key in ("pulls", "slope_pulls"):
         pulls = getattr(penalty, key)
         weights[key] = {name: _in_digits(pull) for name, pull in pulls.items()}

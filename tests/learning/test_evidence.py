@@ -37,9 +37,8 @@ def rules(rng, n_rules):
 def laplace_at(problem, evaluation, penalty, **premises):
     """The posterior of the problem's rows, at an evaluation of it."""
     return laplace(
-        evaluation.normal,
+        evaluation,
         problem.common_line,
-        evaluation.mean_squared_error,
         penalty,
         problem.rows.total_weight,
         problem.n_outputs,
