@@ -53,10 +53,8 @@ def posterior_of(
     noise *= np.sqrt(n_rows / freedom)
     shared = np.sqrt(np.sum(noise**2) / n_varying)
     # L^-1 T' is the factor of consequents on [1, z], T the local basis.
-    local = problem.local
+    half = np.ascontiguousarray(problem.local.to_global(half.T).T)
     blocks = half.reshape(len(half), -1, problem.n_basis)
-    blocks[:, :, 1:] /= local.spread
-    blocks[:, :, 0] -= np.einsum("crj,rj->cr", blocks[:, :, 1:], local.center)
     blocks[:, :, 1:] /= rows.inputs.scale[problem.consequent_inputs]
     half /= np.sqrt(n_rows)
     if len(half) < n_columns:

@@ -119,11 +119,8 @@ class SeparableProblem:
         map_ordered: Callable[[Callable, Iterable], Iterable] = map,
         consequent_inputs: np.ndarray | None = None,
     ):
-        self.rows = rows
-        self.antecedent = antecedent
-        self.order = order
-        self.penalty = penalty
-        self.map_ordered = map_ordered
+        self.rows, self.antecedent, self.order = rows, antecedent, order
+        self.penalty, self.map_ordered = penalty, map_ordered
         every_input = np.arange(rows.X.shape[1])
         given = every_input if consequent_inputs is None else consequent_inputs
         self.consequent_inputs = given if order == 1 else every_input[:0]

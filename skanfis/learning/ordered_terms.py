@@ -30,7 +30,7 @@ LOG_FLATTER = np.log(1.5)
 # Terms may leave the data by this part of their mean distance: a term as narrow as may be is still
 # more than half true at the edge. Where they are free, by all of it.
 _BEYOND = 0.25
-# Less than rounding leaves: of displacements, and of gaps as parts of the range.
+# Displacements, and gaps as parts of the range, that are less are nothing but rounding.
 NEXT_TO_NOTHING = 1e-9
 # Between two terms one is at least so true, and at most so true is the smaller: more, and no reader
 # can say which of the two is meant.
@@ -54,16 +54,14 @@ class Term:
 
 def terms_of(antecedent):
     """All terms of an antecedent."""
-    terms, start = [], 0
-    for group in antecedent.groups:
+    terms = []
+    for group in antecedent.with_parameters(np.arange(antecedent.parameters.size)).groups:
         kinds = np.array([parameter.kind for parameter in group.family.parameters])
-        is_location, is_width = kinds == "location", kinds == "log_width"
-        is_shape = kinds == "log_shape"
-        positions = start + np.arange(group.theta.size).reshape(group.theta.shape)
-        for own, j in zip(positions.T, group.inputs, strict=True):
-            location, widths, shapes = own[is_location][0], own[is_width], own[is_shape]
-            terms.append(Term(group.family, int(j), own, location, widths, shapes, is_width))
-        start += group.theta.size
+        is_width, is_shape = kinds == "log_width", kinds == "log_shape"
+        for own, j in zip(group.theta.T, group.inputs, strict=True):
+            # The first parameter is the location.
+            widths, shapes = own[is_width], own[is_shape]
+            terms.append(Term(group.family, int(j), own, own[0], widths, shapes, is_width))
     return terms
 
 

@@ -166,11 +166,12 @@ class JointPass:
         basis_rows = design.basis(Z)
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
-        masses += strengths.sum(axis=1) if weight is None else strengths @ weight
+        weight = np.ones(Z.shape[1]) if weight is None else weight
+        masses += strengths @ weight
         for k in range(design.n_outputs):
             by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
             residual = target[k] - output
-            weighted = residual if weight is None else residual * weight
+            weighted = residual * weight
             slope[:, k] += (strengths @ (basis_rows * weighted).T).ravel()
             square[k] += weighted @ residual
             by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
@@ -179,12 +180,11 @@ class JointPass:
                 excess = by_rule_k - strengths * output
                 squares = excess**2 / np.maximum(strengths, _TINY)
                 total = squares.sum(axis=0)
-                own = np.ones_like(total) if weight is None else weight
-                apart[k] += own @ total
-                slope[:, k] -= agreement * ((excess * own) @ basis_rows.T).ravel()
+                apart[k] += weight @ total
+                slope[:, k] -= agreement * ((excess * weight) @ basis_rows.T).ravel()
                 change = antecedent.sum_over_rules(squares)
                 change -= antecedent.sum_over_rules(strengths) * total
-                by_term -= (0.5 * agreement) * own * change
+                by_term -= (0.5 * agreement) * weight * change
             premises += by_parameter(gradients, by_term).sum(axis=1)
 
 

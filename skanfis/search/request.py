@@ -106,11 +106,10 @@ class StructureRequest(Plan):
     def _check_number(self, n_rules):
         """Raise ValueError where more rules are given than may be."""
         if self.max_rules is not None and n_rules > self.max_rules:
-            given = f"n_mfs={self.n_mfs!r}"
-            if isinstance(self.n_mfs, str):
-                given = "partition" + (
-                    "" if isinstance(self.partition, TSKModel) else f"={self.partition!r}"
-                )
+            is_word = isinstance(self.n_mfs, str)
+            given = f"partition={self.partition!r}" if is_word else f"n_mfs={self.n_mfs!r}"
+            if isinstance(self.partition, TSKModel):
+                given = "partition"
             raise ValueError(
                 f"{given} makes {n_rules:,} rules, more than max_rules={self.max_rules}: give "
                 "fewer, or leave max_rules at None."

@@ -129,11 +129,8 @@ def check_inputs(model: TSKModel, names, what):
             f"{what} has rules on {model.n_inputs} inputs ({', '.join(model.input_names)}), but X "
             f"has {len(names)} columns ({', '.join(names)})."
         )
-    numbered = [f"x{j}" for j in range(len(names))]
-    if list(model.input_names) != list(names) and numbered not in (
-        list(model.input_names),
-        list(names),
-    ):
+    own, given = tuple(model.input_names), tuple(names)
+    if own != given and tuple(f"x{j}" for j in range(len(names))) not in (own, given):
         raise ValueError(
             f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
             f"are {', '.join(names)}: give them in this order and by these names."
