@@ -178,9 +178,8 @@ class Trials:
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
 
     def _train(self, problem, turns=FEW_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
-        inputs, weight = problem.rows.inputs, effective_weight(problem.rows)
-        premise = Premise.of(problem.antecedent, inputs.minimum, inputs.maximum)
-        free = self.plan.free
+        free, weight = self.plan.free, effective_weight(problem.rows)
+        premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
         return tune(problem, premise, free, weight, turns, first_steps, evaluation)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
