@@ -81,15 +81,15 @@ def tuned_start(
         plan = replace(plan, weights={"stiffness": 0.0} | plan.weights)
     sample, free, slopes = search_sample(rows, FEWEST_ROWS), plan.free, plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.order, plan.first, consequent_inputs=slopes)
-    n_sample, box = effective_weight(sample), sample.inputs.box
-    premise, is_free = Premise.of(antecedent, *box), False
+    n_sample, (low, high) = effective_weight(sample), sample.inputs.box
+    premise, is_free = Premise.of(antecedent, low, high), False
     turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move and free else (0, ARRIVING)
     best = tune(problem, premise, free, n_sample, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
     if is_bounded and has_rows and problem.n_columns <= MOST_COLUMNS:
-        unbounded = Premise.of(antecedent, *box, is_free=True)
+        unbounded = Premise.of(antecedent, low, high, is_free=True)
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_free = freed, True
