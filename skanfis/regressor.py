@@ -776,11 +776,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
     def _keep_weights(self, penalty):
         """Set the attributes that tell the weights on the consequents, and the noise."""
-        self.agreement_, self.alpha_, self.slope_alpha_ = (
-            penalty.agreement,
-            penalty.alpha,
-            penalty.rho,
-        )
+        self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
+        self.slope_alpha_ = penalty.slope
         names = self.model_.input_names
         self.slope_pulls_ = {names[j]: pull for j, pull in penalty.slope_pulls.items()}
         self.pulls_ = [

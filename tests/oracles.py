@@ -266,7 +266,7 @@ class DenseProblem:
     def _slope_roots(self):
         pulls = self.penalty.slope_pulls
         own = [pulls.get(j, 1.0) for j in self._slope_inputs()]
-        return np.sqrt(self.penalty.rho * np.array(own))
+        return np.sqrt(self.penalty.slope * np.array(own))
 
     def _pulled(self, departures):
         """Departures of all rules, each part times the root of its pull."""

@@ -262,8 +262,7 @@ def test_units_repeats_weights_outputs_and_files():
 
 @pytest.mark.parametrize("block_bytes", [1, 2**22])
 def test_noise_of_hubers_loss_is_his_second_proposal(monkeypatch, block_bytes):
-    monkeypatch.setattr("skanfis.learning.objective._BLOCK_BYTES", block_bytes)
-    monkeypatch.setattr("skanfis.learning.objective._FEWEST_ROWS", 64)
+    monkeypatch.setattr("skanfis.blocks.BLOCK_BYTES", block_bytes)
     g, c = np.random.default_rng(12), 1.3
     given = oracles.bumpy_rows(g, 250, 2, 2, weighted=True)
     # As a fit leaves them: Huber's weights are in those of the rows.

@@ -18,9 +18,9 @@ from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skanfis import ANFISRegressor
+from skanfis import ANFISRegressor, blocks
 from skanfis.inspection import rules_html
-from skanfis.learning import Hybrid, VariableProjection, objective
+from skanfis.learning import Hybrid, VariableProjection
 from skanfis.learning import data as rows
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS
@@ -306,8 +306,8 @@ def test_coverage_is_near_one_amid_data_and_low_in_an_empty_cell():
     ids=["default", "huber", "clusters", "hybrid"],
 )
 def test_number_of_workers_changes_no_bit(monkeypatch, settings):
-    monkeypatch.setattr(objective, "_BLOCK_BYTES", 1)
-    monkeypatch.setattr(objective, "_FEWEST_ROWS", 16)
+    monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)
+    monkeypatch.setattr(blocks, "_FEWEST_ROWS", 16)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
     with_few_candidates(monkeypatch)
     threads, read = set(), StandardisedData.read

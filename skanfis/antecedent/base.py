@@ -44,11 +44,9 @@ def _stack(values, Z):
 
 def by_group(gradients, by_term):
     """Gradients of every group, and what belongs to its terms, out of a row per term."""
-    start = 0
-    for gradient in gradients:
-        stop = start + gradient.shape[1]
-        yield gradient, by_term[start:stop]
-        start = stop
+    ends = np.cumsum([gradient.shape[1] for gradient in gradients])
+    # Without any group there is nothing to split.
+    return zip(gradients, np.split(by_term, ends[:-1]), strict=False)
 
 
 def by_parameter(gradients, by_term):
@@ -158,26 +156,18 @@ class Antecedent(ABC):
 
     def with_parameters(self, parameters):
         """Return the same rule base with other parameters, laid out as in :attr:`parameters`."""
-        groups, start = [], 0
-        for group in self.groups:
-            stop = start + group.theta.size
-            theta = parameters[start:stop].reshape(group.theta.shape)
-            groups.append(replace(group, theta=theta))
-            start = stop
+        ends = np.cumsum([group.theta.size for group in self.groups])
+        parts = zip(self.groups, np.split(parameters, ends[:-1]), strict=False)
+        groups = [replace(group, theta=own.reshape(group.theta.shape)) for group, own in parts]
         return replace(self, groups=tuple(groups))
 
     def change_units(self, offset, scale):
         """Return the same rule base for inputs given as offset + scale * z, per input."""
-        groups = tuple(
-            replace(
-                group,
-                theta=group.family.change_units(
-                    group.theta, offset[group.inputs], scale[group.inputs]
-                ),
-            )
-            for group in self.groups
-        )
-        return replace(self, groups=groups)
+        groups = []
+        for group in self.groups:
+            units = offset[group.inputs], scale[group.inputs]
+            groups.append(replace(group, theta=group.family.change_units(group.theta, *units)))
+        return replace(self, groups=tuple(groups))
 
     def log_memberships(self, Z):
         """Log mu of every term at every row, shape (n_terms, n_rows)."""
@@ -185,12 +175,8 @@ class Antecedent(ABC):
 
     def log_memberships_and_gradient(self, Z):
         """Log mu, and per group its derivatives (n_parameters, n_terms of the group, n_rows)."""
-        values, gradients = [], []
-        for group in self.groups:
-            value, gradient = group.family.log_value_and_gradient(Z[group.inputs], group.theta)
-            values.append(value)
-            gradients.append(gradient)
-        return _stack(values, Z), gradients
+        found = [g.family.log_value_and_gradient(Z[g.inputs], g.theta) for g in self.groups]
+        return _stack([value for value, _ in found], Z), [gradient for _, gradient in found]
 
     def strengths_and_shares(self, Z):
         """Normalised firing strengths w (n_rules, n_rows), and the shares that they factor into."""

@@ -64,10 +64,8 @@ class GridAntecedent(Antecedent):
         return self.counts
 
     def factor_terms(self):
-        edges = accumulate((0, *self.counts))
-        spans = [np.arange(*edge) for edge in pairwise(edges)]
-        inputs = self.term_inputs
-        return [{int(inputs[span[0]]): span[:, None]} for span in spans]
+        terms, inputs = np.arange(self.n_terms)[:, None], self.term_inputs
+        return [{j: terms[inputs == j]} for j in self.share_inputs]
 
     def without_rules(self, rules):
         """As of every rule base; a grid stays a grid where whole terms go.
@@ -86,8 +84,7 @@ class GridAntecedent(Antecedent):
 
     @property
     def share_inputs(self):
-        inputs = [int(j) for group in self.groups for j in group.inputs]
-        return tuple(inputs[start] for start in accumulate((0, *self.counts[:-1])) if inputs)
+        return tuple(dict.fromkeys(self.term_inputs.tolist()))
 
     @property
     def rule_terms(self):

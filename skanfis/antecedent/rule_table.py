@@ -61,14 +61,12 @@ class RuleTableAntecedent(Antecedent):
             for j, theta in zip(group.inputs, group.theta.T, strict=True)
         ]
         rules: list[dict[int, tuple[int, ...]]] = []
-        for row in self.table:
-            rules.append({})
-            for t in sorted(row[row >= 0].tolist()):
-                j = own[t][0]
-                rules[-1][j] = (*rules[-1].get(j, ()), t)
         made: dict[tuple, tuple] = {}
-        for r, rule in enumerate(rules):
-            for j, terms in rule.items():
+        for r, row in enumerate(self.table):
+            used = sorted(row[row >= 0].tolist())
+            inputs = dict.fromkeys(own[t][0] for t in used)
+            rules.append({j: tuple(t for t in used if own[t][0] == j) for j in inputs})
+            for j, terms in rules[r].items():
                 found = _one_term([own[t][1:] for t in terms])
                 if found is None:
                     places = ", ".join(f"{own[t][2][0]:g}" for t in terms)
@@ -83,8 +81,8 @@ class RuleTableAntecedent(Antecedent):
             keys = [key for key in order if made[key][0] is family]
             theta = np.column_stack([made[key][1] for key in keys])
             groups.append(TermGroup(family, np.array([j for j, _ in keys]), theta))
-        place, used = {key: k for k, key in enumerate(order)}, sorted({j for j, _ in order})
-        table = [[place[j, rule[j]] if j in rule else -1 for j in used] for rule in rules]
+        place, columns = {key: k for k, key in enumerate(order)}, sorted({j for j, _ in order})
+        table = [[place[j, rule[j]] if j in rule else -1 for j in columns] for rule in rules]
         return RuleTableAntecedent(tuple(groups), np.array(table)), [terms for _, terms in order]
 
     def normalise(self, log_mu):

@@ -22,30 +22,6 @@ def potentials(points, weight):
     return total
 
 
-def find_centers(points, potential, squash, accept, reject, max_clusters):
-    """Positions of the centres in ``points``, as they were chosen, and their potentials.
-
-    Neither potential nor distance grows: a point that was passed over is never accepted later, so
-    that the next centre is the highest of those that may be one (Chiu 1994).
-    """
-    first, distance = potential.max(), np.full(points.shape[0], np.inf)
-    centers: list[int] = []
-    peaks: list[float] = []
-    while len(centers) < max_clusters:
-        ratio = potential / first
-        may = (ratio > accept) | ((ratio >= reject) & (ratio + distance >= 1.0))
-        if not may.any():
-            break
-        candidates = np.where(may, potential, -np.inf)
-        k = int(np.argmax(candidates >= candidates.max() - _TIE * first))
-        squared = cdist(points[k : k + 1], points, "sqeuclidean")[0]
-        centers.append(k)
-        peaks.append(potential[k])
-        potential = potential - potential[k] * np.exp(-4.0 / squash**2 * squared)
-        distance = np.minimum(distance, np.sqrt(squared))
-    return centers, np.array(peaks)
-
-
 class SubtractiveClustering(Clusterer):
     r"""Subtractive clustering: finds the number of clusters and their centres.
 
@@ -120,10 +96,31 @@ class SubtractiveClustering(Clusterer):
         low, high = rows.min(axis=0), rows.max(axis=0)
         self.widths_ = radius * (high - low) / np.sqrt(8.0)
         points = self._in_radii(rows, low + 0.5 * (high - low))
-        most = rows.shape[0] if self.max_clusters is None else self.max_clusters
-        limits = self.squash, self.accept, self.reject, most
-        centers, self.potentials_ = find_centers(points, potentials(points, weight), *limits)
+        centers, self.potentials_ = self._highest(points, potentials(points, weight))
         self.cluster_centers_ = rows[centers]
+
+    def _highest(self, points, potential):
+        """Positions of the centres in ``points``, as they were chosen, and their potentials.
+
+        Neither potential nor distance grows: a point that was passed over is never accepted later,
+        so that the next centre is the highest of those that may be one (Chiu 1994).
+        """
+        first, distance = potential.max(), np.full(points.shape[0], np.inf)
+        centers: list[int] = []
+        peaks: list[float] = []
+        while self.max_clusters is None or len(centers) < self.max_clusters:
+            ratio = potential / first
+            may = (ratio > self.accept) | ((ratio >= self.reject) & (ratio + distance >= 1.0))
+            if not may.any():
+                break
+            candidates = np.where(may, potential, -np.inf)
+            k = int(np.argmax(candidates >= candidates.max() - _TIE * first))
+            squared = cdist(points[k : k + 1], points, "sqeuclidean")[0]
+            centers.append(k)
+            peaks.append(potential[k])
+            potential = potential - potential[k] * np.exp(-4.0 / self.squash**2 * squared)
+            distance = np.minimum(distance, np.sqrt(squared))
+        return centers, np.array(peaks)
 
     def _checked_radius(self):
         if self.reject > self.accept:

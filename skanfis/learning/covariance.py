@@ -20,9 +20,6 @@ from ..posterior import MOST_PARAMETERS, Posterior, parameter_units
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
-# Where rows leave no freedom, the noise is that of so many.
-_LEAST_FREEDOM = 1.0
-
 
 def posterior_of(
     problem: SeparableProblem, premise: Premise | None, evaluation: Evaluation, n_rows, robust=None
@@ -51,14 +48,13 @@ def posterior_of(
     n_determined = 0.0
     if premise is not None and premise.size:
         premises, cross, n_determined = _premises(problem, premise, evaluation)
-    freedom = n_rows - n_effective - n_determined / n_varying
-    noise *= np.sqrt(n_rows / max(freedom, _LEAST_FREEDOM))
+    # Where rows leave no freedom, the noise is that of one.
+    freedom = max(n_rows - n_effective - n_determined / n_varying, 1.0)
+    noise *= np.sqrt(n_rows / freedom)
     shared = np.sqrt(np.sum(noise**2) / n_varying)
     # L^-1 T' is the factor of consequents on [1, z], T the local basis.
-    local = problem.local
+    half = np.ascontiguousarray(problem.local.to_global(half.T).T)
     blocks = half.reshape(len(half), -1, problem.n_basis)
-    blocks[:, :, 1:] /= local.spread
-    blocks[:, :, 0] -= np.einsum("crj,rj->cr", blocks[:, :, 1:], local.center)
     blocks[:, :, 1:] /= rows.inputs.scale[problem.consequent_inputs]
     half /= np.sqrt(n_rows)
     if len(half) < n_columns:

@@ -59,7 +59,7 @@ class Scale:
         return [None if is_constant[j] else int(j) for j in columns]
 
     @property
-    def box(self):
+    def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest values, standardised."""
         return (self.minimum - self.offset) / self.scale, (self.maximum - self.offset) / self.scale
 

@@ -33,25 +33,15 @@ class Departures:
     ``scale`` is the diagonal of S, ``orthonormal`` and ``along`` (n_columns, n_basis) are Q and A;
     ``slopes`` are the inputs that the functions of the basis but the first are slopes by, None
     where one is constant, and there is nothing to learn.
-
-    Attributes
-    ----------
-    components : list of tuple of int
-        The inputs that each component concerns; () for the rest.
-    component : ndarray of shape (n_columns,)
-        The component, by its place in this list, that each row of D belongs to.
     """
 
     def __init__(self, scale, orthonormal, along, antecedent: Antecedent, slopes):
         self._scale, self._orthonormal, self._along = scale, orthonormal, along
         self._counts = antecedent.grid_counts
         grid = (antecedent.grid_counts, antecedent.share_inputs)
+        # The inputs that each component concerns, () for the rest; and by its place in this list,
+        # the component that each row of D belongs to.
         self.components, self.component = _components(*grid, antecedent.n_rules, tuple(slopes))
-
-    @cached_property
-    def together(self):
-        """N' N, of all components alike."""
-        return np.diag(self._scale**2) - self._along @ self._along.T
 
     @cached_property
     def matrix(self):

@@ -6,12 +6,11 @@ consequents that least squares gives, and solves for these again. The step's len
 
     n -> n - kappa g / |g| ,    g = dF / dn ,
 
-and follows the error: kappa grows by 10 % where the error has fallen four times in a row, and
-shrinks by 10 % where it has twice risen and fallen. Centers and widths are in standard deviations
-of their input, so that a fit does not depend on units. His rule has no bounds: a step can make a
-width negative. Here a step that would leave the premises' box ends on its edge, displacement by
-displacement. By the envelope theorem the gradient at solved consequents is that of the joint cost,
-which a pass without square matrices gives (``SeparableProblem.joint``).
+and follows the error (``StepSize``). Centers and widths are in standard deviations of their input,
+so that a fit does not depend on units. His rule has no bounds: a step can make a width negative.
+Here a step that would leave the premises' box ends on its edge, displacement by displacement. By
+the envelope theorem the gradient at solved consequents is that of the joint cost, which a pass
+without square matrices gives (``SeparableProblem.joint``).
 
 **Gradient.** Premises and consequents beta on [1, z] take one such step together, down the gradient
 (dE / dn, dE / dbeta) of the cost E at these consequents (Liu et al. 2009). They start as the
@@ -22,19 +21,18 @@ solution of least squares and are never solved for again (the second of the four
 from collections import deque
 from dataclasses import dataclass
 from numbers import Real
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from .._sklearn import Interval, StrOptions
-from .objective import Evaluation, JointGradient
+from .._sklearn import Interval
+from .objective import Evaluation
 from .solver import LeastSquares, Solver, SolverResult
+from .varpro import GRADIENT_FACTOR, TOLERANCE, VariableProjection
 
 _RISE, _FALL = 1.0, -1.0
 # His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
 _CHANGES = [([_FALL, _FALL, _FALL, _FALL], 1.1), ([_RISE, _FALL, _RISE, _FALL], 0.9)]
-# Gradients below this part of tol times the cost are zero, as in ``varpro``.
-_GRADIENT_FACTOR = 1e-2
 
 
 class StepSize:
@@ -78,23 +76,17 @@ class NaturalPremise:
         parameters = self.premise.parameters(x)[self._first]
         return np.where(self._is_log, np.exp(parameters * self._is_log), parameters)
 
-    def _by_parameters(self, x):
-        """The derivatives of n by the antecedent's parameters, each by its own alone."""
-        return np.where(self._is_log, self._natural(x), 1.0)
-
-    def _jacobian(self, x):
-        """dn / dx."""
-        every = np.eye(self._tied.size)
-        transposed, _ = self.premise.pull_back(x, every, every)
-        return self._by_parameters(x)[:, None] * transposed.T[self._first]
-
     def slope(self, x, by_parameters, stiffness):
         """Gradient of F + stiffness/2 |x|^2 by n, out of dF / d parameters.
 
         Also the largest entry of the gradient by x, projected on the box.
         """
-        jacobian = self._jacobian(x)
-        gradient = np.bincount(self._tied, by_parameters) / self._by_parameters(x)
+        # The derivatives of n by the antecedent's parameters, each by its own alone.
+        natural = np.where(self._is_log, self._natural(x), 1.0)
+        every = np.eye(self._tied.size)
+        transposed, _ = self.premise.pull_back(x, every, every)
+        jacobian = natural[:, None] * transposed.T[self._first]  # dn / dx
+        gradient = np.bincount(self._tied, by_parameters) / natural
         by_displacement = jacobian.T @ gradient + stiffness * x
         gradient += np.linalg.solve(jacobian.T, stiffness * x)
         inside = np.clip(x - by_displacement, self.premise.lower, self.premise.upper)
@@ -116,7 +108,7 @@ class _Point:
     x: np.ndarray
     evaluation: Evaluation
     cost: float
-    joint: JointGradient | None = None  # where the pass that gives the cost gives it too
+    gradient: tuple = ()  # where the pass that gives the cost gives it too
 
 
 class _Descent(Solver):
@@ -124,13 +116,16 @@ class _Descent(Solver):
 
     There is no other end than ``max_iter``, ``error_goal`` and a projected gradient of zero;
     without the last the error may rise and fall for ever. The result is the epoch of least cost.
+
+    ``_at`` gives the point at some displacements, after a step of the coefficients or at their
+    solution; ``_gradient`` that by the antecedent's parameters and by coefficients that take steps.
     """
 
-    _parameter_constraints: ClassVar[dict] = {
+    _at: ClassVar[Any]
+    _gradient: ClassVar[Any]
+    _parameter_constraints: ClassVar[dict] = VariableProjection._parameter_constraints | {
         "step_size": [Interval(Real, 0, None, closed="neither")],
         "error_goal": [Interval(Real, 0, None, closed="left"), None],
-        "tol": [Interval(Real, 0, None, closed="left")],
-        "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
     }
 
     def __init__(
@@ -138,7 +133,7 @@ class _Descent(Solver):
         *,
         step_size: float = 0.01,
         error_goal: float | None = None,
-        tol: float = 1e-3,
+        tol: float = TOLERANCE,
         stiffness: str | float = "auto",
     ) -> None:
         self.step_size = step_size
@@ -158,7 +153,8 @@ class _Descent(Solver):
         length = StepSize(self.step_size, point.cost)
         loss_curve, n_iter = [point.evaluation.mean_squared_error], 0
         while True:
-            if self.error_goal is not None and _rms_error(point) <= self.error_goal:
+            rms_error = np.sqrt(point.evaluation.mean_squared_error / problem.n_outputs)
+            if self.error_goal is not None and rms_error <= self.error_goal:
                 best, status = point, "error_goal"
                 break
             if n_iter == max_iter:
@@ -167,7 +163,7 @@ class _Descent(Solver):
             by_premises, by_coefficients = self._gradient(problem, point)
             slope, steepest = natural.slope(point.x, by_premises, stiffness)
             steepest = max(steepest, np.abs(by_coefficients).max(initial=0.0))
-            if steepest <= _GRADIENT_FACTOR * self.tol * point.cost:
+            if steepest <= GRADIENT_FACTOR * self.tol * point.cost:
                 status = "gradient"
                 break
             whole = np.concatenate([slope, by_coefficients])
@@ -183,21 +179,6 @@ class _Descent(Solver):
                 status = "stopped"
                 break
         return SolverResult(best.evaluation, np.array(loss_curve), n_iter, status)
-
-    @staticmethod
-    def _at(problem, premise, stiffness, x, coefficients):
-        """The point at some displacements, after a step of the coefficients or their solution."""
-        raise NotImplementedError
-
-    @staticmethod
-    def _gradient(problem, point):
-        """By the antecedent's parameters, and by the coefficients that take steps."""
-        raise NotImplementedError
-
-
-def _rms_error(point):
-    n_outputs = point.evaluation.coefficients.shape[1]
-    return np.sqrt(point.evaluation.mean_squared_error / n_outputs)
 
 
 class Hybrid(_Descent):
@@ -241,8 +222,8 @@ class Hybrid(_Descent):
     @staticmethod
     def _gradient(problem, point):
         evaluation = point.evaluation
-        joint = problem.joint(evaluation.antecedent.parameters, evaluation.coefficients)
-        return joint.premises, np.empty(0)
+        at = evaluation.antecedent.parameters, evaluation.coefficients
+        return problem.joint(*at)[1], np.empty(0)
 
 
 class GradientDescent(_Descent):
@@ -276,10 +257,10 @@ class GradientDescent(_Descent):
 
     @staticmethod
     def _at(problem, premise, stiffness, x, coefficients):
-        joint = problem.joint(premise.parameters(x), coefficients)
-        cost = joint.evaluation.cost + 0.5 * stiffness * (x @ x)
-        return _Point(x, joint.evaluation, cost, joint)
+        evaluation, *gradient = problem.joint(premise.parameters(x), coefficients)
+        return _Point(x, evaluation, evaluation.cost + 0.5 * stiffness * (x @ x), tuple(gradient))
 
     @staticmethod
     def _gradient(problem, point):
-        return point.joint.premises, point.joint.coefficients.ravel()
+        by_premises, by_coefficients = point.gradient
+        return by_premises, by_coefficients.ravel()

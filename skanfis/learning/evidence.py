@@ -1,6 +1,6 @@
 r"""The evidence of a model: how probable the data are, with all that was learnt averaged out.
 
-By Laplace's method (docs/mathematics.rst), up to what is the same for all models of the same data,
+By Laplace's method, up to what is the same for all models of the same data,
 
     -2 log p = (n - 1) m log 2F + m [log |M| - log |P|+ + log R] + log |I + H / kappa| ,
 
@@ -10,23 +10,11 @@ n is the number of rows by weight, m that of outputs, R that of rules; x are the
 the premises, kappa is their stiffness, H the reduced Gauss-Newton matrix by x. |P|+ leaves out the
 one direction on which no penalty acts, that in which all rules rise alike.
 
-The weights tau of the penalty, P = sum_k tau_k P_k, are where the evidence is largest, which is
-where, for each, as much is paid as is determined (Fellner and Schall; Wood and Fasiolo 2017):
-
-    n / sigma^2  beta' tau_k P_k beta = m [ tr(P^- tau_k P_k) - tr(M^-1 tau_k P_k) ] ,
-
-    n / sigma^2  kappa (|x|^2 + nu x0^2) = tr H (H + kappa)^-1 + nu ,
-
-    sigma^2 = n 2F / ((n - 1) m) ,
-
-each weight being multiplied by the ratio of the right side to the left. nu and x0 are the prior of
-the stiffness, as if nu displacements of size x0 had been seen before, which adds nu (t - log t - 1)
-to -2 log p, t = n kappa x0^2 / sigma^2; sigma^2 is held in it. At fixed premises this takes no pass
-over the rows: for any weights, beta is one solve away.
-
-The alpha_c, and the rho_j, are expected to be alike: the logarithm of each is normally distributed
-about their mean, with the standard deviation s = log 3, which adds sum_c (log alpha_c / alpha)^2 /
-s^2 to -2 log p (see ``_step_to_likeness``).
+A weight is the largest evidence's where as much is paid for it as it determines; each is multiplied
+by the ratio of the two (Fellner and Schall; Wood and Fasiolo 2017). At fixed premises this takes no
+pass over the rows: for any weights, beta is one solve away. docs/mathematics.rst has the whole of
+it, with the priors of the stiffness, which is expected as if nu displacements of size x0 had been
+seen before, and of the alpha_c and the rho_j, which are expected to be alike.
 """
 
 from dataclasses import dataclass, replace
@@ -37,30 +25,28 @@ import numpy as np
 from scipy.special import wrightomega
 
 from ..consequent import NormalFactor
-from .objective import NormalEquations
+from .objective import Evaluation
 from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
 
 # The weights that the evidence can find.
 FREE = ("agreement", "alpha", "slope", "stiffness")
 # Beyond these the weights mean nothing: rounding, and rules that are one line to every digit.
-_SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
-_LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
+SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
+LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
 _AGREEMENT, _STIFFNESS = range(len(WEIGHTS))
 _OTHERS = slice(len(WEIGHTS), None)
-# The premises' weight has a prior of its own, as if so many displacements of such a size had been
-# seen before: a fifth of a spacing is what a term is expected to move.
+# x0 and nu: a fifth of a spacing is what a term is expected to move.
 PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
-# The pulls on components of the departures, and those on slopes, are expected to be within a factor
-# of three of their mean, as one standard deviation s: 1 / s^2.
+# One standard deviation s of alpha_c, and of rho_j, is a factor of three of their mean: 1 / s^2.
 _LIKENESS = 1.0 / np.log(3.0) ** 2
-# Least weights where there are fewer distinct rows than this per consequent.
-_UNDERDETERMINED = ((1.0, 1e-4), (2.0, 1e-6))
 # Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone;
 # and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
 # count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
 # noise is fitted.
 ROWS_EACH = 2.0
+# Least weights where there are fewer distinct rows than this per consequent.
+_UNDERDETERMINED = ((1.0, 1e-4), (ROWS_EACH, 1e-6))
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
@@ -68,7 +54,7 @@ _LONGEST_STEP = np.log(100.0)
 # Successive steps of a weight are alike from this ratio on; next to one, all the way is open.
 _ALIKE, _MOST_ALIKE = 0.5, 0.99
 # Below all weights: a logarithm can be taken of it.
-_NOTHING = 1e-30
+_NOTHING = np.finfo(float).tiny
 # What changes a weight by less leaves its second digit as it is.
 _SETTLED = 5e-3
 # The target of a fit that is exact to rounding has no more digits than this, squared.
@@ -90,7 +76,11 @@ class Laplace:
     prior: NormalFactor  # of P, its null space joined in at P's own size
     factor: NormalFactor  # of M
     curvature: np.ndarray  # eigenvalues of H
-    n_columns: int  # consequent parameters of one output
+
+    @property
+    def n_columns(self):
+        """Consequent parameters of one output."""
+        return self.line.height.size - self.penalty.n_held
 
     @cached_property
     def trace_before(self):
@@ -160,29 +150,28 @@ class Laplace:
 
 
 def laplace(
-    normal: NormalEquations,
+    evaluation: Evaluation,
     line: CommonLine,
-    mean_squared_error: float,
     penalty: Penalty,
     n_rows: float,
-    n_rules: int,
+    n_outputs: int,
     displacement=None,
     curvature=None,
-    n_outputs=None,
 ):
     """The posterior at fixed premises, for a penalty of any weights.
 
-    ``normal`` and ``mean_squared_error`` are those of an evaluation, at weights of its own;
-    ``n_outputs`` are those that vary, if not all do: a constant target says nothing about the noise
-    of another.
+    The ``evaluation`` is at weights of its own; ``n_outputs`` are those that vary: a constant one
+    says nothing about the noise of another.
     """
+    normal = evaluation.normal
+    assert normal is not None
     matrix = penalty.agreement * normal.disagreement
     matrix += line.pull(penalty)
     # Of one constant there is no penalty at all: any size will do.
     size = np.trace(matrix) / matrix.shape[0] or 1.0
     # ``matrix`` takes on the factor's shift.
     free = line.free(penalty)
-    own, _, error = normal.with_penalty(matrix, mean_squared_error, free)
+    own, _, error = normal.with_penalty(matrix, evaluation.mean_squared_error, free)
     factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), free)
@@ -195,32 +184,29 @@ def laplace(
         penalty,
         n_rows,
         max(error + float(np.vdot(solved, matrix @ solved) + paid[_STIFFNESS]), _LEAST_ERROR),
-        normal.coefficients.shape[1] if n_outputs is None else n_outputs,
-        factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(n_rules),
+        n_outputs,
+        factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(line.n_rules),
         paid,
         normal.disagreement,
         line,
         prior,
         factor,
         curvature if has_premises else np.empty(0),
-        matrix.shape[0] - penalty.n_held,
     )
 
 
-def least_weights(posterior: Laplace, n_rules, n_distinct):
+def least_weights(posterior: Laplace, n_distinct):
     """The penalty below whose weights the prior expects what no rule that can be read does.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
     from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the square
-    of what is far for a target, two of its standard deviations.
-
-    Where there are hardly more distinct rows than consequents, a model that passes through every
-    row explains them without noise, and nothing in the data speaks against it. And rounding errors
-    grow by 1 / alpha along what the data leave open. There the weights are never next to nothing.
+    of what is far for a target. Where there are hardly more distinct rows than consequents, a model
+    that passes through every row explains them without noise, and rounding errors grow by 1 / alpha
+    along what the data leave open: there the weights are never next to nothing.
     """
     rows_each = n_distinct / posterior.n_columns
     least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)
-    if n_rules == 1:
+    if posterior.line.n_rules == 1:
         return Penalty(least, least, least)
     noise = posterior.noise_variance / posterior.n_rows
     agreement = max(least, posterior.n_columns * noise / _FAR**2)
@@ -244,26 +230,19 @@ def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
         determined[_STIFFNESS] += _PRIOR_NUMBER
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = _log_ratio(determined, cost)
-    slopes, components = _blocks(line)
+    slopes, components = line.kinds == "slope", line.kinds == "alpha"
     if n_distinct < ROWS_EACH * posterior.n_columns:
         step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
-    moves = _is_free(free, line, now.size) & (before > 0.0)
+    moves = np.isin(line.kinds, free) & (before > 0.0)
     ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
     return _limited(penalty, line, now * ratio, moves, now, least)
 
 
 def _log_ratio(determined, cost):
     return np.log((determined + 1e-12) / (cost + 1e-12))
-
-
-def _blocks(line):
-    """Where the weights on slopes are in a row, and where those on components."""
-    first = len(WEIGHTS)
-    after = first + len(line.slopes)
-    return slice(first, after), slice(after, None)
 
 
 def _step_to_likeness(cost, determined, weights):
@@ -279,20 +258,12 @@ def _step_to_likeness(cost, determined, weights):
     return z - wrightomega(z + np.log(cost / (2.0 * _LIKENESS) + _NOTHING))
 
 
-def _is_free(free, line, size):
-    """Of a row of weights, which of them may be found."""
-    found = np.full(size, "alpha" in free)
-    found[_AGREEMENT], found[_STIFFNESS] = "agreement" in free, "stiffness" in free
-    found[_blocks(line)[0]] = "slope" in free
-    return found
-
-
 def _limited(penalty, line, weights, moves, others, least):
     """The penalty of weights within their limits where they move, and of others where not."""
-    slopes, components = _blocks(line)
-    # All of a block, or none.
+    slopes, components = line.kinds == "slope", line.kinds == "alpha"
+    # All of a kind, or none.
     moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
-    low, high = line.weights(_SMALLEST), line.weights(_LARGEST)
+    low, high = line.weights(SMALLEST), line.weights(LARGEST)
     if least is not None:
         low = np.maximum(low, line.weights(least))
     found = np.where(moves, np.clip(weights, low, high), others)
@@ -318,7 +289,7 @@ def extrapolated(line, before, now, after, free, least):
     weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
     first, second, third = np.log(np.maximum(weights, _NOTHING))
     step, last = third - second, second - first
-    moves = _is_free(free, line, step.size)
+    moves = np.isin(line.kinds, free)
     moves &= (step * last > 0.0) & (np.abs(step) >= _ALIKE * np.abs(last))
     if not moves.any():
         return after

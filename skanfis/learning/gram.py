@@ -74,12 +74,8 @@ def _products(groups, n_rows):
 class DesignMoments:
     """Accumulates the moments of one design over blocks of rows.
 
-    Parameters
-    ----------
-    counts : tuple of int
-        Shares per factor of the rule base; empty for a single rule.
-    n_basis : int
-        Basis functions per rule.
+    ``counts`` are the shares per factor of the rule base, none of a single rule; ``n_basis`` basis
+    functions belong to a rule.
     """
 
     def __init__(self, counts, n_basis):

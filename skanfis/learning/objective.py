@@ -28,23 +28,15 @@ from functools import cached_property
 import numpy as np
 
 from ..antecedent import Antecedent
-from ..blocks import BLOCK_ROWS, row_blocks
+from ..blocks import BLOCK_BYTES, fitting_rows, row_blocks
 from ..consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
 from .data import StandardisedData
 from .gram import DesignMoments
 from .passes import Design, FirstPass, JointPass, SecondPass, own_parameters
 from .penalty import CommonLine, Penalty, disagreement_matrix
 
-_TINY = float(np.finfo(float).tiny)
 # A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
 _SMALLEST_FREEDOM = 1e-6
-# Columns up to which a product with an inverse is quicker than solving for every row; to invert
-# more takes as long, and memory.
-_MOST_INVERTED = 512
-# Working set of a block in bytes. Smaller blocks stay nearer to the processor but pay the price of
-# a call to NumPy more often; of 2^18 to 2^24, this was fastest or near it.
-_BLOCK_BYTES = 2**22
-_FEWEST_ROWS = 128
 
 
 def _keep_freed_memory():
@@ -54,7 +46,7 @@ def _keep_freed_memory():
     piece freed so far; without one of this size, every block gets its arrays page by page again,
     and a pass takes up to twice as long. Nothing is written to it. Elsewhere this does nothing.
     """
-    np.empty(2 * _BLOCK_BYTES // 8)
+    np.empty(2 * BLOCK_BYTES // 8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,31 +102,12 @@ class Linearisation:
     cross: tuple[np.ndarray, ...]  # L^-1 C' / W of every output, L the factor of the consequents
 
 
-@dataclass(frozen=True, eq=False)
-class JointGradient:
-    """The cost at given coefficients, and its gradient by premises and coefficients together."""
-
-    evaluation: Evaluation
-    premises: np.ndarray  # by the antecedent's parameters
-    coefficients: np.ndarray  # by those on [1, z]
-
-
 class SeparableProblem:
     """The reduced problem of one set of rows.
 
-    Parameters
-    ----------
-    rows : StandardisedData
-    antecedent : Antecedent
-        The rule base at the start, which freezes the consequents' local basis.
-    order : {0, 1}
-        Order of the consequents.
-    penalty : Penalty
-        What the consequents pay beside their errors.
-    map_ordered : callable
-        ``map``, or what stands in for it to spread chunks over workers; results in order.
-    consequent_inputs : ndarray of int, optional
-        The inputs that the consequents are linear in, if not all are.
+    ``antecedent`` is the rule base at the start, which freezes the consequents' local basis;
+    ``map_ordered`` is ``map``, or what spreads chunks over workers, with results in order;
+    ``consequent_inputs`` are the inputs that the consequents are linear in, if not all are.
     """
 
     def __init__(
@@ -146,26 +119,27 @@ class SeparableProblem:
         map_ordered: Callable[[Callable, Iterable], Iterable] = map,
         consequent_inputs: np.ndarray | None = None,
     ):
-        self.rows = rows
-        self.antecedent = antecedent
-        self.order = order
-        self.penalty = penalty
-        self.map_ordered = map_ordered
+        self.rows, self.antecedent, self.order = rows, antecedent, order
+        self.penalty, self.map_ordered = penalty, map_ordered
         every_input = np.arange(rows.X.shape[1])
         given = every_input if consequent_inputs is None else consequent_inputs
         self.consequent_inputs = given if order == 1 else every_input[:0]
-        takes_every_input = self.consequent_inputs.size == every_input.size
         self.n_basis = 1 + self.consequent_inputs.size
         self.n_columns = antecedent.n_rules * self.n_basis
         self.n_outputs = rows.y.shape[1]
         self._design = Design(
-            None if takes_every_input else self.consequent_inputs,
+            self.consequent_inputs,
             self.n_basis,
             self.n_outputs,
             DesignMoments(antecedent.share_counts, self.n_basis),
             own_parameters(antecedent),
         )
-        self._block_rows = self._rows_of_block(antecedent)
+        self._block_rows = fitting_rows(
+            sum(self._design.moments.shape)
+            + antecedent.parameters.size * (1 + self.n_basis)
+            + 2 * self._design.own_parameters.size
+            + 4 * (antecedent.n_terms + antecedent.n_rules)
+        )
         self._weight = rows.total_weight
         _keep_freed_memory()
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
@@ -213,16 +187,6 @@ class SeparableProblem:
     @cached_property
     def _pull(self):
         return self.common_line.pull(self.penalty)
-
-    def _rows_of_block(self, antecedent):
-        values_per_row = (
-            sum(self._design.moments.shape)
-            + antecedent.parameters.size * (1 + self.n_basis)
-            + 2 * self._design.own_parameters.size
-            + 4 * (antecedent.n_terms + antecedent.n_rules)
-        )
-        fitting = _BLOCK_BYTES // (8 * values_per_row) // 64 * 64
-        return int(np.clip(fitting, _FEWEST_ROWS, BLOCK_ROWS))
 
     def _blocks(self):
         return row_blocks(self.rows.n_rows, self._block_rows)
@@ -315,7 +279,7 @@ class SeparableProblem:
         return sample.linearise(replace(own, coefficients=coefficients))
 
     def joint(self, parameters, coefficients):
-        """Cost and its gradient at ``parameters`` and any ``coefficients`` on [1, z]."""
+        """Evaluation, and slopes by both, at ``parameters`` and any ``coefficients`` on [1, z]."""
         antecedent = self.antecedent.with_parameters(parameters)
         premises, slope, square, apart, masses = self._sum(
             JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
@@ -323,32 +287,23 @@ class SeparableProblem:
         local = self.local.to_local(coefficients)
         pull = self._pull @ local
         cost = 0.5 * (square.sum() + self.penalty.agreement * apart.sum() + np.sum(local * pull))
-        return JointGradient(
-            Evaluation(antecedent, cost, coefficients, masses, float(square.sum()), None),
-            -premises,
-            self._by_global(pull) - slope,
-        )
+        evaluation = Evaluation(antecedent, cost, coefficients, masses, float(square.sum()), None)
+        return evaluation, -premises, self._by_global(pull) - slope
 
     def residuals(self, evaluation):
         """Blocks of rows in order: slice, residual of the standardised target, weights or None."""
+        for part, _, _, residual, weight in self._fired(evaluation):
+            yield part, residual, weight
+
+    def _fired(self, evaluation):
+        """The same with strengths of the rules and functions of the basis, after the slice."""
+        by_rule = self._design.by_rule(evaluation.coefficients)
         for part in self._blocks():
-            yield part, *self.residual(evaluation, part)
-
-    def residual(self, evaluation, part):
-        """Residual (n_outputs, n_rows) of the standardised target, and weights, of some rows."""
-        Z, target, weight = self.rows.read(part)
-        strengths, basis_rows = self._firing(evaluation, Z)
-        return self._residual_at(evaluation, strengths, basis_rows, target), weight
-
-    def _firing(self, evaluation, Z):
-        """Strengths of the rules and functions of the basis at some places."""
-        return evaluation.antecedent.strengths(Z), self._design.basis(Z)
-
-    def _residual_at(self, evaluation, strengths, basis_rows, target):
-        by_rule = evaluation.coefficients.reshape(-1, self.n_basis, self.n_outputs)
-        for k in range(self.n_outputs):
-            target[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
-        return target
+            Z, residual, weight = self.rows.read(part)
+            strengths, basis_rows = evaluation.antecedent.strengths(Z), self._design.basis(Z)
+            for k in range(self.n_outputs):
+                residual[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
+            yield part, strengths, basis_rows, residual, weight
 
     def mean_squares(self, evaluation):
         """Mean square of the residual of every standardised output, (n_outputs,)."""
@@ -357,55 +312,29 @@ class SeparableProblem:
         if self.on_sample is not None:
             # How the outputs share it shows on the sample; all of it is known of all rows.
             found = self.on_sample.mean_squares(evaluation)
-            return found * (evaluation.mean_squared_error / max(found.sum(), _TINY))
+            return found * (evaluation.mean_squared_error / max(found.sum(), np.finfo(float).tiny))
         total, total_weight = np.zeros(self.n_outputs), 0.0
         for _, residual, weight in self.residuals(evaluation):
             total += (residual**2).sum(axis=1) if weight is None else residual**2 @ weight
             total_weight += residual.shape[1] if weight is None else weight.sum()
         return total / total_weight
 
-    def leave_one_out_error(self, evaluation, n_rows, held=None):
+    def leave_one_out_error(self, evaluation, n_rows):
         """Mean squared error of leaving out each row, at fixed premises (Allen 1974).
 
-        The mean of (r_i / (1 - h_i))^2. The weights are those of so many rows: of a row that stands
-        for several, one is left out.
-
-        Coefficients that keep linear constraints are taken as they are, with ``held`` of every
-        output, orthonormal columns (n_columns, n_held) that span L^-1 A', where A has a row for
-        each constraint met with equality. Exact as long as these stay so: what moves without a row
-        is orthogonal to them, and h_i that of this smaller problem.
+        The mean of (r_i / (1 - h_i))^2, h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. The weights are
+        those of so many rows: of a row that stands for several, one is left out.
         """
         total, unit = 0.0, self._weight / n_rows
-        for part in self._blocks():
-            Z, target, weight = self.rows.read(part)
-            strengths, basis_rows = self._firing(evaluation, Z)
-            residual = self._residual_at(evaluation, strengths, basis_rows, target)
-            half = self._half_at(evaluation, strengths, basis_rows)
+        # L^-1 T': what is changed is a matrix of few rows, and not the design.
+        root = self.local.to_global(evaluation.normal.factor.root.T).T
+        for _, strengths, basis_rows, residual, weight in self._fired(evaluation):
+            half = root @ (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)
             leverage = np.einsum("ij,ij->j", half, half)
-            if held is not None:
-                taken = [np.sum((own.T @ half) ** 2, axis=0) for own in held]
-                leverage = leverage - np.stack(taken)
             residual /= np.maximum(1.0 - unit * (leverage / self._weight), _SMALLEST_FREEDOM)
             squares = np.sum(residual**2, axis=0)
             total += squares.sum() if weight is None else weight @ squares
         return float(total / self._weight)
-
-    def half(self, evaluation, part):
-        """W^-1/2 L^-1 phi of some rows, (n_columns, n_rows), of which squares are leverages.
-
-        Those are h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i.
-        """
-        Z, _, _ = self.rows.read(part)
-        return self._half_at(evaluation, *self._firing(evaluation, Z)) / np.sqrt(self._weight)
-
-    def _half_at(self, evaluation, strengths, basis_rows):
-        """L^-1 phi of some places."""
-        design = (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)
-        factor = evaluation.normal.factor
-        if self.n_columns > _MOST_INVERTED:
-            return factor.half_solve(self.local.transform_rows(design))
-        # L^-1 T': what is changed is a matrix of few rows, and not the design.
-        return self.local.to_global(factor.root.T).T @ design
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""

@@ -28,10 +28,10 @@ LOG_FACTOR = np.log(4.0)
 # A shape that makes the top of an ordered term flat, and so truer next to a neighbour, by this.
 LOG_FLATTER = np.log(1.5)
 # Terms may leave the data by this part of their mean distance: a term as narrow as may be is still
-# more than half true at the edge. Where they are free, by the second.
-_BEYOND, _FREE_BEYOND = 0.25, 1.0
-# A gap that a step has closed, as part of the range.
-_SMALLEST_GAP = 1e-9
+# more than half true at the edge. Where they are free, by all of it.
+_BEYOND = 0.25
+# Displacements, and gaps as parts of the range, that are less are nothing but rounding.
+NEXT_TO_NOTHING = 1e-9
 # Between two terms one is at least so true, and at most so true is the smaller: more, and no reader
 # can say which of the two is meant.
 _LEAST_TRUTH, _GREATEST_CROSSING = 0.5, 0.9
@@ -54,36 +54,29 @@ class Term:
 
 def terms_of(antecedent):
     """All terms of an antecedent."""
-    terms, start = [], 0
-    for group in antecedent.groups:
+    terms = []
+    for group in antecedent.with_parameters(np.arange(antecedent.parameters.size)).groups:
         kinds = np.array([parameter.kind for parameter in group.family.parameters])
-        is_location, is_width = kinds == "location", kinds == "log_width"
-        is_shape = kinds == "log_shape"
-        positions = start + np.arange(group.theta.size).reshape(group.theta.shape)
-        for own, j in zip(positions.T, group.inputs, strict=True):
-            location, widths, shapes = own[is_location][0], own[is_width], own[is_shape]
-            terms.append(Term(group.family, int(j), own, location, widths, shapes, is_width))
-        start += group.theta.size
+        is_width, is_shape = kinds == "log_width", kinds == "log_shape"
+        for own, j in zip(group.theta.T, group.inputs, strict=True):
+            # The first parameter is the location.
+            widths, shapes = own[is_width], own[is_shape]
+            terms.append(Term(group.family, int(j), own, own[0], widths, shapes, is_width))
     return terms
 
 
 @dataclass(frozen=True, eq=False)
 class OrderedTerms:
-    """The terms of one input, one after another.
+    """The terms of one input, one after another."""
 
-    ``locations`` are their positions in the vector, ``widths`` those of all their widths, ``terms``
-    which term each of these belongs to; ``low`` and ``high`` the ends of the range. ``basis`` and
-    ``inverse`` lead from displacements to logarithms of gaps, but for a constant, and back.
-    """
-
-    locations: np.ndarray
-    widths: np.ndarray
-    terms: np.ndarray
-    low: float
+    locations: np.ndarray  # their positions in the vector of all parameters
+    widths: np.ndarray  # those of all their widths
+    terms: np.ndarray  # which term each of these belongs to
+    low: float  # the ends of the range
     high: float
-    log_gaps: np.ndarray
-    basis: np.ndarray
-    inverse: np.ndarray
+    log_gaps: np.ndarray  # at the start
+    basis: np.ndarray  # from displacements to logarithms of gaps, but for a constant
+    inverse: np.ndarray  # and back
 
     @classmethod
     def of(cls, own, parameters, low, high, is_free):
@@ -98,7 +91,7 @@ class OrderedTerms:
             # Where the data go on further, as in a heavy tail, there is hardly a row.
             low = max(low, 2.0 * values[0] - values[1])
             high = min(high, 2.0 * values[-1] - values[-2])
-        margin = (_FREE_BEYOND if is_free else _BEYOND) * spacing
+        margin = spacing if is_free else _BEYOND * spacing
         low, high = low - margin, high + margin
         gaps = np.diff(np.concatenate([[low], values, [high]]))
         n = gaps.size
@@ -133,14 +126,11 @@ class OrderedTerms:
         gaps = np.exp(logs - logs.max())
         return gaps * ((self.high - self.low) / gaps.sum())
 
-    def gaps_of(self, values):
-        """Gaps of any locations; where these are out of order, as little as can be."""
+    def of_locations(self, values):
+        """Gaps of any locations, next to nothing where out of order; displacements at these."""
         gaps = np.diff(np.concatenate([[self.low], values, [self.high]]))
-        return np.maximum(gaps, _SMALLEST_GAP * (self.high - self.low))
-
-    def from_gaps(self, gaps):
-        """The displacements of the locations at which the gaps are these."""
-        return self.inverse @ (np.log(gaps) - self.log_gaps)
+        gaps = np.maximum(gaps, NEXT_TO_NOTHING * (self.high - self.low))
+        return gaps, self.inverse @ (np.log(gaps) - self.log_gaps)
 
     @staticmethod
     def _beside(gaps):

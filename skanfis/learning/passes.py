@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..antecedent import Antecedent, by_group, by_parameter
+from ..antecedent import Antecedent, by_parameter
 from ..consequent import basis, rule_outputs
 from .gram import DesignMoments
 from .ordered_terms import terms_of
@@ -22,7 +22,7 @@ _TINY = np.finfo(float).tiny
 class Design:
     """The columns of the design: its basis functions, and what its Gram matrix is made of."""
 
-    consequent_inputs: np.ndarray | None  # that the consequents are linear in; None is all
+    consequent_inputs: np.ndarray  # that the consequents are linear in
     n_basis: int
     n_outputs: int
     moments: DesignMoments
@@ -30,7 +30,7 @@ class Design:
 
     def basis(self, Z):
         """Basis functions of the consequents at a block of rows."""
-        return basis(Z if self.consequent_inputs is None else Z[self.consequent_inputs])
+        return basis(Z[self.consequent_inputs])
 
     def by_rule(self, coefficients):
         """Coefficients (n_columns, n_outputs) as (n_rules, n_basis, n_outputs)."""
@@ -166,11 +166,12 @@ class JointPass:
         basis_rows = design.basis(Z)
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
-        masses += strengths.sum(axis=1) if weight is None else strengths @ weight
+        weight = np.ones(Z.shape[1]) if weight is None else weight
+        masses += strengths @ weight
         for k in range(design.n_outputs):
             by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
             residual = target[k] - output
-            weighted = residual if weight is None else residual * weight
+            weighted = residual * weight
             slope[:, k] += (strengths @ (basis_rows * weighted).T).ravel()
             square[k] += weighted @ residual
             by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
@@ -179,18 +180,12 @@ class JointPass:
                 excess = by_rule_k - strengths * output
                 squares = excess**2 / np.maximum(strengths, _TINY)
                 total = squares.sum(axis=0)
-                own = np.ones_like(total) if weight is None else weight
-                apart[k] += own @ total
-                slope[:, k] -= agreement * ((excess * own) @ basis_rows.T).ravel()
+                apart[k] += weight @ total
+                slope[:, k] -= agreement * ((excess * weight) @ basis_rows.T).ravel()
                 change = antecedent.sum_over_rules(squares)
                 change -= antecedent.sum_over_rules(strengths) * total
-                by_term -= (0.5 * agreement) * own * change
-            # Not by ``by_parameter``: there is no need of an array of every parameter's rows.
-            parts = [
-                np.einsum("pti,ti->pt", gradient, own).ravel()
-                for gradient, own in by_group(gradients, by_term)
-            ]
-            premises += np.concatenate(parts or [premises[:0]])
+                by_term -= (0.5 * agreement) * weight * change
+            premises += by_parameter(gradients, by_term).sum(axis=1)
 
 
 def own_parameters(antecedent):

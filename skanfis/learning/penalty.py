@@ -7,9 +7,7 @@ The cost of a model is, as docs/mathematics.rst explains,
 and every part is quadratic in the consequents beta.
 
 *Agreement*, lambda. V, the mean over rows of sum_r w_r (f_r - y_hat)^2, is the disagreement of
-rules that fire on the same row. With G the Gram matrix of the design, V = beta' Q beta with
-Q = B - G, where B is block diagonal and its block of rule r the row sum over r' of the blocks
-G_(r, r'): nothing else is accumulated.
+rules that fire on the same row.
 
 *The rules' common line* b, alpha_c. It is the line of least squares through all rules. delta_r is
 how much rule r differs from it, in its value at its own centre and in its slopes times the distance
@@ -40,7 +38,7 @@ class Penalty:
 
     agreement: float = 0.0  # lambda
     alpha: float = 0.0  # pull of each rule to the common line, the mean of all components
-    slope: float | None = None  # rho, on the slopes of the common line, their mean; None is alpha
+    slope: float = 0.0  # rho, on the slopes of the common line, their mean
     stiffness: float = 0.0  # kappa, on the displacements of the premises
     # Of each component of the departures in alphas, and of the slope by each input in rhos; one
     # where there is none. Those of some rows hold for others, where other inputs are constant.
@@ -57,11 +55,6 @@ class Penalty:
         n_common = sum(len(rules) - 1 for _, rules in self.common)
         return n_common + sum(len(rules) for _, rules in self.absent)
 
-    @property
-    def rho(self):
-        """The weight of the common line's slopes."""
-        return self.alpha if self.slope is None else self.slope
-
 
 def mean_and_parts(weights, names):
     """The geometric mean of some weights, and these in units of it by name, where there are two."""
@@ -74,7 +67,8 @@ def mean_and_parts(weights, names):
 def disagreement_matrix(gram, n_rules, local: LocalBasis):
     """Q = B - G of the disagreement V = beta' Q beta, and G itself, in the local basis.
 
-    ``gram`` is that of the design on [1, z].
+    B is block diagonal, its block of rule r the sum over r' of the blocks G_(r, r'); ``gram`` is
+    that of the design on [1, z].
     """
     n_columns = gram.shape[0]
     n_basis = n_columns // n_rules
@@ -92,18 +86,7 @@ class CommonLine:
 
     ``extent`` (n_rules, n_basis - 1) is how far from its centre each rule stands for rows, along
     every input; ``slopes`` are the inputs that the consequents are linear in, None for those that
-    are constant.
-
-    Attributes
-    ----------
-    departures : Departures
-        From the line, of the local coefficients u.
-    slopes : list of int
-        The inputs, those that vary, by which b has slopes.
-    to_slopes : ndarray of shape (n_slopes, n_columns)
-        These slopes out of u.
-    height : ndarray of shape (n_columns,)
-        The unit vector along which all rules rise alike: the null space of the whole penalty.
+    are constant. By the others, which the attribute lists, the line has slopes.
     """
 
     def __init__(
@@ -127,7 +110,7 @@ class CommonLine:
         scale = scale.ravel()
         along = orthonormal * scale[:, None]
         self.departures = Departures(scale, orthonormal, along, antecedent, slopes)
-        # b = triangle^-1 along' u
+        # The slopes of b = triangle^-1 along' u.
         is_varying = np.array([j is not None for j in slopes], dtype=bool)
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
         self.slopes, self.to_slopes = [j for j in slopes if j is not None], to_slopes[is_varying]
@@ -135,11 +118,14 @@ class CommonLine:
         self._part = np.concatenate(
             [np.arange(len(self.slopes)), len(self.slopes) + self.departures.component]
         )
+        parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.departures.components)
+        self.kinds = np.array([*WEIGHTS, *parts])
         self.n_rules, self._n_basis = n_rules, n_basis
         # Slopes per unit of z out of local ones, in units of a typical extent; where each stands.
         self._per_unit = extent.mean(axis=0) / local.spread
         self._function = {j: k for k, j in enumerate(slopes) if j is not None}
         self._free: dict[tuple, np.ndarray] = {}
+        # Along which all rules rise alike: the null space of the whole penalty.
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
 
@@ -151,15 +137,11 @@ class CommonLine:
     def pull(self, penalty: Penalty):
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
         weights = self.weights(penalty)[len(WEIGHTS) :]
-        if penalty.pulls:
-            rooted = np.sqrt(weights)[self._part, None] * self._rows
-            matrix = rooted.T @ rooted
-        else:
-            rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
-            matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
+        rooted = np.sqrt(weights)[self._part, None] * self._rows
+        matrix = rooted.T @ rooted
         if self._to_none.size:
             # What is constant has no slope to learn, but one that is held.
-            matrix += penalty.rho * self._to_none.T @ self._to_none
+            matrix += penalty.slope * self._to_none.T @ self._to_none
         return matrix
 
     def free(self, penalty: Penalty):
@@ -196,8 +178,8 @@ class CommonLine:
         return linalg.helmert(rules.size) @ self.of_slopes(j, rules)
 
     def weights(self, penalty: Penalty):
-        """All weights in a row: those of ``WEIGHTS``, on every slope, on every component."""
-        rho, alpha = penalty.rho, penalty.alpha
+        """All weights in a row, of these ``kinds``: of ``WEIGHTS``, every slope and component."""
+        rho, alpha = penalty.slope, penalty.alpha
         slopes = [rho * penalty.slope_pulls.get(j, 1.0) for j in self.slopes]
         components = [alpha * penalty.pulls.get(one, 1.0) for one in self.departures.components]
         return np.array([penalty.agreement, penalty.stiffness, *slopes, *components], dtype=float)

@@ -16,10 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..antecedent import Antecedent
-from .ordered_terms import LOG_FACTOR, LOG_FLATTER, OrderedTerms, terms_of
-
-# Displacements this near to an edge of the box are on it.
-_ON_EDGE = 1e-9
+from .ordered_terms import LOG_FACTOR, LOG_FLATTER, NEXT_TO_NOTHING, OrderedTerms, terms_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,22 +50,21 @@ class Premise:
                     upper[np.concatenate([term.shapes for term in own])] = LOG_FLATTER
                 ordered.append(row)
                 continue
-            widths = np.exp([raw[term.widths[0]] for term in own])
+            first = np.array([term.widths[0] for term in own])
+            widths = np.exp(raw[first])
             unit[locations] = widths
             # Up to one width beyond the data, or where the term stands already.
             lower[locations] = np.minimum((minimum[j] - raw[locations]) / widths - 1.0, 0.0)
             upper[locations] = np.maximum((maximum[j] - raw[locations]) / widths + 1.0, 0.0)
-            first = np.array([term.widths[0] for term in own])
-            # What is as narrow as may be is so but for rounding; what is crisp is half of it.
-            is_crisp = widths < 0.75 * antecedent.least_width
-            with np.errstate(divide="ignore"):
-                least = np.log(antecedent.least_width) - raw[first]
-            lower[first] = np.minimum(np.maximum(lower[first], least), 0.0)
             if antecedent.least_width > 0.0:
                 # A cut may become sharper, and no softer: a rule is to be told from the next.
+                least = np.log(antecedent.least_width) - raw[first]
+                lower[first] = np.minimum(np.maximum(lower[first], least), 0.0)
                 upper[first] = 0.0
-            for still in (locations[is_crisp], first[is_crisp]):
-                lower[still] = upper[still] = 0.0
+                # What is as narrow as may be is so but for rounding; what is crisp is half of it.
+                is_crisp = widths < 0.75 * antecedent.least_width
+                for still in (locations[is_crisp], first[is_crisp]):
+                    lower[still] = upper[still] = 0.0
         tied = antecedent.tied
         size = np.unique(tied).size
         return cls(antecedent, lower[:size], upper[:size], unit, tied, tuple(ordered))
@@ -94,12 +90,11 @@ class Premise:
         """The displacement at which the antecedent has these parameters."""
         x = ((parameters - self.antecedent.parameters) / self._unit)[: self.size]
         for row in self._ordered:
-            gaps = row.gaps_of(parameters[row.locations])
-            x[row.locations] = row.from_gaps(gaps)
+            gaps, x[row.locations] = row.of_locations(parameters[row.locations])
             x[row.widths] -= row.widening(gaps)
         # What stands on an edge stays there whatever rounding says: it is what does not move.
         for edge in (self.lower, self.upper):
-            x = np.where(np.abs(x - edge) < _ON_EDGE, edge, x)
+            x = np.where(np.abs(x - edge) < NEXT_TO_NOTHING, edge, x)
         return x
 
     def pull_back(self, displacement, gradient, gauss_newton):

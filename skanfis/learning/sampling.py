@@ -38,7 +38,7 @@ def with_sample(rows, most=None):
     most = SAMPLE_ROWS if most is None else most
     # The second limit is for rows that repeat each other, of which the first brings too few.
     for limit in (_MARGIN * most / rows.n_rows, 1.0):
-        drawn = rows.reduce(partial(_draw, most=most, limit=limit), partial(_join, most=most))
+        drawn = rows.reduce(partial(_draw, most=most, limit=limit), partial(_smallest, most=most))
         if len(drawn[0]) == most:
             break
     X, y, weight, _, _, *groups = drawn
@@ -57,16 +57,12 @@ def _draw(rows, most, limit):
         found.append(_of_block(rows, part, limit))
         n_found += len(found[-1][0])
         if n_found > 2 * most:
-            found = [_smallest(found, most)]
+            found = [_smallest(*found, most=most)]
             n_found = len(found[0][0])
-    return _smallest(found, most)
+    return _smallest(*found, most=most)
 
 
-def _join(one, other, most):
-    return _smallest([one, other], most)
-
-
-def _smallest(parts, most):
+def _smallest(*parts, most):
     """Each row of all parts once, with the weight of all; at most so many, by their numbers."""
     columns = [np.concatenate(of_all) for of_all in zip(*parts, strict=True)]
     order = np.argsort(columns[3], kind="stable")

@@ -14,8 +14,6 @@ from sklearn.base import BaseEstimator
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
-__all__ = ["MESSAGES", "LeastSquares", "Solver", "SolverResult", "Watch"]
-
 # Called with the number of the iteration and the evaluation there; what is true ends the run.
 Watch = Callable[[int, Evaluation], bool]
 

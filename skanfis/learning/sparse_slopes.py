@@ -18,7 +18,6 @@ from .evidence import Laplace
 # What a number must be worth of the evidence, in -2 log p: as much as a parameter costs by Akaike's
 # criterion.
 _WORTH = 2.0
-_TINY = np.finfo(float).tiny
 
 
 def sparse_slopes(posterior: Laplace, coefficients):
@@ -83,7 +82,8 @@ def _farthest(state, slopes):
     """The rule whose slope is farthest from the mean of the others, in deviations."""
     mean, after, _ = state
     values = slopes @ mean
-    weights = 1.0 / np.maximum(np.einsum("ri,ij,rj->r", slopes, after, slopes), _TINY)
+    variances = np.einsum("ri,ij,rj->r", slopes, after, slopes)
+    weights = 1.0 / np.maximum(variances, np.finfo(float).tiny)
     others = weights.sum() - weights
     centers = (weights @ values - weights[:, None] * values) / others[:, None]
     squares = np.sum((values - centers) ** 2, axis=1)

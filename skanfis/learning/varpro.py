@@ -16,6 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from .._sklearn import Interval, StrOptions
+from .ordered_terms import NEXT_TO_NOTHING
 from .solver import Solver, SolverResult
 
 # Displacements are in spacings and logarithms: steps beyond about a third of a spacing skip from
@@ -23,20 +24,15 @@ from .solver import Solver, SolverResult
 _FIRST_RADIUS = 0.3
 # However well the steps before have done: a whole spacing.
 _LARGEST_RADIUS = 1.0
-# Below this the decrease that a step promises is lost in the rounding of the cost.
-_SMALLEST_RADIUS = 1e-9
-# Nocedal and Wright's eta: as good as any decrease is taken.
-_ACCEPTED_RATIO = 1e-4
 # Steps up to this much longer than the radius count as on its edge: the radius itself is a guess.
 _LENGTH_SLACK = 1.01
-# Newton's method converges quadratically here; the bound is for rounding alone.
-_MOST_NEWTON_STEPS = 50
 # Added to every curvature: this part of the largest, far above what rounding leaves where there is
 # none and far below what data give; and this part of the cost, which a step of one must pay for.
 _SMALLEST_CURVATURE = 1e-6
 _WORTH = 0.1
 # The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.
-_GRADIENT_FACTOR = 1e-2
+GRADIENT_FACTOR = 1e-2
+TOLERANCE = 1e-3
 
 
 def trust_region_step(gradient, hessian, radius, damping=0.0):
@@ -50,32 +46,13 @@ def trust_region_step(gradient, hessian, radius, damping=0.0):
     # largest curvature leaves of it can be needed.
     values = np.maximum(values, 0.0)
     values += damping + _SMALLEST_CURVATURE * max(values[-1], np.finfo(float).tiny)
-    damping = max(size / radius - values[-1], 0.0)
-    for _ in range(_MOST_NEWTON_STEPS):
-        step = slope / (values + damping)
-        length = np.linalg.norm(step)
-        if length <= _LENGTH_SLACK * radius:
-            break
+    values += max(size / radius - values[-1], 0.0)
+    step = slope / values
+    while (length := np.linalg.norm(step)) > _LENGTH_SLACK * radius:
         # Newton on 1 / |s(damping)| = 1 / radius, which converges from this side without overshoot.
-        damping += (length / radius - 1.0) * length**2 / np.sum(step**2 / (values + damping))
+        values += (length / radius - 1.0) * length**2 / np.sum(step**2 / values)
+        step = slope / values
     return -vectors @ step
-
-
-def _free(x, gradient, premise):
-    """Displacements that a descent may move without leaving the box."""
-    stuck_low = (x <= premise.lower) & (gradient > 0.0)
-    stuck_high = (x >= premise.upper) & (gradient < 0.0)
-    return ~(stuck_low | stuck_high)
-
-
-def _propose(x, gradient, hessian, premise, free, radius, damping):
-    """A point within box and region, the step to it, and the decrease that the model promises."""
-    step = np.zeros_like(x)
-    step[free] = trust_region_step(gradient[free], hessian[np.ix_(free, free)], radius, damping)
-    # The point and not the step is what meets an edge of the box to the last bit.
-    trial_x = np.clip(x + step, premise.lower, premise.upper)
-    step = trial_x - x
-    return trial_x, step, -(gradient @ step + 0.5 * step @ hessian @ step)
 
 
 def varpro(
@@ -108,24 +85,30 @@ def varpro(
         gradient, curvature = premise.pull_back(x, raw.gradient, raw.gauss_newton)
         gradient = gradient + stiffness * x
         hessian = curvature + stiffness * np.eye(x.size)
-        free = _free(x, gradient, premise)
+        # What a descent may move without leaving the box.
+        free = np.where(gradient > 0.0, x > premise.lower, x < premise.upper) | (gradient == 0.0)
         steepest = float(np.max(np.abs(gradient[free]), initial=0.0))
-        if steepest <= _GRADIENT_FACTOR * tol * cost:
+        if steepest <= GRADIENT_FACTOR * tol * cost:
             status = "gradient"
             break
         while True:
-            damping = _WORTH * cost
-            trial_x, step, expected = _propose(x, gradient, hessian, premise, free, radius, damping)
+            step, own = np.zeros_like(x), hessian[np.ix_(free, free)]
+            step[free] = trust_region_step(gradient[free], own, radius, _WORTH * cost)
+            # The point and not the step is what meets an edge of the box to the last bit.
+            trial_x = np.clip(x + step, premise.lower, premise.upper)
+            step = trial_x - x
             length = float(np.linalg.norm(step))
+            expected = -(gradient @ step + 0.5 * step @ hessian @ step)
             trial = problem.evaluate(premise.parameters(trial_x), current.coefficients)
             trial_cost = trial.cost + 0.5 * stiffness * (trial_x @ trial_x)
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
-            accepted = ratio > _ACCEPTED_RATIO
+            accepted = ratio > 0.0
             if not ratio >= 0.25:  # also where the trial is not finite
                 radius = 0.25 * min(length, radius)
             elif ratio > 0.75 and length > 0.9 * radius:
                 radius = min(2.0 * radius, _LARGEST_RADIUS)
-            if accepted or radius < _SMALLEST_RADIUS:
+            # What a smaller step promises is lost in the rounding of the cost.
+            if accepted or radius < NEXT_TO_NOTHING:
                 break
         if not accepted:
             status = "step"
@@ -186,7 +169,7 @@ class VariableProjection(Solver):
         "stiffness": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
     }
 
-    def __init__(self, *, tol: float = 1e-3, stiffness: str | float = "auto") -> None:
+    def __init__(self, *, tol: float = TOLERANCE, stiffness: str | float = "auto") -> None:
         self.tol = tol
         self.stiffness = stiffness
 

@@ -28,8 +28,6 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-__all__ = ["Membership", "Parameter"]
-
 # exp(-u^2 / 2) = 1/2 at this u.
 _HALF_HEIGHT = np.sqrt(2.0 * np.log(2.0))
 
@@ -59,10 +57,10 @@ class Membership(ABC):
         that a derivative is the imaginary part at a complex step.
         """
 
-    @staticmethod
-    @abstractmethod
-    def log_value(x, theta):
+    @classmethod
+    def log_value(cls, x, theta):
         """log mu(x), shape (n_terms, n_rows), finite, without overflow or underflow."""
+        return cls.log_value_and_gradient(x, theta)[0]
 
     @staticmethod
     @abstractmethod

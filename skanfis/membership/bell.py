@@ -26,12 +26,6 @@ class Bell(Membership):
         return 1.0 / (1.0 + ((x - center) ** 2 * np.exp(-2.0 * log_width)) ** np.exp(log_slope))
 
     @staticmethod
-    def log_value(x, theta):
-        center, log_width, log_slope = theta[:, :, None]
-        square = ((x - center) * np.exp(-log_width)) ** 2
-        return -np.logaddexp(0.0, np.exp(log_slope) * np.log(np.maximum(square, _SMALLEST_SQUARE)))
-
-    @staticmethod
     def log_value_and_gradient(x, theta):
         center, log_width, log_slope = theta[:, :, None]
         slope, inverse_width = np.exp(log_slope), np.exp(-log_width)

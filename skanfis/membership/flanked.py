@@ -39,7 +39,7 @@ class _Flanked(Membership):
 
     @classmethod
     def log_value(cls, x, theta):
-        return cls.profile.log_value(cls._distance(x, theta)[0])
+        return cls.profile.log_value_and_slope(cls._distance(x, theta)[0])[0]
 
     @classmethod
     def log_value_and_gradient(cls, x, theta):

@@ -34,11 +34,6 @@ class GaussianProfile:
         return np.exp(-0.5 * t**2)
 
     @staticmethod
-    def log_value(t):
-        """Log mu, finite."""
-        return -0.5 * t**2
-
-    @staticmethod
     def log_value_and_slope(t):
         """Log mu and its derivative by t, which is zero at t = 0."""
         return -0.5 * t**2, -t
@@ -56,23 +51,13 @@ class _ProfileWithFoot:
     slope: ClassVar[Any]
 
     @classmethod
-    def _floored(cls, t):
-        """min(t, 1), the Gaussian there, the mixture there, and its logarithm at t."""
-        near = np.minimum(t, 1.0)
-        gaussian = np.exp(-0.5 * near**2)
-        mu = cls.value(t)
-        mixture = mu + _FLOOR * (gaussian - mu)
-        # Beyond the foot the mixture is e exp(-1/2) here, and -t^2 / 2 goes on outside.
-        return near, gaussian, mixture, np.log(mixture) - 0.5 * (t - near) * (t + near)
-
-    @classmethod
-    def log_value(cls, t):
-        return cls._floored(t)[-1]
-
-    @classmethod
     def log_value_and_slope(cls, t):
-        near, gaussian, mixture, log_mu = cls._floored(t)
+        near = np.minimum(t, 1.0)
+        gaussian, mu = np.exp(-0.5 * near**2), cls.value(t)
+        mixture = mu + _FLOOR * (gaussian - mu)
         slope = (1.0 - _FLOOR) * cls.slope(t) - _FLOOR * near * gaussian
+        # Beyond the foot the mixture is e exp(-1/2) here, and -t^2 / 2 goes on outside.
+        log_mu = np.log(mixture) - 0.5 * (t - near) * (t + near)
         return log_mu, slope / mixture - (t - near)
 
 

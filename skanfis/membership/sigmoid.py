@@ -48,13 +48,6 @@ class SigmoidDifference(Membership):
         return (1.0 - np.exp(-2.0 * v)) / ((1.0 + np.exp(-u - v)) * (1.0 + np.exp(u - v)))
 
     @staticmethod
-    def log_value(x, theta):
-        center, log_width, log_flank = theta[:, :, None]
-        u = (x - center) * np.exp(-log_flank)
-        v = np.exp(log_width - log_flank)
-        return np.log(-np.expm1(-2.0 * v)) + _log_sigmoid(v + u) + _log_sigmoid(v - u)
-
-    @staticmethod
     def log_value_and_gradient(x, theta):
         center, log_width, log_flank = theta[:, :, None]
         inverse_flank = np.exp(-log_flank)
@@ -98,14 +91,6 @@ class SigmoidProduct(Membership):
         first = cls.signs[0] * (x - center + width) * np.exp(-log_left)
         second = cls.signs[1] * (x - center - width) * np.exp(-log_right)
         return 1.0 / ((1.0 + np.exp(-first)) * (1.0 + np.exp(-second)))
-
-    @classmethod
-    def log_value(cls, x, theta):
-        center, log_width, log_left, log_right = theta[:, :, None]
-        offset, width = x - center, np.exp(log_width)
-        first = (offset + width) * (cls.signs[0] * np.exp(-log_left))
-        second = (offset - width) * (cls.signs[1] * np.exp(-log_right))
-        return _log_sigmoid(first) + _log_sigmoid(second)
 
     @classmethod
     def log_value_and_gradient(cls, x, theta):

@@ -15,14 +15,12 @@ from sklearn.cluster import KMeans
 from ..antecedent import TreeAntecedent
 from .clusters import clustered_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
-from .sample import counting_weight
+from .sample import DIGITS, counting_weight
 from .splits import Split
 from .tuning import Tuned
 
 KINDS = ("grid", "tree", "scattered")
 _MORE_CLUSTERS = 1.5
-# Digits that rounding leaves alone where units change.
-_DIGITS = 9
 
 
 @dataclass(frozen=True)
@@ -71,10 +69,6 @@ class Candidate:
         counts[j] += 1
         return replace(self, counts=tuple(counts))
 
-    def with_split(self, split):
-        """The tree with one leaf more."""
-        return replace(self, splits=(*self.splits, split))
-
     def with_more_clusters(self):
         """Half as many scattered rules again, two at least."""
         number = max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters)))
@@ -98,7 +92,7 @@ def rule_base(candidate, rows, families, inputs, spacing, seed, smaller=None):
     def label(table, weight):
         # It begins at some of the rows: the order of columns is to have no part in which, and
         # rounding none in what is near to two centres.
-        table = np.round(table, _DIGITS)
+        table = np.round(table, DIGITS)
         order = np.lexsort(np.sort(table, axis=1).T)
         labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
         return labels[np.argsort(order)]

@@ -55,10 +55,6 @@ class Judges:
         """Of squared errors."""
         return float(np.average(squares, weights=self.weight))
 
-    def prefer(self, candidate: Judged, than: Judged) -> bool:
-        """Whether a larger candidate leaves less."""
-        return self.are_less(candidate.squares, than.squares)
-
     def are_less(self, squares, than) -> bool:
         """Whether squared errors are, by more than one standard error, or rounding."""
         gain = than - squares
@@ -72,7 +68,7 @@ def best_of(judged, judges: Judges) -> Judged:
     """That of the smallest error; what costs more to read must be better by more than chance."""
     best, *others = sorted(judged, key=lambda one: one.cost)
     for one in others:
-        best = one if judges.prefer(one, best) else best
+        best = one if judges.are_less(one.squares, best.squares) else best
     return best
 
 

@@ -22,22 +22,18 @@ OVERLAP = 0.6
 # The outermost terms stand where this part of the rows lies beyond: a stray row is none to name a
 # term after, and a term at the very edge would be half empty.
 _EDGE = 0.02
-# Of the gaps between values, see above.
-_QUANTISER = 2.0 / 3.0
 # Neighbouring gaps differ by this factor at most; ``premise`` allows them a little more.
 _RATIO = 1.8
 # Of a term's distances to its neighbours the nearer one counts by this part of its logarithm: where
 # an overlap of 0.6 at even distances stands between the least and the most of ``premise``.
 _NEARER = 1.0 / 6.0
-# Quantiles of so many are right to about a hundredth of a deviation.
-_MOST_ROWS = 20_000
 
 
 class Spacing:
     """Where the terms of every input stand, whatever their number."""
 
     def __init__(self, rows: StandardisedData):
-        table, weight, _ = representative_rows(rows, _MOST_ROWS)
+        table, weight, _ = representative_rows(rows)
         self._columns = [_levels(column, weight) for column in table[:, : rows.X.shape[1]].T]
 
     def n_values(self, j):
@@ -67,7 +63,7 @@ def _levels(column, weight):
     if low == high:
         low, high = values[[0, -1]]
     values = values[(values >= low) & (values <= high)]
-    levels = np.concatenate([[0.0], np.cumsum(np.diff(values) ** _QUANTISER)])
+    levels = np.concatenate([[0.0], np.cumsum(np.diff(values) ** (2.0 / 3.0))])
     return values, levels / max(levels[-1], np.finfo(float).tiny)
 
 
@@ -85,9 +81,10 @@ def grid_antecedent(families, counts, spacing: Spacing, known=None):
         if j in terms and terms[j].shape[1] == counts[j]:
             thetas.append(terms[j])
             continue
-        centers = spacing.centers(j, counts[j])
         if j in terms:
             centers = _with_more(np.sort(terms[j][0]), counts[j])
+        else:
+            centers = spacing.centers(j, counts[j])
         thetas.append(families[j].start(centers, _distance(np.diff(centers)), OVERLAP))
     return GridAntecedent.build([families[j] for j in inputs], inputs, thetas)
 

@@ -9,33 +9,25 @@ Rows are dealt in the order of their target, so that neither the order in which 
 of the columns makes a difference; what is equal in all columns is one row with a weight.
 """
 
-from dataclasses import replace
-
 import numpy as np
 from sklearn.model_selection import GroupKFold
 
 from ..learning.data import StandardisedData
-from .sample import search_sample
+from .sample import DIGITS, search_sample
 
-# Rows from which on half of them are enough to grow, and half to judge; below, folds, and of these
-# as many as leave out enough.
-_PLENTY, _FOLDS, _ENOUGH = 1000, 5, 200
-# Rows that all candidates together see, to grow and to judge.
-_MOST_ROWS = 20_000
-# Digits that rounding leaves alone where units change.
-_DIGITS = 9
-_SEED = 0
+# Folds, and rows that are enough to judge on: of few rows, as many folds as leave out enough; where
+# a single one does, half of the rows are enough to grow, and half to judge.
+_FOLDS, _ENOUGH = 5, 200
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
     """Distinct rows in an order that is random and depends on their values alone."""
-    sample = search_sample(rows, _MOST_ROWS)
+    sample = search_sample(rows)
     # What is constant, and in which column a value stands, are no part of it.
     values = np.sort(sample.X[:, ~rows.inputs.is_constant], axis=1)
-    columns = np.round(np.hstack([values[:, ::-1], sample.y[:, ::-1]]), _DIGITS)
+    columns = np.round(np.hstack([values[:, ::-1], sample.y[:, ::-1]]), DIGITS)
     order = np.lexsort(columns.T)
-    dealt = sample.part(order[np.random.default_rng(_SEED).permutation(order.size)])
-    return replace(dealt, inputs=sample.inputs, targets=sample.targets)
+    return sample.part(order[np.random.default_rng(0).permutation(order.size)])
 
 
 def splits(rows: StandardisedData):
@@ -50,7 +42,7 @@ def splits(rows: StandardisedData):
     if groups is not None and np.unique(groups).size > 1:
         n_folds = min(_FOLDS, np.unique(groups).size)
         folds = list(GroupKFold(n_folds).split(rows.X, groups=groups))
-    elif n_rows >= _PLENTY:
+    elif n_rows >= _FOLDS * _ENOUGH:
         folds = [(every[1::2], every[::2])]
     else:
         folds = [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]

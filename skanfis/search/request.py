@@ -6,15 +6,13 @@ from math import prod
 from typing import Any
 
 import numpy as np
-from sklearn import get_config
 from sklearn.base import clone
 from sklearn.utils.validation import has_fit_parameter
 
 from .._validation import warn_user
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
 from ..learning.data import StandardisedData
-from ..learning.evidence import FREE
-from ..membership import Gaussian, Membership
+from ..membership import Gaussian
 from ..model import TSKModel
 from ..naming import default_term_names
 from .candidates import KINDS
@@ -22,44 +20,36 @@ from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
 from .sample import effective_weight, n_distinct_inputs
 from .search import StructureSearch
-from .size import check_clusters_fit, check_columns_fit, check_grid_fits, term_counts
+from .size import check_columns_fit, check_grid_fits, check_rules_fit, term_counts
 from .start import Start, imported_antecedent, tuned_start
-from .trials import Held, Plan
-from .tuning import FIRST_PENALTY, scaled
+from .trials import Plan
+from .tuning import scaled
 
-_MIB = 2**20
 # Columns that a warning names; it counts the others.
 _MOST_NAMED = 10
 
 
-@dataclass(frozen=True, eq=False)
-class StructureRequest:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StructureRequest(Plan):
     """What was asked for."""
 
     n_mfs: Any
     partition: Any  # as given; a model in place of the estimator that holds it
-    families: Sequence[type[Membership]]  # one per input
-    order: int
-    premise_inputs: np.ndarray
-    consequent_inputs: np.ndarray
-    weights: dict[str, float]  # of the penalty, those that are given, of ``evidence.FREE``
     premises_move: bool  # whether what is trained afterwards moves them
-    seed: int  # of clusterings that have none of their own
     names: Sequence[str]  # of the inputs
     simplicity: float  # what may be given up for a model that costs less to read
-    max_rules: int | None
-    held: Held | None = None
 
     def start(self, rows: StandardisedData) -> Start:
         """Where to start from, for these rows."""
         self._check_combination()
-        check_columns_fit(len(self.names), _memory_limit())
+        check_columns_fit(len(self.names))
         is_word = isinstance(self.n_mfs, str) and isinstance(self.partition, str)
         if is_word and self.partition in ("auto", *KINDS):
             return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
         if isinstance(self.partition, TSKModel):
             model = self.partition
             antecedent = imported_antecedent(model, rows)
+            self._check_number(antecedent.n_rules)
             default = default_term_names(model.antecedent, model.minimum, model.maximum)
             # Names that say where terms stand are made anew when these have moved.
             names = () if model.term_names == default else model.term_names
@@ -77,42 +67,30 @@ class StructureRequest:
         return [kind for kind in KINDS if kind not in left_out]
 
     def _plan(self, rows):
-        given: dict[str, Any] = {**self.weights}
-        free, is_constant = (
-            [key for key in FREE if key not in self.weights],
-            rows.inputs.is_constant,
-        )
-        return Plan(
-            self.families,
-            self.order,
-            self.premise_inputs[~is_constant[self.premise_inputs]],
-            self.consequent_inputs,
-            self.seed,
-            free,
-            replace(FIRST_PENALTY, **given),
-            effective_weight(rows),
-            self.max_rules,
-            self.held,
-        )
+        """The same for these rows: what never changes has no terms."""
+        varying = self.premise_inputs[~rows.inputs.is_constant[self.premise_inputs]]
+        return replace(self, premise_inputs=varying, n_all=effective_weight(rows))
 
     def _antecedent(self, rows):
         """The rules that were asked for."""
-        if not isinstance(self.n_mfs, str):
-            return self._grid(rows)
-        label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
-        return clustered_antecedent(self.families, rows, label, self.premise_inputs)
+        if isinstance(self.n_mfs, str):
+            label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
+            return clustered_antecedent(self.families, rows, label, self.premise_inputs)
+        counts = self._grid_counts(rows)
+        self._check_number(prod(counts))
+        check_grid_fits(self.n_mfs, counts, 1 + self.consequent_inputs.size, rows.y.shape[1])
+        return grid_antecedent(self.families, counts, Spacing(rows))
 
     def _tuned(self, antecedent, rows):
-        self._check_number(antecedent.n_rules)
         self._warn_if_underdetermined(antecedent.n_rules, rows)
         plan = self._plan(rows)
         return tuned_start(antecedent, rows, plan, self.premises_move, self.simplicity)
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
         """A start found on a sample, with the weights that were not given those of all rows."""
-        free = [key for key in FREE if key not in self.weights]
         ratio = effective_weight(sample) / effective_weight(rows)
-        return replace(start, penalty=scaled(start.penalty, free, ratio, start.agreement_is_raised))
+        penalty = scaled(start.penalty, self.free, ratio, start.agreement_is_raised)
+        return replace(start, penalty=penalty)
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""
@@ -128,11 +106,10 @@ class StructureRequest:
     def _check_number(self, n_rules):
         """Raise ValueError where more rules are given than may be."""
         if self.max_rules is not None and n_rules > self.max_rules:
-            given = f"n_mfs={self.n_mfs!r}"
-            if isinstance(self.n_mfs, str):
-                given = "partition" + (
-                    "" if isinstance(self.partition, TSKModel) else f"={self.partition!r}"
-                )
+            is_word = isinstance(self.n_mfs, str)
+            given = f"partition={self.partition!r}" if is_word else f"n_mfs={self.n_mfs!r}"
+            if isinstance(self.partition, TSKModel):
+                given = "partition"
             raise ValueError(
                 f"{given} makes {n_rules:,} rules, more than max_rules={self.max_rules}: give "
                 "fewer, or leave max_rules at None."
@@ -145,29 +122,22 @@ class StructureRequest:
             labels = np.asarray(label(table, weight))
             n_rules = np.unique(labels[labels >= 0]).size
             self._check_number(n_rules)
-            check_clusters_fit(
-                f"partition={self.partition!r}",
+            check_rules_fit(
+                f"partition={self.partition!r} makes",
                 n_rules,
-                self.premise_inputs.size,
+                n_rules * self.premise_inputs.size,
                 1 + self.consequent_inputs.size,
                 rows.y.shape[1],
-                _memory_limit(),
+                "Use fewer clusters, or constants as consequents (order=0).",
             )
             return labels
 
         return checked
 
-    def _grid(self, rows):
-        counts = self._grid_counts(rows)
-        n_basis, n_outputs = 1 + self.consequent_inputs.size, rows.y.shape[1]
-        self._check_number(prod(counts))
-        check_grid_fits(self.n_mfs, counts, n_basis, n_outputs, _memory_limit(), self.names)
-        return grid_antecedent(self.families, counts, Spacing(rows))
-
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""
         has_terms = ~rows.inputs.is_constant
-        has_terms[np.setdiff1d(np.arange(has_terms.size), self.premise_inputs)] = False
+        has_terms &= np.isin(np.arange(has_terms.size), self.premise_inputs)
         counts = term_counts(self.n_mfs, self.names)
         if np.ndim(self.n_mfs) == 0:
             return [count if has else 1 for has, count in zip(has_terms, counts, strict=True)]
@@ -197,11 +167,6 @@ class StructureRequest:
                 f"use fewer {'rules' if n_rules > 1 else 'inputs'}.",
                 UnderdeterminedWarning,
             )
-
-
-def _memory_limit():
-    """Bytes that training may take."""
-    return get_config()["working_memory"] * _MIB
 
 
 def _labeller(clusterer, weighted):

@@ -10,9 +10,10 @@ import numpy as np
 
 from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import Scale, StandardisedData, fingerprint
+from ..learning.sampling import SAMPLE_ROWS
 
-# More rows than this tell a clustering nothing new.
-_MOST_ROWS = 20_000
+# Of standardised rows, digits that rounding leaves alone where units change.
+DIGITS = 9
 
 
 def n_distinct_inputs(rows: StandardisedData, enough: int) -> int:
@@ -44,18 +45,11 @@ def counting_weight(rows: StandardisedData):
     return weight * (effective_weight(rows) / weight.sum())
 
 
-def representative_rows(rows: StandardisedData, most=_MOST_ROWS):
+def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
     """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
 
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
     Neither the order of the rows nor whether one is repeated or weighted makes any difference.
-
-    Returns
-    -------
-    table : ndarray of shape (n_distinct, n_inputs + n_outputs)
-    weight : ndarray of shape (n_distinct,)
-    indices : ndarray of shape (n_distinct,)
-        The first row of each.
     """
     weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     numbers = rows.fingerprints()
@@ -86,7 +80,7 @@ def unit_scale(values):
     return Scale(np.zeros(n_columns), np.ones(n_columns), values.min(axis=0), values.max(axis=0))
 
 
-def search_sample(rows: StandardisedData, most):
+def search_sample(rows: StandardisedData, most=SAMPLE_ROWS):
     """At most so many representative rows, already in the standardised units of all rows."""
     table, weight, indices = representative_rows(rows, most)
     n_inputs = rows.X.shape[1]

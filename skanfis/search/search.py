@@ -2,7 +2,7 @@
 
 Every kind is a sequence from small to large (``candidates``). It is grown on all rows and, beside,
 anew without those that judge it (``judging``), all in step, while the error expected of new rows
-falls, and a step further: a product of two inputs needs terms on both before any helps.
+falls, and a step further.
 """
 
 from collections.abc import Sequence
@@ -59,21 +59,18 @@ class StructureSearch:
         Where outputs must rise or fall, a kind goes on while its rules gain either as they must or
         as they would: what is held in order may gain a step later.
         """
-        best, best_free, n_further = one_rule, one_rule, 0
-        candidate, in_folds = self.trials.one_rule, [self.trials.one_rule] * len(self.folds)
+        now, best, best_free, n_further = one_rule, one_rule, one_rule, 0
         while n_further < _FURTHER:
-            larger = self.trials.larger(kind, candidate)
-            each = [
+            larger = self.trials.larger(kind, now.candidate)
+            in_folds = [
                 larger if fold is self.trials else fold.larger(kind, one)
-                for fold, one in zip(self.folds, in_folds, strict=True)
+                for fold, one in zip(self.folds, now.in_folds, strict=True)
             ]
-            grown = [one for one in each if one is not None]
-            if larger is None or len(grown) < len(each):
+            if larger is None or None in in_folds:
                 return
-            candidate, in_folds = larger, grown
-            now = self._judge(candidate, in_folds)
+            now = self._judge(larger, in_folds)
             n_further += 1
-            if self.judges.prefer(now, best):
+            if self.judges.are_less(now.squares, best.squares):
                 best, n_further = now, 0
             if self.judges.are_less(now.free_squares, best_free.free_squares):
                 best_free, n_further = now, 0
@@ -88,14 +85,11 @@ class StructureSearch:
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""
-        held = self.plan.held
         free_squares = squares = self._squares(in_folds, None)
-        if held is not None:
-            squares = self._squares(in_folds, held)
-        error = self.judges.mean(squares)
-        tuned = self.trials.tuned(candidate)
-        of_rules = error + tuned.disagreement
-        cost = cost_of(tuned)
+        if self.plan.held is not None:
+            squares = self._squares(in_folds, self.plan.held)
+        error, tuned = self.judges.mean(squares), self.trials.tuned(candidate)
+        cost, of_rules = cost_of(tuned), error + tuned.disagreement
         judged = Judged(candidate, in_folds, squares, free_squares, error, cost, of_rules)
         self.judged.append(judged)
         return judged

@@ -2,16 +2,16 @@
 
 from math import prod
 from numbers import Integral
+from typing import Any
 
 import numpy as np
+from sklearn import get_config
 
 # Of one term, whatever its family: what a limit on memory reckons with.
 _MOST_PREMISE_PARAMETERS = 4
 # Square matrices over all consequent parameters that exist at one time: the Gram matrix, its
 # moments, local form and factor; the disagreement, the parts of the penalty, and copies of these.
 _SQUARES = 14
-
-
 # Of the products of all pairs of columns, rows that are worked out at one time.
 _ROWS_OF_PAIRS = 128
 
@@ -23,53 +23,52 @@ def n_bytes(n_rules: int, n_terms: int, n_basis: int, n_outputs: int) -> int:
     return 8 * (squares + n_terms * n_rules + 2 * n_premise * n_columns)
 
 
-def check_columns_fit(n_inputs, limit):
-    """Raise ValueError where products of all pairs of columns need more than ``limit`` bytes."""
+def memory_limit():
+    """Bytes that training may take."""
+    return get_config()["working_memory"] * 2**20
+
+
+def check_columns_fit(n_inputs):
+    """Raise ValueError where products of all pairs of columns need more than may be."""
     needed = 8 * _ROWS_OF_PAIRS * (1 + n_inputs) ** 2 // 2
-    if needed > limit:
+    if needed > memory_limit():
         raise ValueError(
-            f"X has {n_inputs:,} columns: products of all their pairs would take {_bytes(needed)}, "
-            f"and the limit is {_bytes(limit)} (sklearn.set_config(working_memory=...), in MiB). "
+            f"X has {n_inputs:,} columns: products of all their pairs {_would_take(needed)} "
             "Choose some of them first, as by make_pipeline(SelectKBest(f_regression, k=50), "
             "ANFISRegressor())."
         )
 
 
-def check_clusters_fit(what, n_rules, n_premise_inputs, n_basis, n_outputs, limit):
-    """Raise ValueError where training scattered rules would need more than ``limit`` bytes."""
-    needed = n_bytes(n_rules, n_rules * n_premise_inputs, n_basis, n_outputs)
-    if needed > limit:
+def check_rules_fit(what, n_rules, n_terms, n_basis, n_outputs, advice):
+    """Raise ValueError where training what ``what`` makes needs more memory than may be."""
+    needed = n_bytes(n_rules, n_terms, n_basis, n_outputs)
+    if needed > memory_limit():
         raise ValueError(
-            f"{what} makes {_too_large(n_rules, n_basis, 'them', needed, limit)} Use fewer "
-            "clusters, or constants as consequents (order=0)."
+            f"{what} {_count(n_rules)} rules with {_count(n_rules * n_basis)} consequent "
+            f"parameters; training them {_would_take(needed)} {advice}"
         )
 
 
-def check_grid_fits(n_mfs, counts, n_basis, n_outputs, limit, names):
-    """Raise ValueError where training a grid of ``counts`` would need more than ``limit`` bytes."""
-    needed = _bytes_of_grid(counts, n_basis, n_outputs)
-    if needed <= limit:
-        return
-    smallest = [2] * len(names)
-    fits = _bytes_of_grid(smallest, 1 + len(names), 1) <= limit
-    hint = f"n_mfs=2 makes {prod(smallest):,} rules; " if fits else ""
-    size = _too_large(prod(counts), n_basis, "it", needed, limit)
-    raise ValueError(
-        f"n_mfs={n_mfs!r} on {len(names)} inputs makes a grid of {size} Use fewer terms: "
-        f"{hint}give one number per input, 1 for an input that needs no fuzzy terms; or use "
-        "scattered rules, whose number does not grow with the inputs: partition=KMeans("
-        "n_clusters=...)."
+def check_grid_fits(n_mfs, counts, n_basis, n_outputs):
+    """The same of a grid of ``counts``, which ``n_mfs`` has asked for."""
+    n_inputs = len(counts)
+    fits = n_bytes(2**n_inputs, 2 * n_inputs, 1 + n_inputs, 1) <= memory_limit()
+    hint = f"n_mfs=2 makes {2**n_inputs:,} rules; " if fits else ""
+    check_rules_fit(
+        f"n_mfs={n_mfs!r} on {n_inputs} inputs makes a grid of",
+        prod(counts),
+        sum(count for count in counts if count > 1),
+        n_basis,
+        n_outputs,
+        f"Use fewer terms: {hint}give one number per input, 1 for an input that needs no fuzzy "
+        "terms; or use scattered rules, whose number does not grow with the inputs: "
+        "partition=KMeans(n_clusters=...).",
     )
 
 
-def _bytes_of_grid(counts, n_basis, n_outputs):
-    return n_bytes(prod(counts), sum(c for c in counts if c > 1), n_basis, n_outputs)
-
-
-def _too_large(n_rules, n_basis, what, needed, limit):
+def _would_take(needed):
     return (
-        f"{_count(n_rules)} rules with {_count(n_rules * n_basis)} consequent parameters; training "
-        f"{what} would take {_bytes(needed)}, and the limit is {_bytes(limit)} "
+        f"would take {_bytes(needed)}, and the limit is {_bytes(memory_limit())} "
         "(sklearn.set_config(working_memory=...), in MiB)."
     )
 
@@ -90,24 +89,22 @@ def _bytes(number):
 
 def term_counts(n_mfs, names):
     """``n_mfs`` as one count per input, or ValueError or TypeError that says what it must be."""
-    if isinstance(n_mfs, Integral) and not isinstance(n_mfs, bool):
-        counts = [int(n_mfs)] * len(names)
-    else:
-        if isinstance(n_mfs, str | bytes | bool) or np.ndim(n_mfs) != 1:
-            raise TypeError(
-                f"n_mfs={n_mfs!r} must be 'auto', a whole number, or one whole number per input."
-            )
-        if len(n_mfs) != len(names):
-            raise ValueError(
-                f"n_mfs={n_mfs!r} has {len(n_mfs)} entries, but X has {len(names)} columns "
-                f"({', '.join(names)}): give one number of terms per column."
-            )
-        if not all(isinstance(count, Integral) and not isinstance(count, bool) for count in n_mfs):
-            raise TypeError(f"n_mfs={n_mfs!r} must hold whole numbers only.")
-        counts = [int(count) for count in n_mfs]
-    if min(counts) < 1:
+    is_number = isinstance(n_mfs, Integral) and not isinstance(n_mfs, bool)
+    given: Any = [n_mfs] * len(names) if is_number else n_mfs
+    if isinstance(given, str | bytes) or np.ndim(given) != 1:
+        raise TypeError(
+            f"n_mfs={n_mfs!r} must be 'auto', a whole number, or one whole number per input."
+        )
+    if len(given) != len(names):
+        raise ValueError(
+            f"n_mfs={n_mfs!r} has {len(given)} entries, but X has {len(names)} columns "
+            f"({', '.join(names)}): give one number of terms per column."
+        )
+    if not all(isinstance(count, Integral) and not isinstance(count, bool) for count in given):
+        raise TypeError(f"n_mfs={n_mfs!r} must hold whole numbers only.")
+    if min(given) < 1:
         raise ValueError(
             f"n_mfs={n_mfs!r} must be 1 or more everywhere; 1 means that an input has no fuzzy "
             "terms and takes part in the consequents alone."
         )
-    return counts
+    return [int(count) for count in given]

@@ -24,7 +24,6 @@ _QUANTILES = 8
 _WIDTH = 0.5
 # Beyond so many inputs, slopes are not looked at: the work goes with their square.
 _MOST_CROSSED = 200
-_TINY = np.finfo(float).tiny
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def _scored(column, sums, n_basis, variance):
     norm = (1.0 - 2.0 * part) * below[:, mass] + part**2 * whole[mass]
     along = below[:, 1 + n_basis :] - part * whole[1 + n_basis :]
     squares = along.reshape(ends.size, n_basis, -1) ** 2
-    squares /= np.maximum(norm[:, :, None] * variance, _TINY)
+    squares /= np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
     n_free = n_basis * variance.size
     statistics = (squares.sum(axis=(1, 2)) - n_free) / np.sqrt(2.0 * n_free)
     return 0.5 * (column[ends - 1] + column[ends]), statistics

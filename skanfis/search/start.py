@@ -18,7 +18,7 @@ from ..learning.premise import Premise
 from ..model import TSKModel
 from .choice import tolerated
 from .sample import effective_weight, search_sample
-from .trials import Plan
+from .trials import FEWEST_ROWS, Plan
 from .tuning import (
     ARRIVING,
     FIRST_STEPS,
@@ -35,8 +35,6 @@ from .tuning import (
 
 # What terms without bounds must leave of the expected squared error: nearer, chance decides.
 _LESS_ERROR = 0.9
-# The weights of rules that are given are found on at most so many representative rows.
-_MOST_ROWS = 1000
 # Of displacements, in spacings of terms: rounding errors stay below.
 _DIGITS = 5
 
@@ -61,16 +59,16 @@ def started(tuned: Tuned, plan: Plan, left: float, candidates, is_free=False) ->
     ``left`` is the factor by which the squared error may still rise.
     """
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
-    low, high = problem.rows.inputs.box
-    premise = Premise.of(problem.antecedent, low, high, is_free)
-    tuned = with_most_agreement(tuned, premise, plan.free, left)
+    premise = Premise.of(problem.antecedent, *problem.rows.inputs.box, is_free)
+    agreeing = with_most_agreement(tuned, premise, plan.free, left)
+    is_raised = agreeing is not tuned
     return Start(
         problem.antecedent,
-        scaled(tuned.penalty, plan.free, n_rows / plan.n_all, tuned.agreement_is_raised),
+        scaled(agreeing.penalty, plan.free, n_rows / plan.n_all, is_raised),
         # Training goes on from there, without the digits that rounding errors reach.
-        np.round(tuned.displacement, _DIGITS),
+        np.round(agreeing.displacement, _DIGITS),
         is_free,
-        tuned.agreement_is_raised,
+        is_raised,
         candidates,
     )
 
@@ -79,13 +77,10 @@ def tuned_start(
     antecedent: Antecedent, rows: StandardisedData, plan: Plan, premises_move, simplicity
 ) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows."""
-    free, penalty = plan.free, plan.first
-    if not premises_move and "stiffness" in free:
-        free = [key for key in free if key != "stiffness"]
-        penalty = replace(penalty, stiffness=0.0)
-    sample = search_sample(rows, _MOST_ROWS)
-    slopes = plan.consequent_inputs
-    problem = SeparableProblem(sample, antecedent, plan.order, penalty, consequent_inputs=slopes)
+    if not premises_move:
+        plan = replace(plan, weights={"stiffness": 0.0} | plan.weights)
+    sample, free, slopes = search_sample(rows, FEWEST_ROWS), plan.free, plan.consequent_inputs
+    problem = SeparableProblem(sample, antecedent, plan.order, plan.first, consequent_inputs=slopes)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box
     premise, is_free = Premise.of(antecedent, low, high), False
     turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move and free else (0, ARRIVING)
@@ -105,7 +100,7 @@ def tuned_start(
         most = tolerated(error, variance, simplicity)
         best = simpler if simpler.expected_error <= most else best
         left = most / best.expected_error
-    return started(best, replace(plan, free=free), left, [_as_given(best)], is_free)
+    return started(best, plan, left, [_as_given(best)], is_free)
 
 
 def _as_given(tuned: Tuned):
@@ -133,11 +128,8 @@ def check_inputs(model: TSKModel, names, what):
             f"{what} has rules on {model.n_inputs} inputs ({', '.join(model.input_names)}), but X "
             f"has {len(names)} columns ({', '.join(names)})."
         )
-    numbered = [f"x{j}" for j in range(len(names))]
-    if list(model.input_names) != list(names) and numbered not in (
-        list(model.input_names),
-        list(names),
-    ):
+    own, given = tuple(model.input_names), tuple(names)
+    if own != given and tuple(f"x{j}" for j in range(len(names))) not in (own, given):
         raise ValueError(
             f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
             f"are {', '.join(names)}: give them in this order and by these names."

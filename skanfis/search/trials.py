@@ -10,14 +10,15 @@ A candidate sees as many rows as its parameters need, and not more.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..antecedent import Antecedent
 from ..consequent import in_user_units
 from ..learning.data import StandardisedData
+from ..learning.evidence import FREE
 from ..learning.objective import Evaluation, SeparableProblem
-from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..membership import Membership
 from ..model import TSKModel
@@ -26,16 +27,14 @@ from .candidates import Candidate, rule_base, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
 from .splits import best_splits
-from .tuning import FIRST_STEPS, Tuned, tune, with_sparse_slopes
+from .tuning import FEW_TURNS, FIRST_PENALTY, FIRST_STEPS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters, and at least.
-_ROWS_EACH, _FEWEST_ROWS = 40, 1000
+_ROWS_EACH, FEWEST_ROWS = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
 # Of a pass over the rows of a training.
 _MOST_OPERATIONS = 1e9
-# Turns of weights and premises of a candidate.
-_TURNS = 2
 # Of the inputs, or splits, that the residual asks for most, so many are tried.
 _TRIED = 4
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
@@ -46,25 +45,29 @@ _SIGNIFICANT = 2.0
 Held = Callable[[SeparableProblem, Evaluation], tuple[Antecedent, np.ndarray]]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
     """What all trainings of a search have in common."""
 
     families: Sequence[type[Membership]]  # one per input
     order: int
-    inputs: np.ndarray  # those that may have terms
+    premise_inputs: np.ndarray  # those that may have terms
     consequent_inputs: np.ndarray
-    seed: int  # of the clustering
-    free: list[str]  # weights of the penalty that the evidence finds, of ``evidence.FREE``
-    first: Penalty  # where they start
-    n_all: float  # rows by weight that the final model will be trained on
-    most_rules: int | None
+    weights: dict[str, Any]  # of the penalty, those that are given, of ``evidence.FREE``
+    seed: int  # of clusterings that have none of their own
+    max_rules: int | None
     held: Held | None = None
+    n_all: float = np.nan  # rows by weight that the final model will be trained on
 
     @property
-    def n_basis(self):
-        """Coefficients of a rule."""
-        return 1 + (self.consequent_inputs.size if self.order else 0)
+    def free(self):
+        """Weights that the evidence finds."""
+        return [key for key in FREE if key not in self.weights]
+
+    @property
+    def first(self):
+        """The penalty at the start."""
+        return replace(FIRST_PENALTY, **self.weights)
 
 
 class Trials:
@@ -74,45 +77,41 @@ class Trials:
         self.rows, self.plan = rows, plan
         self.spacing = Spacing(rows)
         self.one_rule = Candidate((1,) * rows.X.shape[1])
-        self._parts: dict[int, StandardisedData] = {}
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
-        self.scattered_inputs = plan.inputs
+        self.scattered_inputs = plan.premise_inputs
         # A line has no premises to move: begun is done.
         line = self._train(self._problem(self.one_rule), first_steps=FIRST_STEPS)
         self._begun[self.one_rule] = self._found[self.one_rule] = line
         # Scattered rules have terms on those inputs of which the line's residual says something.
         scores = self._scores(self.one_rule)
         asked = scores > _SIGNIFICANT
-        self.scattered_inputs = plan.inputs[
+        self.scattered_inputs = plan.premise_inputs[
             asked if asked.any() else scores == scores.max(initial=0)
         ]
 
     def _scores(self, candidate):
         # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
-        counts = [candidate.counts[j] + 2 for j in self.plan.inputs]
-        return term_scores(self.tuned(candidate), self.plan.inputs, counts, self.spacing)
+        counts = [candidate.counts[j] + 2 for j in self.plan.premise_inputs]
+        return term_scores(self.tuned(candidate), self.plan.premise_inputs, counts, self.spacing)
 
     def rows_for(self, candidate):
-        """As many as its parameters need; powers of two, for few sets of rows serve them all."""
-        needed = max(_ROWS_EACH * self.n_parameters(candidate), _FEWEST_ROWS)
-        n_rows = min(
-            _FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / _FEWEST_ROWS))), self.rows.n_rows
-        )
-        if n_rows not in self._parts:
-            part = self.rows.part(slice(n_rows))
-            self._parts[n_rows] = replace(part, inputs=unit_scale(part.X))
-        return self._parts[n_rows]
+        """As many as its parameters need, by powers of two: most candidates see the same."""
+        needed = max(_ROWS_EACH * self.n_parameters(candidate), FEWEST_ROWS)
+        n_rows = FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / FEWEST_ROWS)))
+        part = self.rows.part(slice(n_rows))
+        return replace(part, inputs=unit_scale(part.X))
 
     def larger(self, kind, candidate) -> Candidate | None:
         """The next of a kind; None where there are not the rows."""
         if kind == "scattered":
             grown = [candidate.with_more_clusters()] if self.scattered_inputs.size else []
         elif kind == "tree":
-            splits = best_splits(self.tuned(candidate), self.plan.inputs, _TRIED)
-            grown = [candidate.with_split(split) for split in splits]
+            splits = best_splits(self.tuned(candidate), self.plan.premise_inputs, _TRIED)
+            grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
         else:
-            grown = [candidate.with_more_terms(j) for j in self._asking(candidate)]
+            asking = np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]
+            grown = [candidate.with_more_terms(j) for j in self.plan.premise_inputs[asking]]
         smaller = self.tuned(candidate)
         promising = [
             (one, self._train(self._problem(one, smaller), turns=0))
@@ -126,17 +125,13 @@ class Trials:
         self._begun[best] = begun
         return best
 
-    def _asking(self, candidate):
-        """The inputs of whose terms the residual says most."""
-        return self.plan.inputs[np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]]
-
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
-        n_terms = candidate.n_terms(self.scattered_inputs)
-        return candidate.n_rules * self.plan.n_basis + 2 * n_terms
+        n_basis = 1 + self.plan.consequent_inputs.size
+        return candidate.n_rules * n_basis + 2 * candidate.n_terms(self.scattered_inputs)
 
     def _is_small(self, candidate):
-        most = self.plan.most_rules or np.inf
+        most = self.plan.max_rules or np.inf
         if candidate.n_rules > most or self.n_parameters(candidate) > self.rows.n_rows:
             return False
         if any(count > self.spacing.n_values(j) for j, count in enumerate(candidate.counts)):
@@ -156,7 +151,7 @@ class Trials:
                 found = with_sparse_slopes(trained, self.plan.free)
             else:
                 begun = self._begun[candidate]
-                found = self._train(begun.problem, begun=begun)
+                found = self._train(begun.problem, evaluation=begun.evaluation)
             self._found[candidate] = found
         return self._found[candidate]
 
@@ -178,16 +173,14 @@ class Trials:
         known, penalty = None, plan.first
         if smaller is not None:
             known, penalty = smaller.evaluation.antecedent, smaller.penalty
-        inputs, slopes = self.scattered_inputs, plan.consequent_inputs
-        antecedent = rule_base(
-            candidate, rows, plan.families, inputs, self.spacing, plan.seed, known
-        )
+        inputs, spacing, slopes = self.scattered_inputs, self.spacing, plan.consequent_inputs
+        antecedent = rule_base(candidate, rows, plan.families, inputs, spacing, plan.seed, known)
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
 
-    def _train(self, problem, turns=_TURNS, first_steps=_STEPS_TO_PROMISE, begun=None):
-        inputs, weight = problem.rows.inputs, effective_weight(problem.rows)
-        premise = Premise.of(problem.antecedent, inputs.minimum, inputs.maximum)
-        return tune(problem, premise, self.plan.free, weight, turns, first_steps, begun=begun)
+    def _train(self, problem, turns=FEW_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
+        free, weight = self.plan.free, effective_weight(problem.rows)
+        premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
+        return tune(problem, premise, free, weight, turns, first_steps, evaluation)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
         """Of rows that were not trained on, as predict answers; summed over outputs."""
@@ -195,17 +188,12 @@ class Trials:
         antecedent, coefficients = tuned.evaluation.antecedent, tuned.solved.coefficients
         if held is not None:
             antecedent, coefficients = held(tuned.problem, tuned.solved)
-        n_inputs, low, high = seen.X.shape[1], seen.y.min(axis=0), seen.y.max(axis=0)
+        n_inputs, targets = seen.X.shape[1], unit_scale(seen.y)
+        slopes, order = tuned.problem.consequent_inputs, self.plan.order
         model = TSKModel(
             antecedent=antecedent,
             initial_antecedent=antecedent,
-            coefficients=in_user_units(
-                coefficients,
-                seen.inputs,
-                unit_scale(seen.y),
-                tuned.problem.consequent_inputs,
-                self.plan.order,
-            ),
+            coefficients=in_user_units(coefficients, seen.inputs, targets, slopes, order),
             reference=np.zeros(n_inputs),
             spread=np.ones(n_inputs),
             minimum=seen.inputs.minimum,
@@ -213,6 +201,6 @@ class Trials:
             rule_weights=tuned.evaluation.masses,
             rule_rows=tuned.evaluation.masses,
             input_names=tuple(f"x{j}" for j in range(n_inputs)),
-            target=TargetRange(low, high, np.ones(low.size)),
+            target=TargetRange(targets.minimum, targets.maximum, targets.scale),
         )
         return np.sum((model.predict(rows.X) - rows.y) ** 2, axis=1)

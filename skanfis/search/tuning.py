@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 
 from ..learning.evidence import (
+    LARGEST,
     PRIOR_DISPLACEMENT,
+    SMALLEST,
     Laplace,
     extrapolated,
     is_settled,
@@ -28,7 +30,7 @@ from ..learning.objective import Evaluation, SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
 from ..learning.sparse_slopes import sparse_slopes
-from ..learning.varpro import varpro
+from ..learning.varpro import TOLERANCE, varpro
 from ..reading_cost import reading_cost
 
 # In the middle of what data of every kind ask for; from there the first steps find their way.
@@ -40,21 +42,18 @@ FIRST_STEPS = 5
 ARRIVING = 50
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 MOST_COLUMNS = 512
-_FEW_STEPS, _FEW_TURNS = 3, 2
+_FEW_STEPS, FEW_TURNS = 3, 2
 # Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
 # A turn: a few iterations of the premises, and steps of the weights to follow them. Neither is
 # finished while the other moves: what is left is done in the training that follows.
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
-_TOLERANCE = 1e-3
 # The smallest rise of the evidence, in -2 log p, after which another turn follows.
 _RISE = 0.5
-# Of terms without bounds: weights next to nothing, which rounding errors need, and a first turn
-# that goes far.
-_NO_WEIGHT, _UNBOUNDED_ITERATIONS = 1e-12, 25
-# Agreement: beyond the last weight, all rules are one line; less of a rise is not worth a training.
+# The first turn of terms without bounds goes far.
+_UNBOUNDED_ITERATIONS = 25
+# Of agreement: less of a rise is not worth a training.
 _MOST_RAISES, _HALVINGS, _LEAST_RAISE = 3, 8, 2.0
-_MOST_AGREEMENT = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +64,6 @@ class Tuned:
     evaluation: Evaluation
     displacement: np.ndarray
     posterior: Laplace
-    agreement_is_raised: bool = False  # as far as the tolerance allows
 
     @property
     def penalty(self):
@@ -76,11 +74,6 @@ class Tuned:
     def score(self):
         """-2 log p."""
         return self.posterior.minus_twice_log
-
-    @property
-    def is_trained(self):
-        """Whether premises have moved, or looked where to."""
-        return self.posterior.curvature.size > 0
 
     @cached_property
     def solved(self):
@@ -122,37 +115,21 @@ def tune(
     n_rows: float,
     turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
-    begun: Tuned | None = None,
+    evaluation: Evaluation | None = None,
 ) -> Tuned:
-    """Find the free weights, and the premises that go with them.
+    """Find the ``free`` weights, of ``evidence.FREE``, and the premises that go with them.
 
-    Parameters
-    ----------
-    problem : SeparableProblem
-        Its penalty is where the weights start.
-    premise : Premise
-    free : collection of str
-        Weights to be found, of ``evidence.FREE``.
-    n_rows : float
-        Rows by weight.
-    turns : int
-        Most turns of the premises; with 0 they stay where they are.
-    first_steps : int
-        Steps of the weights before the premises move.
-    begun : Tuned, optional
-        What earlier turns have found: these go on from there.
+    The weights start at those of the problem's penalty and take ``first_steps`` before the premises
+    move, in so many ``turns`` at most; with 0 these stay where they are. ``n_rows`` are rows by
+    weight; ``evaluation`` is that of the start, where it is known.
     """
     steps = _STEPS
     if problem.n_columns > MOST_COLUMNS:
-        first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, _FEW_TURNS), 1
+        first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
-    if begun is not None and begun.is_trained:
-        return _risen(begun, premise, free, turns, steps)
-    if begun is not None:
-        x, evaluation = begun.displacement, begun.evaluation
-    else:
-        x = np.zeros(premise.size)
+    x = np.zeros(premise.size)
+    if evaluation is None:
         evaluation = problem.evaluate(premise.parameters(x))
     start = _improved(problem, evaluation, x, problem.penalty, first_steps, free, n_rows)
     if premise.size == 0 or turns == 0:
@@ -171,8 +148,8 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: fl
     What the premises of the start leave of data without noise would be taken for noise.
     """
     x = np.zeros(premise.size)
-    nothing: dict[str, Any] = dict.fromkeys(free, _NO_WEIGHT)
-    penalty = replace(problem.penalty, **nothing)
+    least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
+    penalty = replace(problem.penalty, **least)
     evaluation = problem.evaluate(premise.parameters(x))
     start = _improved(problem, evaluation, x, penalty, 0, free, n_rows)
     first = _turned(start, premise, penalty, free, FIRST_STEPS, _UNBOUNDED_ITERATIONS, False)
@@ -203,7 +180,7 @@ def _turned(
         problem,
         premise,
         max_iter=iterations,
-        tol=_TOLERANCE,
+        tol=TOLERANCE,
         stiffness=penalty.stiffness,
         start=tuned.displacement,
         evaluation=problem.solved_again(tuned.evaluation),
@@ -224,19 +201,16 @@ def _improved(
     Steps that are alike are taken on to where they lead, if the evidence rises there; the last is
     always a plain one.
     """
-    line, n_rules = problem.common_line, problem.antecedent.n_rules
+    line = problem.common_line
     n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
     n_distinct = problem.rows.n_rows  # a search sample has no row twice
 
     def posterior_at(weights):
-        error = evaluation.mean_squared_error
-        return laplace(
-            evaluation.normal, line, error, weights, n_rows, n_rules, x, curvature, n_outputs
-        )
+        return laplace(evaluation, line, weights, n_rows, n_outputs, x, curvature)
 
     posterior, before = posterior_at(penalty), None
     for left in reversed(range(steps)):
-        least = least_weights(posterior, n_rules, n_distinct) if has_least else None
+        least = least_weights(posterior, n_distinct) if has_least else None
         plain = reestimated(posterior, free, least, n_distinct)
         far = extrapolated(line, before, posterior.penalty, plain, free, least)
         if before is not None and is_settled(line, posterior.penalty, far):
@@ -277,7 +251,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, left: float) -> Tu
             best, agreement = found, 0.0
         else:
             agreement = float(np.sqrt(best.penalty.agreement * agreement))
-    return best if best is tuned else replace(best, agreement_is_raised=True)
+    return best
 
 
 def with_sparse_slopes(tuned: Tuned, free) -> Tuned:
@@ -293,17 +267,14 @@ def with_sparse_slopes(tuned: Tuned, free) -> Tuned:
 
 def _most_agreement(tuned: Tuned, most: float) -> float:
     """The largest agreement at which the consequents alone keep the error, by bisection."""
-    low, high = np.log(tuned.penalty.agreement), np.log(_MOST_AGREEMENT)
+    low, high = tuned.penalty.agreement, LARGEST.agreement
     for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        penalty = replace(tuned.penalty, agreement=float(np.exp(middle)))
+        middle = float(np.sqrt(low * high))
+        penalty = replace(tuned.penalty, agreement=middle)
         # The consequents of another penalty take no pass over the rows but for their error.
         raised = replace(tuned, problem=tuned.problem.with_penalty(penalty))
-        if raised.expected_error <= most:
-            low = middle
-        else:
-            high = middle
-    return float(np.exp(low))
+        low, high = (middle, high) if raised.expected_error <= most else (low, middle)
+    return low
 
 
 def scaled(penalty: Penalty, free, ratio, agreement_is_raised=False):
@@ -312,13 +283,9 @@ def scaled(penalty: Penalty, free, ratio, agreement_is_raised=False):
     But agreement that makes rules hold one by one does so for any number of rows. More digits than
     three say nothing, and would carry rounding errors into the model.
     """
-    own = {
-        "agreement": penalty.agreement / (ratio if agreement_is_raised else 1.0),
-        "alpha": penalty.alpha,
-        "slope": penalty.rho,
-        "stiffness": penalty.stiffness,
-    }
-    weights: dict[str, Any] = {key: _in_digits(own[key] * ratio) for key in free}
+    weights: dict[str, Any] = {key: _in_digits(getattr(penalty, key) * ratio) for key in free}
+    if agreement_is_raised:
+        weights["agreement"] = _in_digits(penalty.agreement)
     for key in ("pulls", "slope_pulls"):
         pulls = getattr(penalty, key)
         weights[key] = {name: _in_digits(pull) for name, pull in pulls.items()}

@@ -25,7 +25,7 @@ every_iterative_solver = pytest.mark.parametrize("name", ITERATIVE)
 
 
 def solve(name, rows, premise, alpha=1e-8, order=1, agreement=0.0, **settings):
-    penalty = Penalty(agreement=agreement, alpha=alpha)
+    penalty = Penalty(agreement=agreement, alpha=alpha, slope=alpha)
     problem = SeparableProblem(rows, premise.antecedent, order, penalty)
     solver = SOLVERS[name]()
     own = {key: settings.pop(key) for key in ("tol", "step_size") if key in settings}
@@ -90,7 +90,7 @@ def test_cost_falls_where_rules_must_agree(name, kind, agreement):
     rows, premise = noisy(kind)
     settings = {"step_size": 1e-3} if name in RESTLESS else {}
     result = solve(name, rows, premise, alpha=1e-3, agreement=agreement, **settings)
-    penalty = Penalty(agreement=agreement, alpha=1e-3)
+    penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-3)
     dense = oracles.DenseProblem(rows, premise.antecedent, 1, penalty)
     start = dense.cost(premise.antecedent.parameters)
     evaluation = result.evaluation
@@ -104,7 +104,7 @@ def test_loss_curve_begins_at_the_start(name, rng):
     rows, premise = noisy()
     for start in (None, 0.1 * rng.normal(size=premise.size)):
         result = solve(name, rows, premise, start=start)
-        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8))
+        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8, slope=1e-8))
         there = problem.evaluate(
             premise.parameters(np.zeros(premise.size) if start is None else start)
         )

@@ -43,9 +43,9 @@ def test_cost_and_solution_with_a_pull_for_every_part_are_those_of_the_dense_pro
     assert_allclose(problem.evaluate(parameters).cost, dense.cost(parameters), rtol=1e-9)
     # At any consequents, as the solvers by gradients have it.
     beta = g.normal(size=(problem.n_columns, 2))
-    joint = problem.joint(parameters, beta)
+    evaluation, _, slope = problem.joint(parameters, beta)
     residuals = dense.residual_matrix(parameters)
     right = dense.right_side(len(residuals))
     expected = 0.5 * np.sum((residuals @ beta - right) ** 2)
-    assert_allclose(joint.evaluation.cost, expected, rtol=1e-10)
-    assert_allclose(joint.coefficients, residuals.T @ (residuals @ beta - right), rtol=1e-8)
+    assert_allclose(evaluation.cost, expected, rtol=1e-10)
+    assert_allclose(slope, residuals.T @ (residuals @ beta - right), rtol=1e-8)

@@ -105,7 +105,7 @@ def two_bells(rows, alpha=0.0):
     low, high = oracles.box(rows)
     n_inputs = low.size
     antecedent = oracles.even_grid([Bell] * n_inputs, [2] * n_inputs, low, high, 0.5)
-    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=alpha))
+    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=alpha, slope=alpha))
     return problem, Premise.of(antecedent, low, high, is_free=True)
 
 
@@ -228,7 +228,9 @@ class TestNaturalPremise:
 class TestEnd:
     def problem(self, **settings):
         rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1, **settings)
-        return SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8)), premise
+        return SeparableProblem(
+            rows, premise.antecedent, 1, Penalty(alpha=1e-8, slope=1e-8)
+        ), premise
 
     def test_error_goal_ends_it(self):
         problem, premise = self.problem()

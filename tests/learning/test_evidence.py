@@ -24,7 +24,7 @@ PENALTIES = [
     Penalty(agreement=0.1, alpha=0.01, slope=0.3),
     Penalty(agreement=1e-3, alpha=2e-3, slope=1e-2),
     Penalty(agreement=0.0, alpha=1.0, slope=1e-4),
-    Penalty(agreement=1.0, alpha=1e-5),
+    Penalty(agreement=1.0, alpha=1e-5, slope=1e-5),
 ]
 # Pulls of components are expected to be within this factor of one another, as one deviation.
 LIKENESS = np.log(3.0)
@@ -37,12 +37,11 @@ def rules(rng, n_rules):
 def laplace_at(problem, evaluation, penalty, **premises):
     """The posterior of the problem's rows, at an evaluation of it."""
     return laplace(
-        evaluation.normal,
+        evaluation,
         problem.common_line,
-        evaluation.mean_squared_error,
         penalty,
         problem.rows.total_weight,
-        problem.antecedent.n_rules,
+        problem.n_outputs,
         **premises,
     )
 
@@ -67,7 +66,7 @@ def with_pulls(penalty, line, g):
         return dict(zip(names, pulls, strict=False))
 
     components, slopes = around_one(line.departures.components), around_one(line.slopes)
-    return replace(penalty, slope=penalty.rho, pulls=components, slope_pulls=slopes)
+    return replace(penalty, pulls=components, slope_pulls=slopes)
 
 
 def prior_of_pulls(penalty):
@@ -208,7 +207,6 @@ def at_fixed_premises(seed):
 
 def slope_of(function, penalty, key, step=1e-3):
     """Derivative by the logarithm of a weight."""
-    penalty = replace(penalty, slope=penalty.rho)
     ends = [
         function(replace(penalty, **{key: getattr(penalty, key) * np.exp(side * step)}))
         for side in (1.0, -1.0)

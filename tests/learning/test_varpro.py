@@ -194,7 +194,7 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
 
 
 def solve(rows, premise, alpha=1e-8, agreement=0.0, **settings):
-    penalty = Penalty(agreement=agreement, alpha=alpha)
+    penalty = Penalty(agreement=agreement, alpha=alpha, slope=alpha)
     problem = SeparableProblem(rows, premise.antecedent, 1, penalty)
     return problem, varpro(problem, premise, **({"max_iter": 200, "tol": 1e-6} | settings))
 

@@ -362,7 +362,18 @@ def request_for(counts, weights):
     inputs, families = np.arange(len(counts)), [Gaussian] * len(counts)
     names = [f"x{j}" for j in inputs]
     return StructureRequest(
-        counts, "grid", families, 1, inputs, inputs, weights, True, 0, names, 0.05, None
+        n_mfs=counts,
+        partition="grid",
+        families=families,
+        order=1,
+        premise_inputs=inputs,
+        consequent_inputs=inputs,
+        weights=weights,
+        premises_move=True,
+        seed=0,
+        names=names,
+        simplicity=0.05,
+        max_rules=None,
     )
 
 

@@ -1,27 +1,29 @@
 """Where training starts: rules that are given, their weights, and when terms are unbounded."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.evidence import FREE
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
 from skanfis.search import Spacing, grid_antecedent, start
 from skanfis.search.judging import dealt_rows
 from skanfis.search.trials import Plan, Trials
-from skanfis.search.tuning import FIRST_PENALTY
 
 
 def plan_of(n_all, given=()):
     """Of one input; the weights that are not given are free."""
-    weights, slopes = dict(given), np.arange(1)
-    free = [key for key in FREE if key not in weights]
-    first = replace(FIRST_PENALTY, **weights)
-    return Plan([Gaussian], 1, slopes, slopes, 0, free, first, n_all, None)
+    return Plan(
+        families=[Gaussian],
+        order=1,
+        premise_inputs=np.arange(1),
+        consequent_inputs=np.arange(1),
+        weights=dict(given),
+        seed=0,
+        max_rules=None,
+        n_all=n_all,
+    )
 
 
 def of_grid(count, truth, rng, noise=0.0, n_rows=300, weights=(), simplicity=0.0):
@@ -80,8 +82,8 @@ def test_a_candidate_begins_where_its_trial_ended(rng, left):
     assert found.candidates == ["told"]
     assert found.antecedent is tuned.problem.antecedent
     assert found.agreement_is_raised is (left > 1.0)
-    weights = [found.penalty.alpha, found.penalty.rho, found.penalty.stiffness]
-    own = [tuned.penalty.alpha, tuned.penalty.rho, tuned.penalty.stiffness]
+    weights = [found.penalty.alpha, found.penalty.slope, found.penalty.stiffness]
+    own = [tuned.penalty.alpha, tuned.penalty.slope, tuned.penalty.stiffness]
     assert_allclose(weights, np.multiply(own, 0.2), rtol=5e-3)
     if left == 1.0:
         assert_allclose(found.displacement, tuned.displacement, atol=1e-5)

@@ -9,24 +9,29 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE
-from skanfis.learning.penalty import Penalty
 from skanfis.membership import Gaussian
 from skanfis.search.candidates import Candidate
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
-from skanfis.search.trials import _FEWEST_ROWS, _ROWS_EACH, Plan, Trials
-from skanfis.search.tuning import FIRST_PENALTY
+from skanfis.search.trials import _ROWS_EACH, FEWEST_ROWS, Plan, Trials
 
 from .. import oracles
 
 pytestmark = pytest.mark.theory
 
 
-def plan_of(n_inputs, n_all, free=FREE, first=FIRST_PENALTY, order=1, most_rules=None):
+def plan_of(n_inputs, n_all, weights=(), order=1, max_rules=None):
     every = np.arange(n_inputs)
-    slopes = every if order else every[:0]
-    families = [Gaussian] * n_inputs
-    return Plan(families, order, every, slopes, 0, list(free), first, n_all, most_rules)
+    return Plan(
+        families=[Gaussian] * n_inputs,
+        order=order,
+        premise_inputs=every,
+        consequent_inputs=every if order else every[:0],
+        weights=dict(weights),
+        seed=0,
+        max_rules=max_rules,
+        n_all=n_all,
+    )
 
 
 def trials_of(X, y, n_all=None, **settings):
@@ -39,7 +44,7 @@ def surface(rng, n_rows=300, n_inputs=3):
     return X, np.sin(3.0 * X[:, 0]) + X[:, 0] * X[:, 1] + 0.1 * rng.normal(size=n_rows)
 
 
-NOTHING = Penalty()  # pays for nothing
+NOTHING = dict.fromkeys(FREE, 0.0)  # pays for nothing
 
 
 def test_squared_errors_of_one_rule_are_those_of_a_public_fit(rng):
@@ -49,7 +54,7 @@ def test_squared_errors_of_one_rule_are_those_of_a_public_fit(rng):
     band = np.digitize(rows.X[:, 2], np.linspace(-1.5, 1.5, 4))
     for k in range(5):
         fold, left = rows.part(band != k), rows.part(band == k)
-        trials = Trials(fold, plan_of(3, 90.0, free=[], first=NOTHING))
+        trials = Trials(fold, plan_of(3, 90.0, NOTHING))
         found = trials.squared_errors(trials.tuned(trials.one_rule), left, None)
         model = ANFISRegressor(n_mfs=1, agreement=0.0, alpha=0.0).fit(fold.X, fold.y[:, 0])
         assert_allclose(found, (model.predict(left.X) - left.y[:, 0]) ** 2, rtol=1e-5, atol=1e-9)
@@ -129,7 +134,7 @@ class TestSequences:
     @pytest.mark.parametrize("most", [None, 4])
     def test_they_end_where_rows_or_the_bound_on_rules_do(self, rng, kind, most):
         X, y = surface(rng, 40, 2)
-        trials = trials_of(X, y, most_rules=most)
+        trials = trials_of(X, y, max_rules=most)
         sizes, one = [], trials.one_rule
         while one is not None:
             sizes.append(one.n_rules)
@@ -153,8 +158,8 @@ def test_a_candidate_sees_as_many_rows_as_its_parameters_need(rng):
     X, y = surface(rng, 9000, 2)
     trials = trials_of(X, y)
     for n_clusters, n_rows in (
-        (0, _FEWEST_ROWS),
-        (3, _FEWEST_ROWS),
+        (0, FEWEST_ROWS),
+        (3, FEWEST_ROWS),
         (12, 4000),
         (20, 8000),
         (90, 9000),

@@ -63,7 +63,9 @@ def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, conseque
     g = np.random.default_rng(4)
     rows, used = oracles.bumpy_rows(g, 200, 2, 2, weighted), np.array(consequent_inputs)
     antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])
-    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=1e-3), consequent_inputs=used)
+    problem = SeparableProblem(
+        rows, antecedent, 1, Penalty(alpha=1e-3, slope=1e-3), consequent_inputs=used
+    )
     evaluation = problem.evaluate(antecedent.parameters)
     # On either side of the box of every input, and in it.
     low, high = rows.inputs.minimum, rows.inputs.maximum
