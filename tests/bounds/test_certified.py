@@ -20,12 +20,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsW
 ONE_RULE = MODELS["one rule, order 1, 2 outputs"].with_out_of_bounds("linear", 0.5)
 
 
-def whole_box(model, part=0.3):
-    """The range, and part of its width to every side."""
-    beyond = part * (model.maximum - model.minimum)
-    return np.stack([model.minimum - beyond, model.maximum + beyond], axis=1)
-
-
 def a_fit(rng, **params):
     X = rng.uniform([-20.0, -100.0], [60.0, 100.0], (200, 2))
     y = 1e-3 * X[:, 1] * (1.0 + 0.01 * X[:, 0]) + 0.1 * np.sin(X[:, 0] / 15.0)

@@ -177,24 +177,6 @@ def test_a_raw_signal_is_no_rate(tmp_path, truth, name):
     assert reading.units["output"] == "mV"
 
 
-def test_units_are_told_by_values_where_no_name_does(tmp_path, truth):
-    table = pd.DataFrame(
-        {
-            "time": 1_770_000_000_000 + 1000 * truth["clock"],
-            "temperature": truth["temperature"] + 273.15,
-            "gyro": (27_000 * truth["output"]).round(),
-            "rate": truth["rate"],
-        }
-    )
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
-    same(reading, truth, ["temperature", "rate"])
-    assert {reading.units[part] for part in ("time", "temperature", "output")} == {
-        "ms", "K", "counts",
-    }  # fmt: skip
-    np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-6)
-
-
 def test_many_files_a_pattern_and_headers_that_nearly_agree(tmp_path, truth):
     folder = tmp_path / "logs"
     folder.mkdir()

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
-from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
 from skanfis.gyro.physics import OpenLoopArcsineRegressor, phase_of
@@ -193,17 +192,3 @@ def test_bad_logs_are_refused(rng):
         OpenLoopArcsineRegressor().fit(X, np.full(20, 3.0))
     with pytest.raises(ValueError, match="the output never changes"):
         OpenLoopArcsineRegressor().fit(X * [0.0, 1.0], rate)
-
-
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-@pytest.mark.parametrize(
-    ("estimator", "check"),
-    [
-        pytest.param(clone, check, id=getattr(check, "func", check).__name__)
-        for clone, check in estimator_checks_generator(OpenLoopArcsineRegressor())
-    ],
-)
-def test_estimator_passes_the_checks_of_scikit_learn(estimator, check):
-    check(estimator)
