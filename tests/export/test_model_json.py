@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis import ANFISRegressor
 from skanfis.export import export_json, read_fis, read_json
 from skanfis.export.json_reader import parse_json
 
@@ -48,17 +47,6 @@ def test_comes_back_to_the_last_bit(model):
     rows = rows_of(model, 1.3)
     assert_array_equal(read.predict(rows), model.predict(rows))
     assert_array_equal(read.coverage(rows), model.coverage(rows))
-
-
-def test_file_of_a_trained_model(tmp_path, rng):
-    X = rng.normal(size=(100, 2)) * [1e-3, 1e5]
-    estimator = ANFISRegressor(n_mfs=2, agreement=0.1, alpha=1e-5).fit(X, X[:, 0] * X[:, 1])
-    export_json(estimator, tmp_path / "model.json", posterior=True)
-    read = read_json(tmp_path / "model.json")
-    assert_same(read, estimator.model_)
-    assert_array_equal(read.predict(X)[:, 0], estimator.predict(X))
-    onward = ANFISRegressor(partition=read, solver="lse").fit(X, X[:, 0])
-    assert onward.n_rules_ == 4
 
 
 def test_a_person_can_read_it():
