@@ -6,18 +6,11 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import export_c_physics
-from skanfis.gyro._simpler import fitted_rule, kinds
 
 from ..export.c_compiler import SANITIZE, UNTOUCHED, evaluate_all, needs_compiler
+from .targets.models import polynomial
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
-
-
-def cubic_of(X, log, policy):
-    *_, (_, _, fit) = kinds(list(X), policy)
-    return fit(
-        X, (log["output"] - log["rate"]).to_numpy(), fitted_rule(X, np.zeros(len(X)), 0, policy)
-    )
 
 
 @needs_compiler
@@ -33,7 +26,7 @@ def cubic_of(X, log, policy):
 def test_answers_as_python(tmp_path, policy, dtype, std, tolerance):
     log = make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=0)
     X = log[list(INPUTS)]
-    estimator = cubic_of(X, log, policy)
+    estimator = polynomial(X, (log["output"] - log["rate"]).to_numpy(), policy)
     low, high = X.min().to_numpy(), X.max().to_numpy()
     rng = np.random.default_rng(0)
     reach = rng.choice([1.0, 1.5], 3000)[:, None]

@@ -63,20 +63,24 @@ def no_pictures(monkeypatch):
     monkeypatch.setattr("skanfis.gyro._results._PICTURES", {})
 
 
-@pytest.fixture(scope="module")
-def calibrated(tmp_path_factory, log, given_weights, coarse_report):
-    """A folder after one calibration from counts, milliseconds and kelvin; without pictures."""
-    folder = tmp_path_factory.mktemp("calibrated")
-    raw = pd.DataFrame(
+def raw(log, kelvin=273.15):
+    """The log without the rate as an instrument writes it, in counts, milliseconds and kelvin."""
+    return pd.DataFrame(
         {
             "t_ms": 1000 * log["time"] + 5e6,
-            "T": log["temperature"] + 273.15,
+            "T": log["temperature"] + kelvin,
             "counts": FACTOR * log["output"],
-            "table": log["rate"],
             "run": log["run"],
         }
     )
-    path = write_log(folder / "raw.csv", raw, raw.columns)
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory, log, given_weights, coarse_report):
+    """A folder after one calibration from raw columns; without pictures."""
+    folder = tmp_path_factory.mktemp("calibrated")
+    table = raw(log).assign(table=log["rate"])
+    path = write_log(folder / "raw.csv", table, table.columns)
     arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("skanfis.gyro._results._PICTURES", {})
@@ -122,14 +126,7 @@ def test_what_is_refused_once_there_is_a_compensator(calibrated, tmp_path, log, 
 
 
 def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path, log, capsys):
-    hot = pd.DataFrame(
-        {
-            "t_ms": 1000 * log["time"],
-            "T": log["temperature"] + 293.15,
-            "counts": FACTOR * log["output"],
-            "run": log["run"],
-        }
-    )
+    hot = raw(log, kelvin=293.15)
     path = write_log(tmp_path / "hot.csv", hot, hot.columns)
     target = tmp_path / "hot-rates.csv"
     model = str(calibrated / "out" / "compensator.json")
