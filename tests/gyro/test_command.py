@@ -30,10 +30,6 @@ FACTOR = -27_000.0
 FILES = ["compensator.joblib", "compensator.json", "report.html", "rules.txt"]
 
 
-def simulated(**options):
-    return make_ofog(n_devices=1, duration=900.0, random_state=0, **options)
-
-
 # A fit of the smallest kind, where it is not the question.
 SMALL = ["--inputs", "temperature", "output", "--terms", "1,2"]
 MEASURED = ("time", "temperature", "output", "rate", "run")
@@ -46,7 +42,7 @@ def write_log(path, log, columns=MEASURED):
 
 @pytest.fixture(scope="module")
 def log():
-    return simulated(n_runs=5)
+    return make_ofog(n_devices=1, n_runs=5, duration=900.0, random_state=0)
 
 
 @pytest.fixture

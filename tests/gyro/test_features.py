@@ -25,12 +25,8 @@ def log(rng):
         temperature = 20 + np.cumsum(rng.normal(size=n_rows))
         runs.append(pd.DataFrame({"t": time, "T": temperature, "run": name, "other": time**2}))
     log = pd.concat(runs, ignore_index=True)
-    return log.iloc[_interleaved(log["run"])]
-
-
-def _interleaved(run):
-    """Positions of the rows, the runs by turns, each in its own order."""
-    return np.argsort(run.groupby(run).cumcount(), kind="stable")
+    # The runs by turns, each in its own order.
+    return log.iloc[np.argsort(log.groupby("run").cumcount(), kind="stable")]
 
 
 @pytest.mark.parametrize("steps", [np.full(200, 3.0), np.geomspace(0.01, 50, 200)])
