@@ -362,10 +362,10 @@ def random_scattered(rng, family, n_rules, inputs):
     return ScatteredAntecedent.build(family, inputs, theta)
 
 
-def random_table(rng, n_rules=5, inputs=3):
+def random_table(rng, n_rules=5, inputs=3, families=(Gaussian, Bell, Gaussian)):
     """Rules over shared terms, three per input; the first two rules look at fewer inputs."""
     groups = []
-    for j, family in zip(range(inputs), (Gaussian, Bell, Gaussian), strict=False):
+    for j, family in zip(range(inputs), families, strict=False):
         centers = np.array([-1.0, 0.3, 1.2]) + 0.2 * rng.normal(size=3)
         theta = family.from_center_and_width(centers, rng.uniform(0.7, 1.5, 3))
         groups.append(TermGroup(family, np.full(3, j), theta))

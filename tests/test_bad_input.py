@@ -270,36 +270,23 @@ def flat(column, value=4.25):
     return with_entry(X, (slice(None), column), value)
 
 
-@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {}, {"partition": KMEANS}])
-def test_constant_column_gets_no_terms_and_no_slope(settings):
-    constant = pd.DataFrame(flat(1), columns=NAMES)
-    with pytest.warns(ConstantInputWarning, match=r"'temperature' \(always 4\.25\).*Drop it"):
-        model = ANFISRegressor(**settings).fit(constant, Y)
-    assert "temperature" not in [term["input"] for term in model.memberships_]
-    assert_array_equal(model.consequents_[:, 2], 0.0)
-    without = ANFISRegressor(**settings).fit(constant.drop(columns="temperature"), Y)
-    # A column of zeros more in the same least-squares problem.
-    assert_allclose(
-        model.predict(constant),
-        without.predict(constant.drop(columns="temperature")),
-        rtol=0,
-        atol=1e-8 * np.ptp(Y),
-    )
-
-
-@pytest.mark.parametrize("settings", [{"n_mfs": [3, 2]}, {}])
-def test_constant_columns_cost_nothing_however_many_they_are(settings):
-    """They are no slopes that a row has to pay for, in no count of parameters."""
+@pytest.mark.parametrize("settings", [{"n_mfs": [3, 2]}, {}, {"partition": KMEANS}])
+@pytest.mark.parametrize("n_constant", [1, 40])
+def test_constant_columns_cost_nothing_however_many_they_are(settings, n_constant):
+    """They get no terms and are no slopes that a row has to pay for, in no count of parameters."""
     rng = np.random.default_rng(0)
     inputs = rng.uniform(-1.0, 1.0, (80, 2))
     target = np.sin(4.0 * inputs[:, 0]) + 0.5 * inputs[:, 1] ** 2 + 0.05 * rng.normal(size=80)
     without = ANFISRegressor(**settings).fit(inputs, target)
-    if settings:
-        settings = {"n_mfs": [3, 2] + [1] * 40}
-    with pytest.warns(ConstantInputWarning):
-        model = ANFISRegressor(**settings).fit(np.hstack([inputs, np.ones((80, 40))]), target)
+    if "n_mfs" in settings:
+        settings = {"n_mfs": [3] + [1] * n_constant + [2]}
+    still = {f"still {k}": 4.25 for k in range(n_constant)}
+    rows = pd.DataFrame({"time": inputs[:, 0]} | still | {"rate": inputs[:, 1]})
+    with pytest.warns(ConstantInputWarning, match=r"'still 0' \(always 4\.25\).*Drop it"):
+        model = ANFISRegressor(**settings).fit(rows, target)
     assert model.n_rules_ == without.n_rules_
-    rows = np.hstack([inputs, np.ones((80, 40))])
+    assert {term["input"] for term in model.memberships_} <= {"time", "rate"}
+    assert_array_equal(model.consequents_[:, 2:-1], 0.0)
     told, deviation = model.predict(rows, return_std=True)
     expected, expected_deviation = without.predict(inputs, return_std=True)
     assert_allclose(told, expected, rtol=0, atol=1e-9)

@@ -109,6 +109,12 @@ def alternating(n_inputs, exponent):
     return 10.0 ** (exponent * (-1.0) ** np.arange(n_inputs + 1))
 
 
+def repeated(X, y, weight):
+    """Every row as often as it weighs, in another order."""
+    order = np.random.default_rng(3).permutation(weight.sum())
+    return np.repeat(X, weight, axis=0)[order], np.repeat(y, weight)[order]
+
+
 def test_units_and_origin_of_inputs_and_target(case):
     # The contract is 1e-4, for sixteen digits less four of the inputs' are left; found 1e-8.
     *factors, factor = alternating(case.X.shape[1], 6)
@@ -151,11 +157,10 @@ def test_order_of_the_inputs_of_a_grid(name):
 def test_whole_weights_are_repeated_rows_in_any_order(case):
     weight = np.random.default_rng(2).integers(1, 5, len(case.y))
     weighted = case.fit(case.X, case.y, weight)
-    order = np.random.default_rng(1).permutation(weight.sum())
-    repeated = case.fit(np.repeat(case.X, weight, axis=0)[order], np.repeat(case.y, weight)[order])
-    difference = weighted.predict(case.X) - repeated.predict(case.X)
+    other = case.fit(*repeated(case.X, case.y, weight))
+    difference = weighted.predict(case.X) - other.predict(case.X)
     assert np.abs(difference).max() < TOLERANCE * case.span
-    assert_allclose(weighted.coverage(case.X), repeated.coverage(case.X), atol=1e-4)
+    assert_allclose(weighted.coverage(case.X), other.coverage(case.X), atol=1e-4)
     # The weights matter at all.
     assert np.abs(weighted.predict(case.X) - case.predictions).max() > 1e-5 * case.span
 
@@ -190,10 +195,8 @@ def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
     weight = np.random.default_rng(2).integers(1, 5, len(y))
     model = ANFISRegressor(partition=KMEANS)
     weighted = model.fit(X, y, weight).predict(X)
-    # Repeated rows in another order and in other units.
-    order, units = np.random.default_rng(3).permutation(weight.sum()), np.array([1e6, 1e-6, 1e6])
-    many, targets = np.repeat(X * units, weight, axis=0)[order], np.repeat(y, weight)[order]
-    found = 1e6 * model.fit(many, 1e-6 * targets).predict(X * units)
+    *units, unit = alternating(3, 6)
+    found = model.fit(*repeated(X * units, y * unit, weight)).predict(X * units) / unit
     assert_allclose(found, weighted, rtol=0, atol=TOLERANCE * np.ptp(y))
 
 
@@ -203,12 +206,9 @@ def test_structure_that_is_chosen_by_itself(name):
     X, y = DATA[name]()
     weight = np.random.default_rng(2).integers(1, 4, len(y))
     plain = ANFISRegressor().fit(X, y, weight)
-    order = np.random.default_rng(3).permutation(weight.sum())
     *units, unit = alternating(X.shape[1], 6)
     far = (X + 1e4 * np.ptp(X, axis=0)) * units
-    other = ANFISRegressor().fit(
-        np.repeat(far, weight, axis=0)[order], unit * np.repeat(y, weight)[order]
-    )
+    other = ANFISRegressor().fit(*repeated(far, unit * y, weight))
     assert_allclose(other.predict(far) / unit, plain.predict(X), atol=TOLERANCE * np.ptp(y))
     assert other.n_rules_ == plain.n_rules_
     # What the penalty hardly costs is found less exactly than what is predicted.
@@ -235,9 +235,6 @@ def test_every_family_and_solver(settings):
     solver = of_given_stiffness(settings.get("solver", "varpro"))
     model = ANFISRegressor(max_iter=8, **GIVEN | settings | {"solver": solver})
     plain = model.fit(X, y, weight).predict(X)
-    # Repeated rows in another order and in other units, all at once.
-    order = np.random.default_rng(3).permutation(weight.sum())
-    units = np.array([1e6, 1e-6, 1e6])
-    many, targets = (X * units).repeat(weight, axis=0)[order], y.repeat(weight)[order]
-    found = model.fit(many, 1e-6 * targets).predict(X * units)
-    assert_allclose(1e6 * found, plain, rtol=0, atol=TOLERANCE * np.ptp(y))
+    *units, unit = alternating(3, 6)
+    found = model.fit(*repeated(X * units, y * unit, weight)).predict(X * units) / unit
+    assert_allclose(found, plain, rtol=0, atol=TOLERANCE * np.ptp(y))

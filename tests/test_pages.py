@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from skanfis.export.fis.functions import function_of
 from skanfis.inspection.readability import GREATEST_ALONE, GREATEST_ERROR
-from skanfis.membership import MEMBERSHIPS
+from skanfis.membership import FAMILIES, MEMBERSHIPS
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGES = ("quickstart", "from_matlab")
@@ -77,6 +78,10 @@ def test_limits_of_reading_rules_are_those_of_the_package():
 
 def test_every_family_is_on_the_page():
     page = (DOCS / "memberships.rst").read_text(encoding="utf-8")
+    for family in FAMILIES.values():
+        in_files, _ = function_of(family, [1.0] * len(family.parameters))
+        assert family.name in page
+        assert f"``{in_files}``" in page
     for family in MEMBERSHIPS.values():
         assert f'``"{family.name}"``' in page
         assert all(parameter.name in page for parameter in family.parameters)

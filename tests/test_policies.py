@@ -6,27 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skanfis.policies import TargetRange, check_policy, describe_out_of_bounds, policy_in_words
+from skanfis.policies import TargetRange, describe_out_of_bounds, policy_in_words
 
 
 def test_values_are_told_in_as_many_digits_as_tell_them_apart():
     X = np.array([[1_000_001.5], [1_000_000.25]])
     told = describe_out_of_bounds(X, [999_999.5], [1_000_001.0], ["time"])
     assert "(trained on [999999.5, 1000001], found [1000000, 1000002])" in told
-
-
-@pytest.mark.parametrize(
-    ("policy", "limit", "part"),
-    [
-        ("extrapolate", 0.5, "'extrapolate' must be one of clip, linear, nan, raise"),
-        ("linear", -0.1, "max_extrapolation=-0.1 must be a number"),
-        ("linear", math.nan, "max_extrapolation=nan must be a number"),
-        ("clip", "far", "max_extrapolation='far' must be a number"),
-    ],
-)
-def test_what_is_no_policy_is_refused(policy, limit, part):
-    with pytest.raises(ValueError, match=part):
-        check_policy(policy, limit)
 
 
 def test_policies_in_words():

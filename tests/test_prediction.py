@@ -142,5 +142,9 @@ def test_policy_may_be_changed_after_training(trained):
         found = model.set_params(out_of_bounds__max_extrapolation=limit).predict(OUTSIDE)
         expected = oracles.held_tangent(trained.model_, OUTSIDE.to_numpy(), limit)
         assert_allclose(found, expected[:, 0], rtol=1e-10)
-    with pytest.raises(ValueError, match="max_extrapolation=-1 must be a number"):
-        model.set_params(out_of_bounds__max_extrapolation=-1).predict(OUTSIDE)
+    for limit in (-0.1, math.nan, "far"):
+        model.set_params(out_of_bounds__max_extrapolation=limit)
+        with pytest.raises(ValueError, match=f"max_extrapolation={limit!r} must be a number"):
+            model.predict(OUTSIDE)
+    with pytest.raises(ValueError, match="'extrapolate' must be one of clip, linear, nan, raise"):
+        trained.model_.with_out_of_bounds("extrapolate")

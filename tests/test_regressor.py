@@ -14,7 +14,7 @@ from sklearn.cluster import AgglomerativeClustering, KMeans
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.metrics import get_scorer
-from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut
+from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
@@ -140,15 +140,6 @@ def test_one_constant_rule_is_the_weighted_mean():
     weight = np.random.default_rng(0).uniform(0.1, 3.0, len(X))
     model = ANFISRegressor(n_mfs=1, order=0).fit(X, Y, weight)
     assert_allclose(model.predict(X), np.average(Y, weights=weight), rtol=1e-13)
-
-
-def test_input_with_one_term_is_linear_under_every_rule():
-    model = ANFISRegressor(n_mfs=[3, 1, 2]).fit(FRAME, Y)
-    assert model.n_rules_ == 6
-    assert [term["input"] for term in model.memberships_] == ["time"] * 3 + ["rate"] * 2
-    steps = np.tile([900.0, 0.0, 50.0], (5, 1))
-    steps[:, 1] = np.linspace(-30.0, 80.0, 5)
-    assert_allclose(np.diff(model.predict(pd.DataFrame(steps, columns=NAMES)), 2), 0.0, atol=1e-14)
 
 
 # ------------------------------------------------------------------ attributes, in the user's units
@@ -438,26 +429,6 @@ def test_representations_show_what_was_changed_and_the_rules():
     assert rules[:40] not in model._repr_html_()
     with config_context(display="text"):
         assert list(fitted._repr_mimebundle_()) == ["text/plain"]
-
-
-@pytest.mark.theory
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-def test_grid_search_over_runs_left_out():
-    # Three terms are too few on the first input, and needless on the second.
-    rng = np.random.default_rng(0)
-    data = rng.uniform(size=(200, 2))
-    target = np.sin(14.0 * data[:, 0]) + data[:, 1] + 0.1 * rng.normal(size=200)
-    run = np.arange(200) % 4
-    estimator = quick()
-    search = GridSearchCV(
-        make_pipeline(StandardScaler(), estimator),
-        {"anfisregressor__n_mfs": [2, 3, [4, 1]]},
-        cv=LeaveOneGroupOut(),
-    )
-    search.fit(data, target, groups=run)
-    assert search.best_params_ == {"anfisregressor__n_mfs": [4, 1]}
-    again = clone(search.best_estimator_).fit(data, target)
-    assert_array_equal(search.predict(data), again.predict(data))
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")

@@ -20,18 +20,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsW
 ONE_RULE = MODELS["one rule, order 1, 2 outputs"].with_out_of_bounds("linear", 0.5)
 
 
-def whole_box(model, part=0.3):
-    """The range, and part of its width to every side."""
-    beyond = part * (model.maximum - model.minimum)
-    return np.stack([model.minimum - beyond, model.maximum + beyond], axis=1)
-
-
-def a_fit(rng, **params):
-    X = rng.uniform([-20.0, -100.0], [60.0, 100.0], (200, 2))
-    y = 1e-3 * X[:, 1] * (1.0 + 0.01 * X[:, 0]) + 0.1 * np.sin(X[:, 0] / 15.0)
-    return X, y, ANFISRegressor(n_mfs=3, max_iter=5, solver=VariableProjection(tol=0.1), **params)
-
-
 def test_one_rule_is_bounded_by_its_corners():
     box = np.stack([OFFSET - SCALE, OFFSET + SCALE], axis=1)
     found = bounds(ONE_RULE, box)
@@ -70,8 +58,9 @@ def test_two_rules_of_order_zero_are_a_sigmoid():
 
 
 def test_the_box_is_held_where_the_policy_holds(rng):
-    X, y, estimator = a_fit(rng)
-    estimator.fit(X, y)
+    X = rng.uniform([-20.0, -100.0], [60.0, 100.0], (200, 2))
+    y = 1e-3 * X[:, 1] * (1.0 + 0.01 * X[:, 0]) + 0.1 * np.sin(X[:, 0] / 15.0)
+    estimator = ANFISRegressor(n_mfs=3, max_iter=5, solver=VariableProjection(tol=0.1)).fit(X, y)
     without_end = [(-np.inf, np.inf)] * 2
     found = bounds(estimator, without_end)
     rows = rng.uniform([-200.0, -900.0], [300.0, 900.0], (5000, 2))

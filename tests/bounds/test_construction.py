@@ -50,15 +50,11 @@ def scattered(rng, n_inputs):
     return ScatteredAntecedent.build(Gaussian, np.arange(n_inputs), theta)
 
 
-def one_rule(rng, n_inputs):
-    return GridAntecedent.build([], [], [])
-
-
 KINDS = {
     "tree": tree,
     "grid": grid,
     "scattered": scattered,
-    "one rule": one_rule,
+    "one rule": lambda rng, n_inputs: GridAntecedent.build([], [], []),
 }
 
 

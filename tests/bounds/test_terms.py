@@ -37,27 +37,31 @@ def boxes(rng, group):
     return low[None], (low + width)[None]
 
 
-@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=MEMBERSHIPS)
-def test_ranges_hold(family, rng):
-    group = a_group(rng, family)
+@pytest.fixture(params=MEMBERSHIPS.values(), ids=MEMBERSHIPS)
+def case(request, rng):
+    """Terms of a family, boxes, and the ranges in them."""
+    group = a_group(rng, request.param)
     low, high = boxes(rng, group)
-    found = ranges(group, low, high)
+    return group, low, high, ranges(group, low, high)
+
+
+def test_ranges_hold(case, rng):
+    group, low, high, found = case
     places = low + np.vstack([np.linspace(0.0, 1.0, 101)[:, None], rng.uniform(size=(60, 1))]) * (
         high - low
     )
     for x in np.minimum(places, high):
-        log_mu, gradient = family.log_value_and_gradient(np.tile(x, (N_TERMS, 1)), group.theta)
+        at = np.tile(x, (N_TERMS, 1))
+        log_mu, gradient = group.family.log_value_and_gradient(at, group.theta)
         assert (found.log_mu[0] <= log_mu).all()
         assert (log_mu <= found.log_mu[1]).all()
         assert (found.slope[0] <= -gradient[0]).all()
         assert (-gradient[0] <= found.slope[1]).all()
 
 
-@pytest.mark.parametrize("family", MEMBERSHIPS.values(), ids=MEMBERSHIPS)
-def test_ranges_of_curvature_hold(family, rng):
-    group = a_group(rng, family)
-    low, high = boxes(rng, group)
-    found = ranges(group, low, high)
+def test_ranges_of_curvature_hold(case):
+    group, low, high, found = case
+    family = group.family
     is_bounded = np.isfinite(found.curve[0])
     assert is_bounded.any() or family.name not in ("gaussian", "bell", "two_sided_gaussian")
 

@@ -84,24 +84,6 @@ def test_power_ups_are_numbered_without_repeats_and_begin_at_time_zero():
     assert set(data.groupby("run")["ambient"].nunique()) == {1}
 
 
-def test_linearised_gyro_leaves_1000_ppm():
-    # About its best line a cubic of x^2 / 6 leaves 0.151 x^2 / 6 RMS of full scale, x = K Omega.
-    data = make_ofog(
-        coefficients={"sagnac_factor": 0.0304, "sagnac_temperature": -45.0},
-        max_rate=375.0,
-        n_devices=1,
-        n_runs=1,
-        duration=72_000.0,
-        device_spread=0.0,
-        noise=0.0,
-        random_state=0,
-    )
-    assert data["rate"].abs().max() > 370
-    best_line = np.polynomial.Polynomial.fit(data["rate"], data["nonlinearity"], 1)
-    left = data["nonlinearity"] - best_line(data["rate"])
-    assert_allclose(np.sqrt(np.mean(left**2)) / 375.0, 1000e-6, rtol=0.02)
-
-
 def test_same_seed_same_table_another_seed_another():
     small = {"n_devices": 2, "n_runs": 2, "duration": 600.0}
     first, again = make_ofog(**small, random_state=5), make_ofog(**small, random_state=5)
@@ -191,29 +173,6 @@ def test_sampling_keeps_to_the_durations_asked_for():
         n_devices=1, n_runs=1, duration=0.3, sampling_interval=0.1, dwell_time=0.1, random_state=0
     )
     assert_allclose(data["time"], [0.0, 0.1, 0.2])
-
-
-@pytest.mark.theory
-def test_rate_of_temperature_undoes_the_lag_of_the_thermometer():
-    """Without noise the error is a smooth law of the coil's temperature, not of the indicated."""
-    still = dict.fromkeys(("warm_up", "warm_up_scale_factor", "bias_temperature_rate"), 0.0)
-    data = make_ofog(
-        n_devices=1,
-        n_runs=12,
-        sampling_interval=5.0,
-        rates=[100.0],
-        device_spread=0.0,
-        noise=0.0,
-        coefficients=still,
-        random_state=1,
-    )
-    coil = data["temperature"] + 180.0 * data["temperature_rate"]
-    left = []
-    for temperature in (data["temperature"], coil):
-        law = np.polynomial.Chebyshev.fit(temperature, data["error"], 6)
-        left.append(np.sqrt(np.mean((data["error"] - law(temperature)) ** 2)))
-    assert left[0] > 0.01
-    assert left[1] < 1e-9
 
 
 @pytest.mark.parametrize(

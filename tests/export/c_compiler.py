@@ -19,6 +19,9 @@ SANITIZE = [
     "-g0",
 ]
 
+REALS = {"float32": "float", "float64": "double"}
+REALS |= {"int32": "int_least32_t", "int16": "int_least16_t"}
+
 # Reads rows from one file, and writes to another what the functions make of them.
 _DRIVER = """
 #include <stdio.h>
@@ -91,7 +94,7 @@ def evaluate_all(codes, X, folder, std, n_outputs, flags=SANITIZE):
         includes="".join(
             f'#define {code.name.upper()}_SELF_TEST\n#include "{code.name}.c"\n' for code in codes
         ),
-        real="float" if X.dtype == np.float32 else "double",
+        real=REALS[X.dtype.name],
         n_rows=len(X),
         n_inputs=X.shape[1],
         most_outputs=max(n_outputs),

@@ -8,12 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skanfis.antecedent import RuleTableAntecedent, TermGroup
 from skanfis.membership import FAMILIES, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS
 
-from ..oracles import random_grid, random_scattered, random_tree
+from ..oracles import random_grid, random_scattered, random_table, random_tree
 from .rule_bases import OFFSET, SCALE, build, narrow_target
 
 
@@ -33,22 +32,11 @@ def surface(n_rows=400, n_outputs=1):
     return X, np.column_stack([y, 1e3 + y**2])[:, :n_outputs].squeeze()
 
 
-def table_of(rng, family):
-    """Four rules over terms of two families on three inputs; two do not look at all of them."""
-    groups = []
-    for j, of_input in enumerate((family, Gaussian, family)):
-        centers = np.array([-1.0, 0.1, 1.2]) + 0.2 * rng.normal(size=3)
-        theta = of_input.from_center_and_width(centers, rng.uniform(0.7, 1.5, 3))
-        groups.append(TermGroup(of_input, np.full(3, j), theta))
-    table = np.array([[0, -1, 6], [1, 4, 7], [2, 3, -1], [1, 5, 8]])
-    return RuleTableAntecedent(tuple(groups), table)
-
-
 PARTITIONS = {
     "grid": lambda rng, family: random_grid(rng, [family] * 3, (2, 3, 2)),
     "mixed grid": lambda rng, family: random_grid(rng, [family, Gaussian], (3, 2), (0, 2)),
     "scattered": lambda rng, family: random_scattered(rng, family, 4, (0, 1, 2)),
-    "rule table": table_of,
+    "rule table": lambda rng, family: random_table(rng, 4, families=(family, Gaussian, family)),
 }
 
 

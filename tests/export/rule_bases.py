@@ -42,30 +42,33 @@ def _antecedents():
     }
 
 
-def build(antecedent, order=1, n_outputs=1, **changes):
-    """A model with random consequents; rule 1 has never fired where there are more than two."""
+def build(antecedent, order=1, n_outputs=1, offset=OFFSET, scale=SCALE, **changes):
+    """A model with random consequents; rule 1 has never fired where there are more than two.
+
+    The antecedent is of inputs of order one, the model in units of ``offset`` and ``scale``.
+    """
     g = np.random.default_rng(2)
     n_rules = antecedent.n_rules
     coefficients = g.normal(size=(n_rules, 1 + 3 * order, n_outputs))
-    coefficients[:, 1:] /= SCALE[:, None][: 3 * order]
+    coefficients[:, 1:] /= scale[:, None][: 3 * order]
     weights = g.dirichlet(np.ones(n_rules))
     rows = np.round(40.0 * weights)
     if n_rules > 2:
         rows[1] = 0.0
-    moved = antecedent.change_units(OFFSET, SCALE)
+    moved = antecedent.change_units(offset, scale)
     settings = {
         "antecedent": moved,
         "initial_antecedent": moved.with_parameters(moved.parameters + 0.25),
         "coefficients": coefficients,
-        "reference": OFFSET + SCALE * [0.2, -0.1, 0.4],
-        "spread": SCALE * [1.0, 1.1, 0.9],
-        "minimum": OFFSET - 2.0 * SCALE,
-        "maximum": OFFSET + 1.5 * SCALE,
+        "reference": offset + scale * [0.2, -0.1, 0.4],
+        "spread": scale * [1.0, 1.1, 0.9],
+        "minimum": offset - 2.0 * scale,
+        "maximum": offset + 1.5 * scale,
         "rule_weights": weights,
         "rule_rows": rows,
         "input_names": NAMES,
         "out_of_bounds": "clip",
-        "support": oracles.random_support(g, n_rules, 3).change_units(OFFSET, SCALE),
+        "support": oracles.random_support(g, n_rules, 3).change_units(offset, scale),
     }
     return TSKModel(**(settings | changes))
 

@@ -1,7 +1,5 @@
 """Membership functions of the format against the definitions in MATLAB's documentation."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -141,15 +139,3 @@ def test_a_family_of_ones_own_is_refused():
     X = np.linspace(0.0, 1.0, 30)[:, None]
     with pytest.raises(ValueError, match=r"'own' cannot be exported; gaussian, bell, .* can"):
         export_c(quick(n_mfs=2, mf=Own).fit(X, X[:, 0]), name="m")
-
-
-PAGE = Path(__file__).parents[2] / "docs" / "memberships.rst"
-
-
-@pytest.mark.skipif(not PAGE.is_file(), reason="the documentation is not here")
-def test_every_family_is_on_the_page_with_its_function():
-    page = PAGE.read_text(encoding="utf-8")
-    for family in FAMILIES.values():
-        name, _ = function_of(family, [1.0] * len(family.parameters))
-        assert family.name in page
-        assert f"``{name}``" in page

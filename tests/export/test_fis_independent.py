@@ -39,7 +39,8 @@ sys.exit(library._ZN2fl7Console4mainEiPPKc(len(words), (ctypes.c_char_p * len(wo
 @pytest.fixture(scope="session")
 def fuzzylite(tmp_path_factory):
     """A function that runs fuzzylite's command line with these words."""
-    library = _installed() or _downloaded(tmp_path_factory.mktemp("fuzzylite"))
+    installed = next(Path("/usr/lib").glob("*/libfuzzylite.so.6*"), None)
+    library = installed or _downloaded(tmp_path_factory.mktemp("fuzzylite"))
 
     def run(*words):
         command = [sys.executable, "-c", FUZZYLITE, library, *words, "-decimals", "17"]
@@ -56,10 +57,6 @@ def by_fuzzylite(fuzzylite, path, rows):
     files = ["-i", path, "-if", "fis", "-d", given, "-o", found, "-of", "fld"]
     fuzzylite(*files, "-dheader", "false", "-dinputs", "false")
     return np.loadtxt(found, ndmin=2).reshape(len(rows), -1)
-
-
-def _installed():
-    return next(Path("/usr/lib").glob("*/libfuzzylite.so.6*"), None)
 
 
 def _downloaded(folder):

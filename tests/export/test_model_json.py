@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis import ANFISRegressor
 from skanfis.export import export_json, read_fis, read_json
 from skanfis.export.json_reader import parse_json
 
@@ -19,7 +18,7 @@ ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR)
 A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
 
 
-def changed(change, model=A_GRID):
+def changed(change, model):
     """The model's JSON after a change of the document."""
     document = json.loads(export_json(model))
     change(document)
@@ -48,17 +47,6 @@ def test_comes_back_to_the_last_bit(model):
     rows = rows_of(model, 1.3)
     assert_array_equal(read.predict(rows), model.predict(rows))
     assert_array_equal(read.coverage(rows), model.coverage(rows))
-
-
-def test_file_of_a_trained_model(tmp_path, rng):
-    X = rng.normal(size=(100, 2)) * [1e-3, 1e5]
-    estimator = ANFISRegressor(n_mfs=2, agreement=0.1, alpha=1e-5).fit(X, X[:, 0] * X[:, 1])
-    export_json(estimator, tmp_path / "model.json", posterior=True)
-    read = read_json(tmp_path / "model.json")
-    assert_same(read, estimator.model_)
-    assert_array_equal(read.predict(X)[:, 0], estimator.predict(X))
-    onward = ANFISRegressor(partition=read, solver="lse").fit(X, X[:, 0])
-    assert onward.n_rules_ == 4
 
 
 def test_a_person_can_read_it():
@@ -117,18 +105,6 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), REFUSED)
-def test_refuses(change, message):
-    with pytest.raises(ValueError, match=message):
-        parse_json(changed(change))
-
-
-def test_refuses_a_rule_with_one_term_twice():
-    table = MODELS["rule table, order 1, 1 outputs"]
-    with pytest.raises(ValueError, match=r"rules\[0\]\.terms: \[3, 3\] has a term twice"):
-        parse_json(changed(_set("rules", 0, "terms", [3, 3, -1]), table))
-
-
 A_TREE = MODELS["tree, order 1, 2 outputs"]
 
 
@@ -157,27 +133,36 @@ def _idle(document):
         rule["terms"] = [t + (t >= 5) for t in rule["terms"]]
 
 
+NO_TREE = [
+    (_set("terms", 5, "center", 1.0), r"terms\[0\]: the side below has another input, cut or"),
+    (_set("terms", 6, "input", 1), r"terms\[1\]: the side below has another input, cut or"),
+    (_set("terms", 7, "log_width", 1.0), r"terms\[2\]: the side below has another input, cut"),
+    (
+        lambda d: (d["terms"].pop(), _set("rules", 1, "terms", [0, 2, -1])(d)),
+        "terms: 5 sides above a cut, and 4 below",
+    ),
+    (_without(4), r"rules\[0\]\.terms: the paths are no tree: each cut stands at one place"),
+    (_without(0), r"rules\[0\]\.terms: the paths are no tree"),
+    (_set("rules", 0, "terms", [2, 0, 4]), "the paths are no tree"),
+    (_set("rules", 5, "terms", [5, 6, 9]), r"none goes on above cut 4"),
+    (_set("rules", 5, "terms", [9, 1, 5]), r"rules\[0\]\.terms: the paths are no tree"),
+    (_idle, "terms: 1 cuts are on no path"),
+]
+A_TABLE = MODELS["rule table, order 1, 1 outputs"]
+TERM_TWICE = _set("rules", 0, "terms", [3, 3, -1]), r"rules\[0\]\.terms: \[3, 3\] has a term twice"
+
+
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("model", "change", "message"),
     [
-        (_set("terms", 5, "center", 1.0), r"terms\[0\]: the side below has another input, cut or"),
-        (_set("terms", 6, "input", 1), r"terms\[1\]: the side below has another input, cut or"),
-        (_set("terms", 7, "log_width", 1.0), r"terms\[2\]: the side below has another input, cut"),
-        (
-            lambda d: (d["terms"].pop(), _set("rules", 1, "terms", [0, 2, -1])(d)),
-            "terms: 5 sides above a cut, and 4 below",
-        ),
-        (_without(4), r"rules\[0\]\.terms: the paths are no tree: each cut stands at one place"),
-        (_without(0), r"rules\[0\]\.terms: the paths are no tree"),
-        (_set("rules", 0, "terms", [2, 0, 4]), "the paths are no tree"),
-        (_set("rules", 5, "terms", [5, 6, 9]), r"none goes on above cut 4"),
-        (_set("rules", 5, "terms", [9, 1, 5]), r"rules\[0\]\.terms: the paths are no tree"),
-        (_idle, "terms: 1 cuts are on no path"),
+        *((A_GRID, *case) for case in REFUSED),
+        *((A_TREE, *case) for case in NO_TREE),
+        (A_TABLE, *TERM_TWICE),
     ],
 )
-def test_refuses_what_is_no_tree(change, message):
+def test_refuses(model, change, message):
     with pytest.raises(ValueError, match=message):
-        parse_json(changed(change, A_TREE))
+        parse_json(changed(change, model))
 
 
 def test_files_of_the_first_version_are_read():

@@ -1,7 +1,8 @@
 """The clean logs as one instrument or program each writes them, in that one's own manner.
 
-Beside log_variants.py, whose forms are drawn part by part. Where the header names no columns, or
-neither it nor the values settle the units, a log is ambiguous.
+Beside log_variants.py, whose forms are drawn part by part; files of LabVIEW, MATLAB and Excel, and
+last lines that are cut, are read in test_natural_logs.py. Where neither the header nor the values
+settle the units, a log is ambiguous.
 """
 
 import io
@@ -121,25 +122,6 @@ def flight_controller(c):
     return ".csv", "\n".join(lines_of(columns, ",", digits=14)), "utf-8", c.rate is not None
 
 
-def graphical_program(c):
-    """LabVIEW's measurement file, with a block of facts on each channel."""
-    columns = c.columns(("X_Value", c.time), ("Temperature", c.heat), ("Gyro", c.gyro),
-                        ("Table rate", c.rate))  # fmt: skip
-    n = len(columns) - 1
-    units = ["degC", "deg/s", "deg/s"][:n]
-    above = ["LabVIEW Measurement\t", "Writer_Version\t2", "Separator\tTab",
-             "Decimal_Separator\t.", "Multi_Headings\tNo", "X_Columns\tOne", "Operator\tbench",
-             "Date\t2026/03/01", "Time\t08:00:00.1234", "***End_of_Header***\t", "\t",
-             "\t".join(["Channels", str(n)]),
-             "\t".join(["Samples", *["1"] * n]), "\t".join(["Y_Unit_Label", *units]),
-             "\t".join(["X0", *["0.0E+0"] * n]), "\t".join(["Delta_X", *["10.0"] * n]),
-             "***End_of_Header***" + "\t" * n]  # fmt: skip
-    rows = lines_of(columns, "\t")
-    rows = [rows[0] + "\tComment", *(row + "\t" for row in rows[1:])]
-    # The values of a table's rate, from 90 deg/s up, tell their unit; a bias alone does not.
-    return ".lvm", "\r\n".join([*above, *rows]), "cp1252", c.rate is not None
-
-
 def array_program(c):
     """Blanks between numbers in full, the names behind a hash."""
     columns = c.columns(("time_s", c.time), ("temp_degC", c.heat), ("gyro_deg_s", c.gyro),
@@ -198,16 +180,6 @@ def database(c):
     return ".csv", "\r\n".join([*above, *("," + row for row in rows)]), "utf-8", True
 
 
-def matlab_file(c):
-    from scipy.io import savemat
-
-    columns = c.columns(("t_ms", 1e3 * c.time), ("temp_K", c.heat + 273.15),
-                        ("gyro_deg_s", c.gyro), ("rate_deg_s", c.rate))  # fmt: skip
-    file = io.BytesIO()
-    savemat(file, {"log": columns, "fs": 0.1, "note": "bench 7"})
-    return ".mat", file.getvalue(), "", True
-
-
 def raw_board(c):
     """Counts of a board, and the truth with its unit: the scale factor is learnt."""
     if c.rate is None:
@@ -217,72 +189,18 @@ def raw_board(c):
     return ".log", "\n".join(lines_of(columns, ",", digits=12)), "utf-8", True
 
 
-def power_lost(c):
-    """The last line is cut where the power went: within a number but the last, whose row is lost.
-
-    (A last number that is cut is one that no other row supports: see test_glitches.py.)
-    """
-    suffix, text, encoding, is_determined = matlab_table(c)
-    last = text.rsplit("," if "," in text else "\t", 1)[0]
-    c.rows = c.rows[:-1]
-    return suffix, last[: len(last) - c.pick(0, 2)], encoding, is_determined
-
-
-def no_names(c):
-    """Channels by number alone."""
-    columns = c.columns(("CH1", c.time), ("CH2", c.heat), ("CH3", c.gyro), ("CH4", c.rate))
-    return ".csv", "\n".join(lines_of(columns, ",")), "utf-8", False
-
-
-def numbers_alone(c):
-    columns = c.columns(("1", c.time), ("2", c.heat), ("3", c.gyro), ("4", c.rate))
-    rows = lines_of(columns, c.pick(",", ";", "\t", " "))[1:]
-    return ".csv", "\n".join(rows), "utf-8", False
-
-
-def small_rates(c):
-    """A slow table without a unit: deg/s or rad/s."""
-    if c.rate is None:
-        columns = {"time_s": c.time, "temp_C": c.heat, "gyro": c.gyro}
-    else:
-        factor = 1.7 / np.abs(c.rate).max()
-        columns = {
-            "time_s": c.time,
-            "temp_C": c.heat,
-            "gyro": factor * c.gyro,
-            "rate": factor * c.rate,
-        }
-    return ".csv", "\n".join(lines_of(columns, ",")), "utf-8", False
-
-
-def warm_log(c):
-    """A warm log without a unit of the temperature: degC or degF."""
-    heat = 45.0 + 35.0 * (c.heat - c.heat.min()) / np.ptp(c.heat)
-    columns = c.columns(
-        ("time_s", c.time), ("temp", heat), ("gyro_dps", c.gyro), ("rate_dps", c.rate)
-    )
-    return ".csv", "\n".join(lines_of(columns, ",")), "utf-8", False
-
-
 MAKERS = [
     scan_logger,
     temperature_logger,
     matlab_table,
     inertial_tool,
     flight_controller,
-    graphical_program,
     array_program,
     aligned,
     german_spreadsheet,
     american_chamber,
     database,
-    matlab_file,
     raw_board,
-    power_lost,
-    no_names,
-    numbers_alone,
-    small_rates,
-    warm_log,
 ]
 
 

@@ -145,11 +145,6 @@ def expected(model, X):
     return rate, status, refused, unsure, policies
 
 
-def as_given(model, rows, columns):
-    named = hasattr(model, "feature_names_in_")
-    return pd.DataFrame(rows, columns=columns) if named else rows
-
-
 @pytest.fixture(scope="module", params=CASES)
 def case(request):
     """What it is called, a fitted model and its table."""
@@ -171,9 +166,10 @@ def test_answers_as_predict(log, case, dtype, tolerance, std, tmp_path):
     used = [j for j, name in enumerate(X) if name != "unused"]
     taken = np.ascontiguousarray(rows[:, used])
     [(y, status)] = evaluate_all([code], taken, tmp_path, std, [1], flags)
-    wanted, bits, refused, unsure, policies = expected(
-        model, as_given(model, rows.astype(float), list(X))
-    )
+    given = rows.astype(float)
+    if hasattr(model, "feature_names_in_"):
+        given = pd.DataFrame(given, columns=list(X))
+    wanted, bits, refused, unsure, policies = expected(model, given)
     assert (bits == 0).sum() > 100
     np.testing.assert_array_equal(status[~unsure], bits[~unsure])
     answered = ~refused & ~unsure

@@ -6,18 +6,11 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import export_c_physics
-from skanfis.gyro._simpler import fitted_rule, kinds
 
 from ..export.c_compiler import SANITIZE, UNTOUCHED, evaluate_all, needs_compiler
+from .targets.models import polynomial
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
-
-
-def cubic_of(X, log, policy):
-    *_, (_, _, fit) = kinds(list(X), policy)
-    return fit(
-        X, (log["output"] - log["rate"]).to_numpy(), fitted_rule(X, np.zeros(len(X)), 0, policy)
-    )
 
 
 @needs_compiler
@@ -33,16 +26,23 @@ def cubic_of(X, log, policy):
 def test_answers_as_python(tmp_path, policy, dtype, std, tolerance):
     log = make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=0)
     X = log[list(INPUTS)]
-    estimator = cubic_of(X, log, policy)
+    estimator = polynomial(X, (log["output"] - log["rate"]).to_numpy(), policy)
     low, high = X.min().to_numpy(), X.max().to_numpy()
     rng = np.random.default_rng(0)
     reach = rng.choice([1.0, 1.5], 3000)[:, None]
     rows = low + (high - low) * (0.5 + reach * rng.uniform(-0.5, 0.5, (3000, 4)))
+    rows[:2] = [np.nan, 0.0, 0.0, 0.0], [0.0, 20.0, 0.0, np.inf]
     rows = rows.astype(np.float32 if dtype == "float" else float)
-    code = export_c_physics(estimator, tmp_path / "gyro", dtype=dtype, std=std)
+    said = {"units": {"temperature": "degC"}, "notes": ["Subtract y[0]."]}
+    code = export_c_physics(estimator, tmp_path / "gyro", dtype=dtype, std=std, **said)
     flags = SANITIZE if policy == "linear" else []
     [(y, status)] = evaluate_all([code], rows, tmp_path, std, [1], flags)
-    table = pd.DataFrame(rows.astype(float), columns=INPUTS)
+    # What is not finite gets no output.
+    assert (status[:2] == 2 + 8).all()
+    none = np.nan if policy == "nan" else UNTOUCHED
+    np.testing.assert_array_equal(y[:2, 0], none)
+    y, status = y[2:], status[2:]
+    table = pd.DataFrame(rows[2:].astype(float), columns=INPUTS)
     error, coverage = estimator.predict(table), estimator.coverage(table)
     answered = np.isfinite(error)
     told = np.where(answered, 4 * (coverage < 0.1), 8) + ~estimator.in_bounds(table)
@@ -53,20 +53,6 @@ def test_answers_as_python(tmp_path, policy, dtype, std, tolerance):
     size = np.abs(error[answered]).max()
     np.testing.assert_allclose(y[answered, 0] / size, error[answered] / size, atol=tolerance)
     assert np.isnan(y[~answered]).all()
-    assert "A polynomial of the third degree with 35 terms" in code.header
-
-
-@needs_compiler
-def test_its_header_is_told_and_rows_that_are_not_finite_get_no_output(tmp_path):
-    log = make_ofog(n_devices=1, n_runs=3, duration=600.0, random_state=0)
-    X = log[["temperature", "output"]]
-    estimator = cubic_of(X, log, "clip")
-    said = {"units": {"temperature": "degC"}, "notes": ["Subtract y[0]."]}
-    code = export_c_physics(estimator, tmp_path / "gyro", std="c99", **said)
-    assert " * Subtract y[0].\n" in code.header
-    assert "[0] temperature [degC]: " in code.header
-    rows = np.vstack([X.to_numpy(), [[np.nan, 0.0], [20.0, np.inf]]])
-    [(y, status)] = evaluate_all([code], rows, tmp_path, "c99", [1], [])
-    np.testing.assert_allclose(y[:-2, 0], estimator.predict(X), atol=1e-12)
-    assert (status[-2:] & 2 == 2).all()
-    assert (y[-2:] == UNTOUCHED).all()
+    for told in ("A polynomial of the third degree with 35 terms", " * Subtract y[0].\n"):
+        assert told in code.header
+    assert "[1] temperature [degC]: " in code.header

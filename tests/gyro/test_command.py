@@ -17,7 +17,6 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 pytest.importorskip("matplotlib")
 
-from skanfis import __version__
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, command
 from skanfis.gyro._options import make_parser
@@ -29,10 +28,6 @@ RENAMED = ["--columns", "time=t_ms", "temperature=T", "output=counts", "rate=tab
 UNITS = ["--units", "time=ms", "temperature=K", "output=counts"]
 FACTOR = -27_000.0
 FILES = ["compensator.joblib", "compensator.json", "report.html", "rules.txt"]
-
-
-def simulated(**options):
-    return make_ofog(n_devices=1, duration=900.0, random_state=0, **options)
 
 
 # A fit of the smallest kind, where it is not the question.
@@ -47,7 +42,7 @@ def write_log(path, log, columns=MEASURED):
 
 @pytest.fixture(scope="module")
 def log():
-    return simulated(n_runs=5)
+    return make_ofog(n_devices=1, n_runs=5, duration=900.0, random_state=0)
 
 
 @pytest.fixture
@@ -64,20 +59,24 @@ def no_pictures(monkeypatch):
     monkeypatch.setattr("skanfis.gyro._results._PICTURES", {})
 
 
-@pytest.fixture(scope="module")
-def calibrated(tmp_path_factory, log, given_weights, coarse_report):
-    """A folder after one calibration from counts, milliseconds and kelvin; without pictures."""
-    folder = tmp_path_factory.mktemp("calibrated")
-    raw = pd.DataFrame(
+def raw(log, kelvin=273.15):
+    """The log without the rate as an instrument writes it, in counts, milliseconds and kelvin."""
+    return pd.DataFrame(
         {
             "t_ms": 1000 * log["time"] + 5e6,
-            "T": log["temperature"] + 273.15,
+            "T": log["temperature"] + kelvin,
             "counts": FACTOR * log["output"],
-            "table": log["rate"],
             "run": log["run"],
         }
     )
-    path = write_log(folder / "raw.csv", raw, raw.columns)
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory, log, given_weights, coarse_report):
+    """A folder after one calibration from raw columns; without pictures."""
+    folder = tmp_path_factory.mktemp("calibrated")
+    table = raw(log).assign(table=log["rate"])
+    path = write_log(folder / "raw.csv", table, table.columns)
     arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("skanfis.gyro._results._PICTURES", {})
@@ -123,14 +122,7 @@ def test_what_is_refused_once_there_is_a_compensator(calibrated, tmp_path, log, 
 
 
 def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path, log, capsys):
-    hot = pd.DataFrame(
-        {
-            "t_ms": 1000 * log["time"],
-            "T": log["temperature"] + 293.15,
-            "counts": FACTOR * log["output"],
-            "run": log["run"],
-        }
-    )
+    hot = raw(log, kelvin=293.15)
     path = write_log(tmp_path / "hot.csv", hot, hot.columns)
     target = tmp_path / "hot-rates.csv"
     model = str(calibrated / "out" / "compensator.json")
@@ -265,14 +257,6 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, message, cap
     assert not (tmp_path / "out").exists()
 
 
-def test_errors_name_the_columns_of_the_file(tmp_path, log, capsys):
-    hot = log.rename(columns={"temperature": "T"}).assign(T=300.0)
-    path = write_log(tmp_path / "a.csv", hot, ["time", "T", "output", "rate", "run"])
-    arguments = ["--columns", "temperature=T", "--units", "temperature=degC", "--quiet"]
-    assert main([path, *arguments, "--output", str(tmp_path / "out")]) == 3
-    assert "a.csv, line 2, column 'T' (temperature): 300.0 degC" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -308,10 +292,7 @@ def test_options_that_make_no_sense(tmp_path, log, arguments, message, capsys):
     assert sorted(tmp_path.iterdir()) == [tmp_path / "log.csv"]
 
 
-def test_help_and_version(capsys):
-    with pytest.raises(SystemExit, match="0"):
-        main(["--version"])
-    assert capsys.readouterr().out == f"skanfis {__version__}\n"
+def test_help_names_every_option(capsys):
     with pytest.raises(SystemExit, match="0"):
         main(["--help"])
     told = capsys.readouterr().out

@@ -9,7 +9,6 @@ from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
-from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
@@ -131,20 +130,3 @@ def test_a_fit_that_fails_leaves_both_parts_of_the_one_before(data):
     with pytest.raises(ValueError, match="positive"):
         model.fit(X, 2.0 * rate)
     np.testing.assert_array_equal(model.predict(X), before)
-
-
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning")
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-@pytest.mark.parametrize(
-    ("estimator", "check"),
-    [
-        pytest.param(clone, check, id=getattr(check, "func", check).__name__)
-        for clone, check in estimator_checks_generator(
-            ResidualRegressor(residual=ANFISRegressor(n_mfs=1, alpha=0.01, max_iter=5))
-        )
-    ],
-)
-def test_estimator_passes_the_checks_of_scikit_learn(estimator, check):
-    check(estimator)

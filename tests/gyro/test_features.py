@@ -1,4 +1,4 @@
-"""Thermal features: closed forms, the recursion in C, causality, runs, scikit-learn's checks."""
+"""Thermal features: closed forms, the recursion in C, causality, runs."""
 
 import shutil
 import subprocess
@@ -12,32 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
-from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis.gyro import ThermalRate
-
-# A row depends on the rows before it: that is what these are for.
-NEEDS_THE_ORDER_OF_ROWS = {
-    "check_methods_sample_order_invariance",
-    "check_methods_subset_invariance",
-}
-
-
-def name_of(check):
-    return getattr(check, "func", check).__name__
-
-
-# Not parametrize_with_checks: scikit-learn 1.6 hands pytest a generator, of which pytest 9 warns.
-@pytest.mark.parametrize(
-    ("estimator", "check"),
-    [
-        pytest.param(each, check, id=name_of(check))
-        for each, check in estimator_checks_generator(ThermalRate())
-        if name_of(check) not in NEEDS_THE_ORDER_OF_ROWS
-    ],
-)
-def test_transformers_pass_the_checks_of_scikit_learn(estimator, check):
-    check(estimator)
 
 
 @pytest.fixture
@@ -49,12 +25,8 @@ def log(rng):
         temperature = 20 + np.cumsum(rng.normal(size=n_rows))
         runs.append(pd.DataFrame({"t": time, "T": temperature, "run": name, "other": time**2}))
     log = pd.concat(runs, ignore_index=True)
-    return log.iloc[_interleaved(log["run"])]
-
-
-def _interleaved(run):
-    """Positions of the rows, the runs by turns, each in its own order."""
-    return np.argsort(run.groupby(run).cumcount(), kind="stable")
+    # The runs by turns, each in its own order.
+    return log.iloc[np.argsort(log.groupby("run").cumcount(), kind="stable")]
 
 
 @pytest.mark.parametrize("steps", [np.full(200, 3.0), np.geomspace(0.01, 50, 200)])

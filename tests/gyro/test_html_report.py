@@ -24,7 +24,6 @@ from skanfis.gyro.displays import figures
 from skanfis.gyro.html_report import check_installed, report_page
 from skanfis.inspection import readability
 
-PNG = re.compile('data:image/png;base64,([^"]*)')
 VOID = {"meta", "img", "br"}
 
 
@@ -238,7 +237,10 @@ def test_a_file_runs_nothing_in_a_spreadsheet():
     assert lines == ["group,error", "'=HYPERLINK(1),1", "-5,2"]
 
 
-def test_without_jinja2_the_way_to_get_it_is_said(calibration, monkeypatch, no_drawing):
+def test_the_way_to_get_what_is_missing_is_said(calibration, monkeypatch, no_drawing):
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    with pytest.raises(ImportError, match="the report needs weasyprint: pip install weasyprint"):
+        check_installed(pdf=True)
     monkeypatch.setitem(sys.modules, "jinja2", None)
     for make in (check_installed, lambda: report_page(calibration, "log.csv")):
         with pytest.raises(ImportError, match="pip install jinja2"):
@@ -266,9 +268,3 @@ def test_a_pdf_of_one_run_has_five_pages_at_most():
     page = report_page(calibration, TITLE)
     assert weasyprint.HTML(string=page).write_pdf().startswith(b"%PDF")
     assert 2 <= len(weasyprint.HTML(string=page).render().pages) <= 5
-
-
-def test_a_pdf_without_its_library_is_a_sentence(monkeypatch):
-    monkeypatch.setitem(sys.modules, "weasyprint", None)
-    with pytest.raises(ImportError, match="the report needs weasyprint: pip install weasyprint"):
-        check_installed(pdf=True)

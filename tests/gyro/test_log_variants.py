@@ -75,7 +75,10 @@ def outcome(case, logs, folder):
 
 @pytest.mark.parametrize(
     ("make", "n_variants"),
-    [(variant, N_VARIANTS), (instrument_logs.variant, max(N_VARIANTS // 5, 18))],
+    [
+        (variant, N_VARIANTS),
+        (instrument_logs.variant, max(N_VARIANTS // 5, 11)),
+    ],
     ids=["by parts", "by instruments"],
 )
 def test_a_log_in_many_forms(logs, tmp_path, make, n_variants):

@@ -29,6 +29,12 @@ def found(path, **options):
     return read(paths, Request(**(ASKED | options)))
 
 
+def found_in(folder, table, **options):
+    """What is read of a table as a spreadsheet writes it."""
+    table.to_csv(folder / "log.csv", index=False)
+    return found(folder / "log.csv", **options)
+
+
 def same(reading, truth, parts=PARTS[1:]):
     for part in parts:
         np.testing.assert_allclose(reading.log[part], truth[part], rtol=1e-9, atol=1e-9)
@@ -100,8 +106,7 @@ def test_lines_above_the_header_and_a_clock_past_midnight(tmp_path, truth):
 def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth):
     table = truth[PARTS].astype(object)
     table.loc[5, "output"], table.loc[9, "temperature"], table.loc[200, "rate"] = "---", "", "NaN"
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
+    reading = found_in(tmp_path, table)
     kept = truth.drop(index=[5, 9, 200])
     same(reading, kept, PARTS)
     said = "3 of 300 rows lack a value ('temperature' in 1, 'output' in 1, 'rate' in 1)"
@@ -112,9 +117,8 @@ def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth
     with pytest.raises(LogError, match="line 11, column 'temperature': the value is missing"):
         found(tmp_path / "log.csv", guess=False)
     table.loc[100:, "rate"] = ""
-    table.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(LogError, match=r"rows lack a value .* too many to go on"):
-        found(tmp_path / "log.csv")
+        found_in(tmp_path, table)
 
 
 def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth):
@@ -146,20 +150,17 @@ def test_the_rate_of_a_temperature_is_no_rate_of_the_table(tmp_path, truth, name
     slope = np.gradient(truth["temperature"], 10.0)
     noise = truth["rate_random_walk"]
     table = truth[["time", "temperature", "output"]].assign(**{name: slope}, random_walk_rate=noise)
-    table.to_csv(tmp_path / "log.csv", index=False)
-    assert "rate" not in found(tmp_path / "log.csv").log
+    assert "rate" not in found_in(tmp_path, table).log
     # Nor where the column of the rate is none of numbers: that is what is said.
     commas = truth["rate"].map("{:.6f}".format).str.replace(".", ",")
-    table.assign(rate=commas).to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(LogError, match=r"line 2, column 'rate': '-?\d+,\d{6}' is not a number"):
-        found(tmp_path / "log.csv")
+        found_in(tmp_path, table.assign(rate=commas))
 
 
 def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
     table = pd.DataFrame({"a": truth["temperature"], "b": truth["output"], "d": truth["rate"]})
-    table.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(LogError, match=r"Say which it is .such as --columns temperature=a"):
-        found(tmp_path / "log.csv")
+        found_in(tmp_path, table)
     told = found(tmp_path / "log.csv", columns={"temperature": "a", "output": "D ", "rate": "b"})
     np.testing.assert_allclose(told.log["output"], truth["rate"])
 
@@ -170,29 +171,10 @@ def test_a_raw_signal_is_no_rate(tmp_path, truth, name):
     table = truth[["time", "temperature"]].assign(
         **{name: -8.0 * truth["output"], "rate_dps": truth["rate"]}
     )
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv", require=("temperature", "output", "rate", "time"))
+    reading = found_in(tmp_path, table, require=("temperature", "output", "rate", "time"))
     layout = reading.files[0].layout
     assert (layout.name("output"), layout.name("rate")) == (name, "rate_dps")
     assert reading.units["output"] == "mV"
-
-
-def test_units_are_told_by_values_where_no_name_does(tmp_path, truth):
-    table = pd.DataFrame(
-        {
-            "time": 1_770_000_000_000 + 1000 * truth["clock"],
-            "temperature": truth["temperature"] + 273.15,
-            "gyro": (27_000 * truth["output"]).round(),
-            "rate": truth["rate"],
-        }
-    )
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
-    same(reading, truth, ["temperature", "rate"])
-    assert {reading.units[part] for part in ("time", "temperature", "output")} == {
-        "ms", "K", "counts",
-    }  # fmt: skip
-    np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-6)
 
 
 def test_many_files_a_pattern_and_headers_that_nearly_agree(tmp_path, truth):
@@ -247,16 +229,14 @@ def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, trut
 )
 def test_runs_are_told_by_the_time(tmp_path, times, runs):
     table = pd.DataFrame({"time": times, "temperature": 20.0, "output_dps": 1.0})
-    table.to_csv(tmp_path / "log.csv", index=False)
-    log = found(tmp_path / "log.csv").log
+    log = found_in(tmp_path, table).log
     assert ("run" in log) == (runs is not None)
     if runs is not None:
         assert log["run"].astype(int).tolist() == runs
     # A row out of order is no run.
     table.loc[60, "time"] = table.loc[58, "time"]
-    table.to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises(LogError, match="line 62, column 'time': time does not increase"):
-        found(tmp_path / "log.csv")
+        found_in(tmp_path, table)
 
 
 @pytest.mark.parametrize(
@@ -392,13 +372,11 @@ def test_a_damaged_file_is_refused(tmp_path, name):
 def test_a_gap_in_one_column_is_no_power_on(tmp_path, truth):
     table = truth[truth["run"] < 2][[*PARTS]].assign(time=10.0 * np.arange(120))
     table.loc[40:89, "output"] = np.nan
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
+    reading = found_in(tmp_path, table)
     assert "run" not in reading.log
     assert "50 of 120 rows lack a value" in "; ".join(reading.notes)
     # Where the clock stops as well, one was.
-    table.drop(index=range(40, 90)).to_csv(tmp_path / "log.csv", index=False)
-    assert found(tmp_path / "log.csv").log["run"].nunique() == 2
+    assert found_in(tmp_path, table.drop(index=range(40, 90))).log["run"].nunique() == 2
 
 
 @pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S", "%H:%M:%S"])
@@ -406,8 +384,7 @@ def test_a_clock_that_is_put_one_hour_back_goes_on(tmp_path, truth, form):
     clock = pd.Timestamp("2026-10-25 01:00") + pd.to_timedelta(20.0 * np.arange(300), unit="s")
     local = clock - pd.to_timedelta(3600.0 * (np.arange(300) >= 250), unit="s")
     table = truth[PARTS].assign(time=local.strftime(form))
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
+    reading = found_in(tmp_path, table)
     np.testing.assert_allclose(np.diff(reading.log["time"]), 20.0)
     assert "run" not in reading.log
     told = "; ".join(reading.notes)
@@ -417,8 +394,7 @@ def test_a_clock_that_is_put_one_hour_back_goes_on(tmp_path, truth, form):
 def test_a_block_that_occurs_twice_is_left_out(tmp_path, truth):
     times = pd.Timestamp("2026-03-01 10:00") + pd.to_timedelta(10.0 * np.arange(300), unit="s")
     table = truth[PARTS].assign(time=times.strftime("%d.%m.%Y %H:%M:%S"))
-    pd.concat([table[:200], table[100:]]).to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
+    reading = found_in(tmp_path, pd.concat([table[:200], table[100:]]))
     same(reading, truth)
     told = "; ".join(reading.notes)
     assert "100 rows occur twice, from time 01.03.2026 10:16:40 to 01.03.2026 10:33:10" in told
@@ -428,8 +404,7 @@ def test_a_block_that_occurs_twice_is_left_out(tmp_path, truth):
 def test_rows_from_the_last_to_the_first_are_turned_round(tmp_path, truth, n_runs):
     """Also where the clock of every run begins anew: it jumps up from one to the next then."""
     table = truth[PARTS].assign(time=10.0 * np.tile(np.arange(300 // n_runs), n_runs))
-    table[::-1].to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
+    reading = found_in(tmp_path, table[::-1])
     same(reading, table, PARTS)
     assert reading.name_row(0).endswith("line 301")
     assert ("run" in reading.log) == (n_runs > 1)

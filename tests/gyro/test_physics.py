@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
-from sklearn.utils.estimator_checks import estimator_checks_generator
 
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
 from skanfis.gyro.physics import OpenLoopArcsineRegressor, phase_of
@@ -31,10 +30,6 @@ def calibration(rng, n_rows=600, max_rate=150.0, **planted):
     return np.column_stack([planted_output(rate, temperature, **planted), temperature]), rate
 
 
-def arcsine(**parameters):
-    return OpenLoopArcsineRegressor(**parameters)
-
-
 def about(law, coefficients):
     """Planted coefficients in powers of the distance from the law's own temperature."""
     distance = Polynomial([law.reference_temperature_ - REFERENCE, 1.0])
@@ -43,7 +38,7 @@ def about(law, coefficients):
 
 def test_planted_coefficients_come_back(rng):
     X, rate = calibration(rng)
-    law = arcsine().fit(X, rate)
+    law = OpenLoopArcsineRegressor().fit(X, rate)
     np.testing.assert_allclose(law.amplitude_, about(law, PLANTED["amplitude"]), rtol=1e-7)
     planted = about(law, PLANTED["sagnac_factor"])
     np.testing.assert_allclose(np.rad2deg(law.sagnac_factor_), planted, rtol=1e-7)
@@ -54,7 +49,7 @@ def test_planted_coefficients_come_back(rng):
 def test_planted_curvature_comes_back(rng):
     amplitude = [6e6, -240.0, -3.0]
     X, rate = calibration(rng, amplitude=amplitude)
-    law = arcsine(amplitude_degree=2).fit(X, rate)
+    law = OpenLoopArcsineRegressor(amplitude_degree=2).fit(X, rate)
     np.testing.assert_allclose(law.amplitude_, about(law, amplitude), rtol=1e-6)
     np.testing.assert_allclose(law.bias_, about(law, PLANTED["bias"]), rtol=1e-5)
 
@@ -64,12 +59,12 @@ def test_lag_of_the_thermometer_comes_back(rng):
     rate, shown = rng.uniform(-150, 150, 600), rng.uniform(-20, 60, 600)
     ramp = rng.uniform(-0.05, 0.05, 600)  # degC/s
     X = np.column_stack([planted_output(rate, shown + 170.0 * ramp), shown, ramp])
-    law = arcsine(temperature_rate=2).fit(X, rate)
+    law = OpenLoopArcsineRegressor(temperature_rate=2).fit(X, rate)
     assert law.thermometer_lag_ == pytest.approx(170.0, rel=1e-7)
     np.testing.assert_allclose(law.predict(X), rate, atol=1e-7)
     np.testing.assert_allclose(law.amplitude_, about(law, PLANTED["amplitude"]), rtol=1e-7)
     assert law.minimum_.shape == (3,)
-    assert arcsine().fit(X, rate).thermometer_lag_ == 0.0
+    assert OpenLoopArcsineRegressor().fit(X, rate).thermometer_lag_ == 0.0
 
 
 def test_units_do_not_matter(rng):
@@ -86,7 +81,7 @@ def test_noise_in_the_output_reaches_the_rate_by_the_slope(rng):
     """The estimate's variance is sigma^2 / (A K cos phi)^2, and the ends have no bias."""
     X, rate = calibration(rng, n_rows=20_000)
     noisy = X + np.outer(600.0 * rng.standard_normal(len(X)), [1.0, 0.0])
-    law = arcsine().fit(noisy, rate)
+    law = OpenLoopArcsineRegressor().fit(noisy, rate)
     slope = 6.2e6 * np.deg2rad(0.2536) * np.cos(phase_of(law, X))
     normalised = (law.predict(noisy) - rate) * slope / 600.0
     assert normalised.std() == pytest.approx(1.0, abs=0.03)  # 6 standard errors
@@ -99,7 +94,7 @@ def test_constant_temperature_is_said_and_survived(rng):
     X[:, 1] = REFERENCE
     X[:, 0] = planted_output(rate, X[:, 1])
     with pytest.warns(ConstantInputWarning, match="20 in all rows"):
-        law = arcsine().fit(X, rate)
+        law = OpenLoopArcsineRegressor().fit(X, rate)
     np.testing.assert_allclose(law.predict(X), rate, atol=1e-7)
     np.testing.assert_array_equal(law.amplitude_[1:], 0.0)
 
@@ -117,7 +112,7 @@ class TestBeyondTheSine:
 
     def fitted(self, rng, **parameters):
         X, rate = calibration(rng)
-        return arcsine(max_phase=self.LIMIT, **parameters).fit(X, rate)
+        return OpenLoopArcsineRegressor(max_phase=self.LIMIT, **parameters).fit(X, rate)
 
     def row(self, phase):
         """A row at the reference temperature with this phase, or this multiple of the sine's."""
@@ -158,7 +153,7 @@ class TestBeyondTheSine:
 
     def test_law_goes_on_outside_the_training_data_and_says_so(self, rng):
         X, rate = calibration(rng, max_rate=65.0)
-        law = arcsine().fit(X, rate)
+        law = OpenLoopArcsineRegressor().fit(X, rate)
         faster = np.array([[planted_output(100.0, 30.0), 30.0]])
         with pytest.warns(OutOfBoundsWarning, match="1 of 1 rows follow the law"):
             assert law.predict(faster) == pytest.approx(100.0, abs=1e-5)
@@ -193,17 +188,3 @@ def test_bad_logs_are_refused(rng):
         OpenLoopArcsineRegressor().fit(X, np.full(20, 3.0))
     with pytest.raises(ValueError, match="the output never changes"):
         OpenLoopArcsineRegressor().fit(X * [0.0, 1.0], rate)
-
-
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
-@pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-@pytest.mark.parametrize(
-    ("estimator", "check"),
-    [
-        pytest.param(clone, check, id=getattr(check, "func", check).__name__)
-        for clone, check in estimator_checks_generator(OpenLoopArcsineRegressor())
-    ],
-)
-def test_estimator_passes_the_checks_of_scikit_learn(estimator, check):
-    check(estimator)

@@ -63,17 +63,9 @@ def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offset
     assert f"({truth['rate'].min() * scales[3]:.4g} to" in found.assumed["rate"]
 
 
-@pytest.mark.parametrize(("low", "high", "is_asked"), [(32.0, 80.0, True), (-4.0, 80.0, False)])
-def test_degrees_fahrenheit_that_look_like_celsius(tmp_path, truth, low, high, is_asked):
-    # Of a log that is as warm as a room in degF alone it is asked; else what was assumed is said.
-    heat = truth["temperature"]
-    scale = (high - low) / np.ptp(heat)
-    scales, offsets = (1, scale, 1, 1), (0, low - scale * heat.min(), 0, 0)
-    if is_asked:
-        with pytest.raises(UsageError, match="--units temperature=degC or --units temperature="):
-            reading(tmp_path, truth, NAMES, scales, offsets)
-        return
-    found = reading(tmp_path, truth, NAMES, scales, offsets)
+def test_degrees_fahrenheit_that_look_like_celsius(tmp_path, truth):
+    heat = np.linspace(-4.0, 80.0, len(truth))
+    found = reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
     assert found.units["temperature"] == "degC"
     told = "taken as degC (-4 to 80; degF? give --units temperature=degF)"
     assert told in found.assumed["temperature"]
@@ -98,7 +90,8 @@ def test_a_clock_that_may_be_two_is_asked_for(tmp_path, truth, slower, ways):
         reading(tmp_path, truth, NAMES, (1 / slower, 1, 1, 1))
 
 
-@pytest.mark.parametrize(("low", "high"), [(20.0, 95.0), (60.0, 80.0)])
+# As warm as a room in degF alone, in degC alone, and in either.
+@pytest.mark.parametrize(("low", "high"), [(32.0, 80.0), (20.0, 95.0), (60.0, 80.0)])
 def test_a_temperature_in_either_scale_is_asked_for(tmp_path, truth, low, high):
     heat = np.linspace(low, high, len(truth))
     with pytest.raises(UsageError, match="temperature=degC or --units temperature=degF"):

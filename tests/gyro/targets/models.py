@@ -32,10 +32,10 @@ def framed():
     return np.vstack([rows(800), ENDS.T])
 
 
-def polynomial(X, error):
+def polynomial(X, error, policy="clip"):
     """The cubic nearest to an error, as it is written."""
-    every = {name: fit for name, _, fit in kinds(list(X), "clip")}
-    return every["cubic polynomial"](X, error, fitted_rule(X, np.zeros(len(X)), 0, "clip"))
+    every = {name: fit for name, _, fit in kinds(list(X), policy)}
+    return every["cubic polynomial"](X, error, fitted_rule(X, np.zeros(len(X)), 0, policy))
 
 
 def law_and_line():
