@@ -100,6 +100,29 @@ def test_slopes_in_common_are_told_once(name, n_outputs):
     assert "time" in rules_html(model).partition("Common to the rules")[2]
 
 
+@pytest.mark.parametrize(
+    ("name", "said"), [("rate", "no change with rate"), ("on", "no change if on is [01]")]
+)
+def test_a_rule_without_a_slope_that_the_others_have_says_so(rng, name, said):
+    X = np.column_stack([rng.normal(size=(400, 2)), rng.integers(0, 2, 400)])
+    y = np.tanh(9.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
+    model = ANFISRegressor(partition="tree", max_rules=2).fit(X, y).model_
+    names = ("speed", "rate", "on")
+    # Three rules, of which two have a slope.
+    tree = model.antecedent.split(0, 1, 0.3, 0.0)
+    coefficients = np.zeros((3, 4, 1))
+    coefficients[:2, 1 + names.index(name)] = 0.7
+    support = model.support
+    support = replace(support, center=support.center[[0, 0, 1]], share=np.ones(3))
+    changes = {"antecedent": tree, "initial_antecedent": tree, "coefficients": coefficients}
+    changes |= {"rule_weights": np.full(3, 1 / 3), "rule_rows": np.full(3, 100.0)}
+    model = replace(model, **changes, support=support, posterior=None, term_names=())
+    text = export_text(model, precision=17, feature_names=names)
+    assert re.search(said, text.partition("Rule 2,")[2])
+    assert text.count("no change") == 1
+    assert_allclose(predicted(text, X, names), model.predict(X), atol=1e-9)
+
+
 def test_a_rule_by_hand():
     # By the text alone, and for one row that anybody can follow.
     tree = TreeAntecedent.build(
