@@ -31,9 +31,10 @@ class RuleSupport:
         distance.
     radius : ndarray of shape (n_rules,)
         The largest d of a training row on which the rule fires.
-    marginals : tuple of (ndarray, ndarray)
+    marginals : tuple of (ndarray, ndarray, ndarray)
         Of every input alone, standardised: second moments of what rules say of it, or None
-        (``inspection.anova``), and values at evenly spaced quantiles. Empty where not known.
+        (``inspection.anova``), values at evenly spaced quantiles, and values next to the places of
+        terms. Empty where not known.
 
     Examples
     --------

@@ -104,7 +104,21 @@ def input_marginals(rows, antecedent):
     table, weight, _ = representative_rows(rows.sample or rows, _MOST_ROWS)
     parts = (np.arange(N_VALUES) + 0.5) / N_VALUES
     values = [weighted_quantile(table[:, j], weight, parts, 1) for (j,) in blocks]
-    return tuple(zip(_moments(rows, antecedent, blocks), values, strict=True))
+    found = rows.reduce(partial(_beside, antecedent=antecedent), np.maximum) * [[-1.0], [1.0]]
+    beside = [np.unique(found[:, antecedent.term_inputs == j]) for (j,) in blocks]
+    return tuple(zip(_moments(rows, antecedent, blocks), values, beside, strict=True))
+
+
+def _beside(rows, antecedent):
+    """Of every term the values next above and below its place, (2, n_terms), the first negative."""
+    inputs, places = antecedent.term_inputs, antecedent.term_places[:, None]
+    found = np.full((2, inputs.size), -np.inf)
+    for part in row_blocks(rows.n_rows, fitting_rows(4 * inputs.size + 1)):
+        Z = rows.read(part)[0][inputs]
+        is_above = places < Z
+        ends = np.where(is_above, -Z, -np.inf), np.where(is_above, -np.inf, Z)
+        found = np.maximum(found, np.max(ends, axis=2))
+    return found
 
 
 def draw(blocks, n_draws, rng):

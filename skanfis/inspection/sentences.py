@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..antecedent.tree import CRISP
 from ..model import TSKModel
 from ..naming import SIGNS, default_term_names, written_side
 
@@ -169,31 +170,43 @@ def _more_digits(scale, noise):
 def _two_valued(model) -> np.ndarray:
     """Inputs that are 0 or 1 on all training rows; none where the rows are not known."""
     found = np.zeros(model.n_inputs, dtype=bool)
-    marginals = () if model.support is None else model.support.marginals
-    for j, (_, quantiles) in enumerate(marginals):
+    for j, (quantiles, _) in enumerate(_seen(model)):
         if (model.minimum[j], model.maximum[j]) == (0.0, 1.0):
-            seen = np.round(model.reference[j] + model.spread[j] * quantiles, _DIGITS_OF_CASE)
-            found[j] = np.isin(seen, (0.0, 1.0)).all()
+            found[j] = np.isin(np.round(quantiles, _DIGITS_OF_CASE), (0.0, 1.0)).all()
     return found
+
+
+def _seen(model):
+    """Of every input, quantiles of the training rows and values next to its terms, if known."""
+    marginals = () if model.support is None else model.support.marginals
+    scales = zip(model.reference, model.spread, marginals, strict=False)
+    return [[offset + scale * z for z in values] for offset, scale, (_, *values) in scales]
 
 
 def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
-    These are the sides of cuts; a name that somebody has given stays.
+    These are the sides of cuts; a name that somebody has given stays. Where every training row is
+    on one side, to so many digits, the width is left out, and the cut is crisp.
     """
     antecedent, box = model.antecedent, (model.minimum, model.maximum)
     default = default_term_names(antecedent, *box)
     of_digits = default_term_names(antecedent, *box, digits)
     names, says_where = list(model.term_names), np.zeros(len(default), dtype=bool)
-    groups, start = [], 0
+    groups, start, seen = [], 0, _seen(model)
+    sure = np.log(10.0 ** max(digits, PRECISION) - 1.0)
     for group in antecedent.groups:
         theta = _rounded_theta(group, digits)
         for k, t in enumerate(range(start, start + group.n_terms)):
             says_where[t] = group.family in SIGNS and names[t] == default[t]
             if says_where[t]:
                 names[t] = of_digits[t]
-                theta[:, k] = written_side(of_digits[t], group.theta[:, k])
+                theta[:, k] = cut, log_width = written_side(of_digits[t], group.theta[:, k])
+                on_input = np.concatenate(seen[group.inputs[k]]) if seen else cut
+                nearest = np.abs(on_input - cut).min()
+                if "±" in names[t] and nearest > sure * np.exp(log_width):
+                    names[t] = names[t].partition(" ±")[0]
+                    theta[1, k] -= np.log(CRISP)
         groups.append(replace(group, theta=theta))
         start += group.n_terms
     written = replace(antecedent, groups=tuple(groups))

@@ -118,7 +118,8 @@ class TreeDisplay:
         (order, ends), n_rules = tree.walk, model.n_rules
         names = [as_label(model.input_names[j]) for j in tree.term_inputs]
         # Above and below each node.
-        words = np.reshape(list(map(condition, names, model.term_names)), (2, -1)).T[order]
+        words = list(map(condition, names, self._said.model.term_names))
+        words = np.reshape(words, (2, -1)).T[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
         share = np.concatenate([parts_led(model), np.zeros(n_rules - 1)])

@@ -123,6 +123,30 @@ def test_a_rule_without_a_slope_that_the_others_have_says_so(rng, name, said):
     assert_allclose(predicted(text, X, names), model.predict(X), atol=1e-9)
 
 
+@pytest.mark.parametrize("gap", [0.0, 0.3, 3.0])
+def test_a_width_is_left_out_where_every_row_is_on_one_side(rng, gap):
+    x = rng.normal(size=400)
+    X = np.column_stack([x + gap * np.sign(x), rng.normal(size=400)])
+    y = np.where(x > 0.0, 3.0, X[:, 1]) + 0.3 * rng.standard_normal(400)
+    model = ANFISRegressor(partition="tree", max_rules=2).fit(X, y)
+    node = model.model_.antecedent.groups[0]
+    assert list(node.inputs) == [0]
+    surest = np.abs(X[:, 0] - node.theta[0]).min() / np.exp(node.theta[1])
+    text = export_text(model)
+    assert (surest > np.log(99.0)) == (gap == 3.0)
+    assert ("±" not in text) == (gap == 3.0)
+    assert "±" in export_text(model, precision=17)
+    # Who reads the cut as crisp errs as the last line says.
+    said = predicted(text, X, ("x0", "x1"))
+    assert_allclose(said, Sentences.of(model.model_).printed.predict(X), atol=1e-9)
+    errors = [np.mean((p - y) ** 2) for p in (said[:, 0], model.predict(X))]
+    told = model.readability_.summary["text_over_model"]
+    assert told == pytest.approx(np.sqrt(errors[0] / errors[1]), rel=1e-3)
+    # Of a model that knows no rows the width is told.
+    unknown = replace(model.model_, support=replace(model.model_.support, marginals=()))
+    assert "±" in export_text(unknown)
+
+
 def test_a_rule_by_hand():
     # By the text alone, and for one row that anybody can follow.
     tree = TreeAntecedent.build(
