@@ -10,6 +10,7 @@ import numpy as np
 from sklearn.utils import check_array
 
 from .._validation import check_finite, named_refusals, positive_weights
+from ..blocks import add_each
 from ..bounds.constraints import Constraints
 from ..learning.data import Scale, StandardisedData, check_scales, column_statistics
 from ..naming import default_output_names
@@ -214,11 +215,6 @@ def _numbers(table, what, names, n_columns):
     if array.shape[1] != n_columns:
         raise ValueError(f"{what} has the shape {array.shape}; {n_columns} columns are expected.")
     return array
-
-
-def add_each(one, other):
-    """Sums of two results, one by one."""
-    return [a + b for a, b in zip(one, other, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from ..blocks import fitting_rows, row_blocks
+from ..blocks import add_each, fitting_rows, row_blocks
 from ..learning.data import Scale, StandardisedData
 from ..search import representative_rows, weighted_quantile
 from .measures import _CONSTANT
@@ -72,17 +72,13 @@ def _sums(rows, antecedent, blocks, sets):
     return totals
 
 
-def _added(one, other):
-    return [a + b for a, b in zip(one, other, strict=True)]
-
-
 def _moments(rows, antecedent, blocks):
     """Of every block the mean products of its functions; None where strengths are no products."""
     if antecedent.factors(np.zeros((rows.inputs.scale.size, 1))) is None:
         return [None] * len(blocks)
     sets = [rule_functions(antecedent, inputs)[0] for inputs in blocks]
     of_rows = partial(_sums, antecedent=antecedent, blocks=blocks, sets=sets)
-    return [total / rows.total_weight for total in rows.reduce(of_rows, _added)]
+    return [total / rows.total_weight for total in rows.reduce(of_rows, add_each)]
 
 
 def _standardised(model):
