@@ -114,14 +114,7 @@ class Posterior:
 
         Where a value is known for certain, what remains uncertain is orthogonal to it: of the half
         h of every row the part along the halves of what is known is taken off. Exact for a Gaussian
-        posterior and equalities.
-
-        Parameters
-        ----------
-        model : TSKModel
-            Whose posterior this is, in the user's units.
-        points : ndarray of shape (n_points, n_inputs)
-            In the range.
+        posterior and equalities. ``points`` (n_points, n_inputs) lie in the range.
         """
         if not len(points):
             return self

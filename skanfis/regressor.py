@@ -710,8 +710,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         self : ANFISRegressor
         """
         model = self._fitted_model()
-        renamed = given_term_names(model, names)
-        self.model_ = replace(model, term_names=renamed)
+        self.model_ = replace(model, term_names=given_term_names(model, names))
         return self
 
     def without_rules(self, rules: ArrayLike | None = None) -> TSKModel:
@@ -776,11 +775,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
     def _keep_weights(self, penalty):
         """Set the attributes that tell the weights on the consequents, and the noise."""
-        self.agreement_, self.alpha_, self.slope_alpha_ = (
-            penalty.agreement,
-            penalty.alpha,
-            penalty.rho,
-        )
+        self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
+        self.slope_alpha_ = penalty.rho
         names = self.model_.input_names
         self.slope_pulls_ = {names[j]: pull for j, pull in penalty.slope_pulls.items()}
         self.pulls_ = [

@@ -36,42 +36,19 @@ _FINEST = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Sentences:
-    """What the rules of a model say; built by :meth:`of`.
+    """What the rules of a model say; built by :meth:`of`."""
 
-    Attributes
-    ----------
-    model : TSKModel
-        Whose rules these are; its terms as they are written.
-    says_where : ndarray of bool of shape (n_terms,)
-        Terms whose name says where they turn.
-    places : ndarray of shape (n_rules, n_inputs)
-        Centre of each rule, to few digits; of an input that is 0 or 1 the more frequent of these.
-    values, of_common : ndarray of shape (n_rules, n_outputs)
-        What each rule says there, and what of it is the common line's part.
-    slopes : ndarray of shape (n_rules, n_inputs, n_outputs)
-        Whole slopes, those in common as well.
-    is_own : ndarray of bool, of the same shape
-        Which of them the rule states itself.
-    common_place : ndarray of shape (n_inputs,)
-    common : ndarray of shape (n_inputs, n_outputs)
-        The common line; zero where nothing is in common.
-    two_valued : ndarray of bool of shape (n_inputs,)
-        Inputs that are 0 or 1.
-    levels : dict of str to tuple of two str
-        Raw columns and levels of inputs that are indicators, by their names (``Reader.levels``).
-    """
-
-    model: TSKModel
-    says_where: np.ndarray
-    places: np.ndarray
-    values: np.ndarray
-    of_common: np.ndarray
-    slopes: np.ndarray
-    is_own: np.ndarray
-    common_place: np.ndarray
-    common: np.ndarray
-    two_valued: np.ndarray
-    levels: Mapping[str, tuple[str, str]]
+    model: TSKModel  # whose rules these are; its terms as they are written
+    says_where: np.ndarray  # terms whose name says where they turn, (n_terms,)
+    places: np.ndarray  # centers, to few digits; 0 or 1 where these are all, (n_rules, n_inputs)
+    values: np.ndarray  # what each rule says there, (n_rules, n_outputs)
+    of_common: np.ndarray  # what of it is the common line's part
+    slopes: np.ndarray  # those in common as well, (n_rules, n_inputs, n_outputs)
+    is_own: np.ndarray  # which of them the rule states itself
+    common_place: np.ndarray  # (n_inputs,)
+    common: np.ndarray  # the common line; zero where nothing is in common, (n_inputs, n_outputs)
+    two_valued: np.ndarray  # inputs that are 0 or 1, (n_inputs,)
+    levels: Mapping[str, tuple[str, str]]  # as ``Reader.levels``
 
     @classmethod
     def of(cls, model: TSKModel, precision: int = PRECISION, levels=None):
@@ -95,7 +72,9 @@ class Sentences:
         of_common = np.einsum("rj,rjo->ro", places - common_place, part)
         # Beside a common slope that of nothing is to be said as well.
         is_own = ~is_common[:, :, None] & ((slopes != 0.0) | (common != 0.0))
-        digits = min(precision + _more_digits(scale, noise), MOST_DIGITS)
+        # What terms may be off by is a part of the output's deviation, not of the noise.
+        more = int(np.floor(np.log10(scale / noise)).max(initial=0.0))
+        digits = min(precision + more, MOST_DIGITS)
         written, says_where = _written_terms(model, digits)
         return cls(
             written,
@@ -116,8 +95,7 @@ class Sentences:
         """The model that the written numbers are."""
         model = self.model
         own = np.where(self.is_own, self.slopes, 0.0)
-        part = np.where(self.is_own, 0.0, self.common)
-        part = np.where(model.common_slopes[:, :, None], part, 0.0)
+        part = np.where(model.common_slopes[:, :, None], self.common, 0.0)
         constant = self.values - self.of_common
         constant -= np.einsum("rj,rjo->ro", self.places - model.reference, own)
         constant -= np.einsum("j,rjo->ro", self.common_place - model.reference, part)
@@ -160,11 +138,6 @@ def _resolution(model, slopes):
     scale = np.where(scale > 0.0, scale, 1.0)
     noise = 0.0 * scale if model.posterior is None else model.posterior.noise
     return scale, np.clip(noise, _FINEST * scale, scale)
-
-
-def _more_digits(scale, noise):
-    """Of terms: what they may be off by is a part of the output's deviation, not of the noise."""
-    return int(np.floor(np.log10(scale / noise)).max(initial=0.0))
 
 
 def _two_valued(model) -> np.ndarray:
