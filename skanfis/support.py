@@ -71,6 +71,11 @@ class RuleSupport:
             marginals=tuple(self.marginals[j] for j in order) if self.marginals else (),
         )
 
+    def without_moments(self):
+        """Return the same support for rules of other terms, of which the moments are not."""
+        marginals = tuple((None, *values) for _, *values in self.marginals)
+        return replace(self, marginals=marginals)
+
     def by_rule(self, Z):
         """The share of each rule, falling with the distance from its data, (n_rules, n_rows).
 
