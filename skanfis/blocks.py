@@ -20,6 +20,11 @@ def row_blocks(n_rows, length) -> list[slice]:
     return [slice(start, min(start + length, n_rows)) for start in range(0, n_rows, length)]
 
 
+def add_each(one, other):
+    """Sums of two results over rows, one by one."""
+    return [a + b for a, b in zip(one, other, strict=True)]
+
+
 def fitting_rows(n_values) -> int:
     """Rows of a block of which so many floats a row exist at one time."""
     return int(np.clip(BLOCK_BYTES // (8 * n_values), _FEWEST_ROWS, BLOCK_ROWS))

@@ -146,14 +146,8 @@ class NormalFactor:
     Solving with one factorisation and projecting with another makes the reduced gradient wrong as
     soon as two rules are alike, which is an everyday case here. ``shift`` times the identity is
     added, at the level of rounding (p eps max diag G): a singular matrix then has a solution too,
-    and it is of small norm.
-
-    Parameters
-    ----------
-    matrix : ndarray of shape (n, n)
-        G + P.
-    free : ndarray of shape (n, n_free), optional
-        Orthonormal columns E: solutions are E v, and L that of E' (G + P) E.
+    and it is of small norm. With orthonormal columns E (``free``) solutions are E v, and L is that
+    of E' (G + P) E.
     """
 
     def __init__(self, matrix, free=None):

@@ -311,9 +311,9 @@ class TSKModel:
         if type(self.antecedent) is RuleTableAntecedent and max(map(len, made), default=1) == 1:
             return self
         names = tuple(" and ".join(self.term_names[t] for t in terms) for terms in made)
-        return replace(
-            self, antecedent=table, initial_antecedent=table, term_names=names, posterior=None
-        )
+        changes = {"antecedent": table, "initial_antecedent": table, "term_names": names}
+        support = self.support and self.support.without_moments()
+        return replace(self, **changes, support=support, posterior=None)
 
     @property
     def policy(self) -> str:

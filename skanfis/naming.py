@@ -60,17 +60,12 @@ def default_term_names(antecedent, minimum, maximum, digits=_DIGITS_OF_WIDTH):
             names[own] = _near(places[own], maximum[j] - minimum[j])
     start = 0
     for group in antecedent.groups:
-        if group.family in SIGNS:
-            for j in np.unique(group.inputs):
-                own = np.flatnonzero(group.inputs == j)
-                names[start + own] = _sides(
-                    SIGNS[group.family],
-                    group.theta[0, own],
-                    group.theta[1, own],
-                    minimum[j],
-                    maximum[j],
-                    digits,
-                )
+        sign = SIGNS.get(group.family)
+        for j in np.unique(group.inputs) if sign else ():
+            own = np.flatnonzero(group.inputs == j)
+            cuts, log_widths = group.theta[:, own]
+            sides = _sides(sign, cuts, log_widths, minimum[j], maximum[j], digits)
+            names[start + own] = sides
         start += group.n_terms
     return tuple(names)
 

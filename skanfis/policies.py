@@ -35,21 +35,12 @@ _LEAST_MARGIN, _MOST_OF_RANGE = 0.5, 0.25
 
 @dataclass(frozen=True, eq=False)
 class TargetRange:
-    """What the target was in training, and what else is known of it.
-
-    Attributes
-    ----------
-    minimum, maximum : ndarray of shape (n_outputs,)
-    spread : ndarray of shape (n_outputs,)
-        Weighted standard deviation, positive.
-    lower, upper : ndarray of shape (n_outputs,), or float
-        Limits that were asked for; infinite where none was.
-    """
+    """What the target was in training, and what else is known of it; of every output."""
 
     minimum: np.ndarray
     maximum: np.ndarray
-    spread: np.ndarray
-    lower: np.ndarray | float = -np.inf
+    spread: np.ndarray  # weighted standard deviation, positive
+    lower: np.ndarray | float = -np.inf  # limits that were asked for; infinite where none was
     upper: np.ndarray | float = np.inf
 
     def within(self, lower, upper, values):

@@ -38,29 +38,15 @@ class Posterior:
     With phi = w_r [1, x - x0] the design of a row, d_k the derivatives of output k by the
     antecedent's parameters, u = F phi and v_k = T d_k - B_k u, the variance of output k is
     noise_k^2 + |h|^2 - |Q_k h|^2 with h = [noise_k u, v_k].
-
-    Attributes
-    ----------
-    noise : ndarray of shape (n_outputs,)
-        Standard deviation of the noise, in the outputs' units.
-    inputs : ndarray of int
-        The inputs that the consequents are linear in.
-    consequents : ndarray of shape (n_columns, n_columns)
-        F, lower triangular.
-    premises : ndarray of shape (n_displacements, n_parameters)
-        T; of no rows where the premises were not learnt.
-    cross : ndarray of shape (n_outputs, n_displacements, n_columns)
-        B_k.
-    pinned : ndarray of shape (n_outputs, n_pinned, n_columns + n_displacements)
-        Q_k, orthonormal rows: what is known of each output for certain, at fixed points. Rows of
-        zeros where outputs have different numbers of them.
     """
 
-    noise: np.ndarray
-    inputs: np.ndarray
-    consequents: np.ndarray
-    premises: np.ndarray
-    cross: np.ndarray
+    noise: np.ndarray  # its standard deviation, in the outputs' units, (n_outputs,)
+    inputs: np.ndarray  # those that the consequents are linear in
+    consequents: np.ndarray  # F, lower triangular, (n_columns, n_columns)
+    premises: np.ndarray  # T, (n_displacements, n_parameters); no rows where none were learnt
+    cross: np.ndarray  # B_k, (n_outputs, n_displacements, n_columns)
+    # Q_k, orthonormal rows: what is known of each output for certain, at fixed points, (n_outputs,
+    # n_pinned, n_columns + n_displacements). Zeros where outputs have different numbers of rows.
     pinned: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0)))
 
     def __post_init__(self):
@@ -114,14 +100,7 @@ class Posterior:
 
         Where a value is known for certain, what remains uncertain is orthogonal to it: of the half
         h of every row the part along the halves of what is known is taken off. Exact for a Gaussian
-        posterior and equalities.
-
-        Parameters
-        ----------
-        model : TSKModel
-            Whose posterior this is, in the user's units.
-        points : ndarray of shape (n_points, n_inputs)
-            In the range.
+        posterior and equalities. ``points`` (n_points, n_inputs) lie in the range.
         """
         if not len(points):
             return self

@@ -7,19 +7,9 @@ def reading_cost(antecedent: Antecedent, n_slopes: int, n_outputs: int = 1) -> i
     """Numerals that a person reads in the rules' sentences.
 
     A named term counts as one each time a rule says it; so do, of every output, the value of every
-    rule and each slope, one that several rules have in common once. How many rows a rule stands
-    for, its share, its error and its number are not counted.
-
-    Parameters
-    ----------
-    antecedent : Antecedent
-    n_slopes : int
-        Of all rules, those in common once.
-    n_outputs : int, default=1
-
-    Returns
-    -------
-    int
+    rule and each slope, one that several rules have in common once (``n_slopes`` is of all rules).
+    "No change with x", in place of such a one, counts as a slope. How many rows a rule stands for,
+    its share, its error and its number are not counted.
     """
     n_conditions = int((antecedent.rule_terms >= 0).sum())
     return n_conditions + n_outputs * (antecedent.n_rules + n_slopes)

@@ -710,8 +710,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         self : ANFISRegressor
         """
         model = self._fitted_model()
-        renamed = given_term_names(model, names)
-        self.model_ = replace(model, term_names=renamed)
+        self.model_ = replace(model, term_names=given_term_names(model, names))
         return self
 
     def without_rules(self, rules: ArrayLike | None = None) -> TSKModel:

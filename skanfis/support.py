@@ -17,23 +17,9 @@ __all__ = ["RuleSupport"]
 class RuleSupport:
     r"""Where the training data of every rule lie, and whether there are enough of them.
 
-    A rule that is the strongest on no training row has share zero, and zeros elsewhere.
-
-    Attributes
-    ----------
-    share : ndarray of shape (n_rules,)
-        min(1, N / P), with N the number of distinct training inputs on which the rule is the
-        strongest and P the number of its coefficients.
-    center : ndarray of shape (n_rules, n_inputs)
-        Mean of the inputs, weighted by the rule's strength, in the units of the inputs.
-    factor : ndarray of shape (n_rules, n_inputs, n_inputs)
-        Lower triangular; the distance of x from the centre m is d = |factor (x - m)|, Mahalanobis'
-        distance.
-    radius : ndarray of shape (n_rules,)
-        The largest d of a training row on which the rule fires.
-    marginals : tuple of (ndarray, ndarray)
-        Of every input alone, standardised: second moments of what rules say of it, or None
-        (``inspection.anova``), and values at evenly spaced quantiles. Empty where not known.
+    A rule that is the strongest on no training row has share zero, and zeros elsewhere. ``share``
+    is min(1, N / P), with N the number of distinct training inputs on which the rule is the
+    strongest and P the number of its coefficients.
 
     Examples
     --------
@@ -47,10 +33,13 @@ class RuleSupport:
     array([1., 0.])
     """
 
-    share: np.ndarray
-    center: np.ndarray
-    factor: np.ndarray
-    radius: np.ndarray
+    share: np.ndarray  # (n_rules,)
+    center: np.ndarray  # m, mean of the inputs by the rule's strength, (n_rules, n_inputs)
+    factor: np.ndarray  # lower triangular; Mahalanobis' distance d of x is |factor (x - m)|
+    radius: np.ndarray  # the largest d of a training row on which the rule fires, (n_rules,)
+    # Of every input alone, standardised: second moments of what rules say of it, or None
+    # (``inspection.anova``), values at evenly spaced quantiles, and values next to the places of
+    # terms. Empty where not known.
     marginals: Any = ()
 
     def change_units(self, offset, scale):
@@ -69,6 +58,11 @@ class RuleSupport:
             factor=turned[:, ::-1, ::-1].copy(),
             marginals=tuple(self.marginals[j] for j in order) if self.marginals else (),
         )
+
+    def without_moments(self):
+        """Return the same support for rules of other terms, of which the moments are not."""
+        marginals = tuple((None, *values) for _, *values in self.marginals)
+        return replace(self, marginals=marginals)
 
     def by_rule(self, Z):
         """The share of each rule, falling with the distance from its data, (n_rules, n_rows).

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from ..blocks import add_each
 from ..bounds.constraints import Constraints
-from ..inspection.measures import RuleSums
+from ..inspection.measures import measures_of, rule_sums
 from ..inspection.readability import Readability
 from ..inspection.sentences import Sentences
 from ..learning.sampling import is_many
 from ..regressor import ANFISRegressor
-from .rows import ClusterData, Partitions, add_each, computed, is_collection, reduce_partitions
+from .rows import ClusterData, Partitions, computed, is_collection, reduce_partitions
 
 
 class DaskANFISRegressor(ANFISRegressor):
@@ -138,13 +139,14 @@ class DaskANFISRegressor(ANFISRegressor):
         # Nothing is asked of the posterior, which is most of a model's bytes.
         printed = Sentences.of(self.model_).printed
         model, printed = (replace(one, posterior=None) for one in (self.model_, printed))
-        of_rows = partial(_rule_sums, model=model, printed=printed, target=rows.targets)
-        sums = rows.reduce(of_rows, RuleSums.joined)
-        return Readability(self.model_, sums.measures())
+        of_rows = partial(_rule_sums, model=model, printed=printed)
+        sums = rows.reduce(of_rows, add_each)
+        return Readability(self.model_, measures_of(rows.targets, sums))
 
 
-def _rule_sums(rows, model, printed, target):
-    return RuleSums(model, printed, target).add(rows.X, rows.y, rows.sample_weight)
+def _rule_sums(rows, model, printed):
+    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
+    return rule_sums(model, printed, rows.targets, rows.X, rows.y, weight)
 
 
 def _predicted(block, model, names, is_deviation):

@@ -10,6 +10,7 @@ import numpy as np
 from sklearn.utils import check_array
 
 from .._validation import check_finite, named_refusals, positive_weights
+from ..blocks import add_each
 from ..bounds.constraints import Constraints
 from ..learning.data import Scale, StandardisedData, check_scales, column_statistics
 from ..naming import default_output_names
@@ -216,11 +217,6 @@ def _numbers(table, what, names, n_columns):
     return array
 
 
-def add_each(one, other):
-    """Sums of two results, one by one."""
-    return [a + b for a, b in zip(one, other, strict=True)]
-
-
 @dataclass(frozen=True, eq=False)
 class ClusterRows:
     """As ``StandardisedData``, wherever the partitions are; on a sample, rows are at hand."""
@@ -247,18 +243,11 @@ def _on_scales(rows, inputs, targets, of_rows):
     return of_rows(replace(rows, inputs=inputs, targets=targets))
 
 
-@dataclass(frozen=True, eq=False)
-class _Described:
-    """What is known of some rows after one pass."""
-
-    n_rows: int
-    weight: float
-    inputs: Scale
-    targets: Scale
-
-
 def _describe(rows, layout):
-    """Count and measure a partition, None of no rows; ValueError where it is not finite."""
+    """Count, weight, and scales of inputs and targets of a partition, None of no rows.
+
+    ValueError where it is not finite.
+    """
     if rows.n_rows == 0:
         return None
     check_finite(rows.X, "X", layout.input_names)
@@ -269,17 +258,15 @@ def _describe(rows, layout):
         if largest > _LARGEST_WEIGHT or 0.0 < total < 1.0 / _LARGEST_WEIGHT:
             raise ValueError(f"sample_weight is as large as {largest:g}: give weights near to one.")
     inputs, targets = (column_statistics(part, rows.sample_weight) for part in (rows.X, rows.y))
-    return _Described(rows.n_rows, rows.total_weight, inputs, targets)
+    return rows.n_rows, rows.total_weight, inputs, targets
 
 
 def _joined(one, other):
     """Describe the rows of both."""
     if one is None or other is None:
         return other if one is None else one
-    weights = one.weight, other.weight
-    inputs = joined_scales(one.inputs, other.inputs, *weights)
-    targets = joined_scales(one.targets, other.targets, *weights)
-    return _Described(one.n_rows + other.n_rows, sum(weights), inputs, targets)
+    n_rows, weights, *scales = zip(one, other, strict=True)
+    return sum(n_rows), sum(weights), *(joined_scales(*both, *weights) for both in scales)
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,7 +274,7 @@ class ClusterData:
     """Validated data on a cluster; see ``ValidatedData``."""
 
     partitions: Partitions
-    described: _Described
+    described: tuple[int, float, Scale, Scale]  # as of ``_describe``
     constraints: Constraints | None = None
 
     @classmethod
@@ -295,7 +282,7 @@ class ClusterData:
         """Validate and measure the partitions, in one pass."""
         describe = partial(_describe, layout=partitions.layout)
         described = reduce_partitions(partitions, describe, _joined)
-        n_rows = 0 if described is None else described.n_rows
+        n_rows = 0 if described is None else described[0]
         if n_rows < 2:
             raise ValueError(f"Found {n_rows} rows with a positive weight; at least 2 are needed.")
         return cls(partitions, described)
@@ -312,6 +299,5 @@ class ClusterData:
 
     def rows(self):
         """The rows on their scales."""
-        found = self.described
-        check_scales(found.inputs, found.targets, self.input_names, self.output_names)
-        return ClusterRows(self.partitions, found.n_rows, found.weight, found.inputs, found.targets)
+        check_scales(*self.described[2:], self.input_names, self.output_names)
+        return ClusterRows(self.partitions, *self.described)

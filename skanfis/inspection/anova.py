@@ -18,7 +18,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from ..blocks import fitting_rows, row_blocks
+from ..blocks import add_each, fitting_rows, row_blocks
 from ..learning.data import Scale, StandardisedData
 from ..search import representative_rows, weighted_quantile
 from .measures import _CONSTANT
@@ -72,17 +72,13 @@ def _sums(rows, antecedent, blocks, sets):
     return totals
 
 
-def _added(one, other):
-    return [a + b for a, b in zip(one, other, strict=True)]
-
-
 def _moments(rows, antecedent, blocks):
     """Of every block the mean products of its functions; None where strengths are no products."""
     if antecedent.factors(np.zeros((rows.inputs.scale.size, 1))) is None:
         return [None] * len(blocks)
     sets = [rule_functions(antecedent, inputs)[0] for inputs in blocks]
     of_rows = partial(_sums, antecedent=antecedent, blocks=blocks, sets=sets)
-    return [total / rows.total_weight for total in rows.reduce(of_rows, _added)]
+    return [total / rows.total_weight for total in rows.reduce(of_rows, add_each)]
 
 
 def _standardised(model):
@@ -104,7 +100,21 @@ def input_marginals(rows, antecedent):
     table, weight, _ = representative_rows(rows.sample or rows, _MOST_ROWS)
     parts = (np.arange(N_VALUES) + 0.5) / N_VALUES
     values = [weighted_quantile(table[:, j], weight, parts, 1) for (j,) in blocks]
-    return tuple(zip(_moments(rows, antecedent, blocks), values, strict=True))
+    found = rows.reduce(partial(_beside, antecedent=antecedent), np.maximum) * [[-1.0], [1.0]]
+    beside = [np.unique(found[:, antecedent.term_inputs == j]) for (j,) in blocks]
+    return tuple(zip(_moments(rows, antecedent, blocks), values, beside, strict=True))
+
+
+def _beside(rows, antecedent):
+    """Of every term the values next above and below its place, (2, n_terms), the first negative."""
+    inputs, places = antecedent.term_inputs, antecedent.term_places[:, None]
+    found = np.full((2, inputs.size), -np.inf)
+    for part in row_blocks(rows.n_rows, fitting_rows(4 * inputs.size + 1)):
+        Z = rows.read(part)[0][inputs]
+        is_above = places < Z
+        ends = np.where(is_above, -Z, -np.inf), np.where(is_above, -np.inf, Z)
+        found = np.maximum(found, np.max(ends, axis=2))
+    return found
 
 
 def draw(blocks, n_draws, rng):

@@ -216,10 +216,8 @@ class ResponseSurfaceDisplay:
         if both[0] == both[1]:
             raise ValueError(f"features={features!r} is the same input twice.")
         k = _position(output, model.output_names, "output")
-        ends = model.minimum[both], model.maximum[both]
-        xx0, xx1 = np.meshgrid(*np.linspace(*ends, grid_resolution).T)
-        values = np.column_stack([xx0.ravel(), xx1.ravel()])
-        rows, others, coverage = _section(model, both, values, held)
+        (xx0, xx1), rows, others = _section(model, both, grid_resolution, held)
+        coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
         display = cls(
             xx0=xx0,
             xx1=xx1,
@@ -234,9 +232,8 @@ class ResponseSurfaceDisplay:
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the surface on ``ax``, as of :meth:`from_estimator`."""
-        if ax is None:
-            ax = _pyplot().subplots(figsize=(5.6, 4.2), layout="constrained")[1]
-        self.ax_, self.figure_ = ax, ax.figure
+        ax = self.ax_ = _axes(ax)
+        self.figure_ = ax.figure
         x, y = self.xx0[0], self.xx1[:, 0]
         grid = (x, y, self.response)
         # Extrapolation shall not set the colours.
@@ -259,14 +256,19 @@ class ResponseSurfaceDisplay:
         return self
 
 
-def _panels(ax, count, columns=3):
+def _axes(ax, figsize=(5.6, 4.2)):
+    """The axes that are given, or of a new figure."""
+    return _pyplot().subplots(figsize=figsize, layout="constrained")[1] if ax is None else ax
+
+
+def _panels(ax, count):
     """So many axes as an array: those given, or of a new figure."""
     if ax is not None:
         axes = np.ravel(ax)
         if axes.size != count:
             raise ValueError(f"ax has {axes.size} axes; {count} are needed, one per panel.")
         return axes
-    columns = min(columns, count)
+    columns = min(3, count)
     rows = -(-count // columns)
     figure = _pyplot().figure(figsize=(3.2 * columns, 2.6 * rows), layout="constrained")
     return np.array([figure.add_subplot(rows, columns, i + 1) for i in range(count)])
@@ -294,11 +296,11 @@ def _position(feature, names, what="input"):
     )
 
 
-def _section(model, inputs, values, held):
-    """Rows that have ``values`` (n_rows, n_inputs_varied) on some inputs, with the others held.
+def _section(model, both, n_points, held=None):
+    """A grid over two inputs, its rows with the others held, and the others' values by name.
 
     The others take their value in ``held``, or their mean in training; without training data, the
-    middle of their range. Returns the rows, the others' values by name, and the rows' coverage.
+    middle of their range.
     """
     middle = 0.5 * (model.minimum + model.maximum)
     mean = model.reference if has_training_data(model) else middle
@@ -315,8 +317,8 @@ def _section(model, inputs, values, held):
                 f"{low:.6g} to {high:.6g}."
             )
         row[j] = value
-    rows = np.tile(row, (len(values), 1))
-    rows[:, inputs] = values
-    others = [j for j in range(model.n_inputs) if j not in inputs]
-    coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
-    return rows, {model.input_names[j]: float(row[j]) for j in others}, coverage
+    grid = np.meshgrid(*np.linspace(model.minimum[both], model.maximum[both], n_points).T)
+    rows = np.tile(row, (n_points**2, 1))
+    rows[:, both] = np.stack(grid, axis=-1).reshape(-1, 2)
+    others = [j for j in range(model.n_inputs) if j not in both]
+    return grid, rows, {model.input_names[j]: float(row[j]) for j in others}

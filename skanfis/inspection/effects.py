@@ -178,7 +178,7 @@ def _known(model, blocks, rows):
             X[:, own] = np.eye(share.size)[:, :-1]
             found += blocks_of_rows(model, [inputs], X, share / share.sum())
         else:
-            moments, values = model.support.marginals[own[0]]
+            moments, values, _ = model.support.marginals[own[0]]
             values = model.reference[own] + model.spread[own] * values[:, None]
             values = np.clip(values, model.minimum[own], model.maximum[own])
             found.append(Block(inputs, values, None, moments))

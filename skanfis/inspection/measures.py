@@ -9,11 +9,12 @@ The error of a rule is that of its f_r to the target, on the rows on which it is
 Rules that are equally strong count in equal parts. Means are by the rows' weights.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
-from ..blocks import LARGE_BLOCK_ROWS, fitting_rows, row_blocks
+from ..blocks import LARGE_BLOCK_ROWS, add_each, fitting_rows, row_blocks
 from ..learning.data import column_statistics
 from ..model import EQUALLY_STRONG
 from .sentences import Sentences
@@ -44,94 +45,77 @@ def measure(model, read, n_rows, y=None, sample_weight=None):
     if y is None:
         held = model.with_out_of_bounds("clip")
         y = np.concatenate([held.predict(read(part)) for part in blocks])
-    y = np.asarray(y, dtype=float)
+    y, weight = np.asarray(y, dtype=float), np.ones(n_rows)
     if sample_weight is None:
         target = column_statistics(y)
     else:
-        has_weight = sample_weight > 0.0
-        target = column_statistics(y[has_weight], sample_weight[has_weight])
-    sums = RuleSums(model, Sentences.of(model).printed, target)
-    for part in blocks:
-        sums.add(read(part), y[part], None if sample_weight is None else sample_weight[part])
-    return sums.measures()
+        weight = np.asarray(sample_weight, dtype=float)
+        target = column_statistics(y[weight > 0.0], weight[weight > 0.0])
+    printed = Sentences.of(model).printed
+    sums = (rule_sums(model, printed, target, read(part), y[part], weight[part]) for part in blocks)
+    return measures_of(target, reduce(add_each, sums))
 
 
-class RuleSums:
-    """The pass over the rows, by parts.
+def _scale(target):
+    """Deviations of a target; one of a constant."""
+    largest = np.maximum(np.abs(target.minimum), np.abs(target.maximum))
+    is_constant = target.maximum - target.minimum <= _CONSTANT * largest
+    return np.where(is_constant, 1.0, target.scale)
+
+
+def rule_sums(model, printed, target, rows, y, weight):
+    """What :func:`measures_of` takes, of some rows; the sums over more rows add up.
 
     ``target`` is the scale of all of them; ``printed`` the model as it is printed.
     """
-
-    def __init__(self, model, printed, target):
-        largest = np.maximum(np.abs(target.minimum), np.abs(target.maximum))
-        is_constant = target.maximum - target.minimum <= _CONSTANT * largest
-        target = replace(target, scale=np.where(is_constant, 1.0, target.scale))
-        self.model, self.printed, self.target, self.weight = model, printed, target, 0.0
-        self.by_rule, self.by_printed = (self._standardised(one) for one in (model, printed))
-        self.mass, self.rows = np.zeros((2, model.n_rules))
-        self.alone, self.rule_errors = np.zeros((2, model.n_rules, model.n_outputs))
-        self.errors, self.printed_errors = np.zeros((2, model.n_outputs))
-
-    def _standardised(self, model):
-        """Consequents in deviations of the target about its mean."""
-        by_rule = model.coefficients / self.target.scale
-        by_rule[:, 0] -= self.target.offset / self.target.scale
-        return np.ascontiguousarray(by_rule.transpose(2, 0, 1))
-
-    def add(self, rows, y, weight=None):
-        """Add rows; returns itself."""
-        weight = np.ones(len(rows)) if weight is None else np.asarray(weight, dtype=float)
-        if not np.all(weight > 0.0):
-            rows, y, weight = rows[weight > 0.0], y[weight > 0.0], weight[weight > 0.0]
-        self.weight += float(weight.sum())
-        step = fitting_rows(8 * self.model.n_rules + self.model.antecedent.n_terms)
-        for part in row_blocks(len(rows), step):
-            Z = np.array(rows[part].T, dtype=float, order="C")
-            of_target = (y[part] - self.target.offset) / self.target.scale
-            self._add(Z, of_target.T, weight[part])
-        return self
-
-    def _add(self, Z, target, weight):
-        model = self.model
+    kept, scale = weight > 0.0, _scale(target)
+    rows, y, weight = rows[kept], y[kept], weight[kept]
+    by_rule, by_printed = (_standardised(one, target.offset, scale) for one in (model, printed))
+    mass, lead = np.zeros((2, model.n_rules))
+    alone, rule_errors = np.zeros((2, model.n_rules, model.n_outputs))
+    errors, printed_errors = np.zeros((2, model.n_outputs))
+    for part in row_blocks(len(rows), fitting_rows(8 * model.n_rules + model.antecedent.n_terms)):
+        Z, s = np.array(rows[part].T, dtype=float, order="C"), weight[part]
         np.clip(Z, model.minimum[:, None], model.maximum[:, None], out=Z)
-        strengths = model.antecedent.strengths(Z)
-        as_printed = self.printed.antecedent.strengths(Z)
-        self.mass += strengths @ weight
+        strengths, basis = model.antecedent.strengths(Z), model.basis(Z)
+        as_printed = printed.antecedent.strengths(Z)
+        mass += strengths @ s
         strongest = (strengths >= EQUALLY_STRONG * strengths.max(axis=0)).astype(float)
-        strongest *= weight / strongest.sum(axis=0)
-        self.rows += strongest.sum(axis=1)
-        basis = model.basis(Z)
-        for k, y in enumerate(target):
-            values, output = _outputs(self.by_rule[k], strengths, basis)
-            self.alone[:, k] += np.einsum("rn,rn->r", strongest, (values - output) ** 2)
-            self.rule_errors[:, k] += np.einsum("rn,rn->r", strongest, (values - y) ** 2)
-            self.errors[k] += weight @ (output - y) ** 2
-            printed = _outputs(self.by_printed[k], as_printed, basis)[1]
-            self.printed_errors[k] += weight @ (printed - y) ** 2
+        strongest *= s / strongest.sum(axis=0)
+        lead += strongest.sum(axis=1)
+        for k, of_target in enumerate(((y[part] - target.offset) / scale).T):
+            values, output = _outputs(by_rule[k], strengths, basis)
+            alone[:, k] += np.einsum("rn,rn->r", strongest, (values - output) ** 2)
+            rule_errors[:, k] += np.einsum("rn,rn->r", strongest, (values - of_target) ** 2)
+            errors[k] += s @ (output - of_target) ** 2
+            told = _outputs(by_printed[k], as_printed, basis)[1]
+            printed_errors[k] += s @ (told - of_target) ** 2
+    return [float(weight.sum()), mass, lead, alone, rule_errors, errors, printed_errors]
 
-    def joined(self, other):
-        """The sums over the rows of both."""
-        for name in ("weight", "mass", "rows", "alone", "rule_errors", "errors", "printed_errors"):
-            setattr(self, name, getattr(self, name) + getattr(other, name))
-        return self
 
-    def measures(self):
-        """What the sums amount to."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            rule_alone = np.sqrt(self.alone / self.rows[:, None])
-            rule_errors = np.sqrt(self.rule_errors / self.rows[:, None])
+def measures_of(target, sums):
+    """What sums over all rows amount to."""
+    weight, mass, lead, alone, rule_errors, errors, printed_errors = sums
+    with np.errstate(divide="ignore", invalid="ignore"):
         return Measures(
-            weight=self.weight,
-            mean=self.target.offset,
-            deviation=self.target.scale,
-            rule_weights=self.mass / self.weight,
-            rule_rows=self.rows,
-            rule_alone=rule_alone,
-            alone=np.sqrt(self.alone.sum(axis=0) / self.weight),
-            rule_errors=rule_errors,
-            errors=np.sqrt(self.errors / self.weight),
-            printed_errors=np.sqrt(self.printed_errors / self.weight),
+            weight=weight,
+            mean=target.offset,
+            deviation=_scale(target),
+            rule_weights=mass / weight,
+            rule_rows=lead,
+            rule_alone=np.sqrt(alone / lead[:, None]),
+            alone=np.sqrt(alone.sum(axis=0) / weight),
+            rule_errors=np.sqrt(rule_errors / lead[:, None]),
+            errors=np.sqrt(errors / weight),
+            printed_errors=np.sqrt(printed_errors / weight),
         )
+
+
+def _standardised(model, offset, scale):
+    """Consequents in deviations of the target about its mean."""
+    by_rule = model.coefficients / scale
+    by_rule[:, 0] -= offset / scale
+    return np.ascontiguousarray(by_rule.transpose(2, 0, 1))
 
 
 def _outputs(by_rule, strengths, basis):

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..antecedent.tree import CRISP
 from ..model import TSKModel
 from ..naming import SIGNS, default_term_names, written_side
 
@@ -35,42 +36,19 @@ _FINEST = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Sentences:
-    """What the rules of a model say; built by :meth:`of`.
+    """What the rules of a model say; built by :meth:`of`."""
 
-    Attributes
-    ----------
-    model : TSKModel
-        Whose rules these are; its terms as they are written.
-    says_where : ndarray of bool of shape (n_terms,)
-        Terms whose name says where they turn.
-    places : ndarray of shape (n_rules, n_inputs)
-        Centre of each rule, to few digits; of an input that is 0 or 1 the more frequent of these.
-    values, of_common : ndarray of shape (n_rules, n_outputs)
-        What each rule says there, and what of it is the common line's part.
-    slopes : ndarray of shape (n_rules, n_inputs, n_outputs)
-        Whole slopes, those in common as well.
-    is_own : ndarray of bool, of the same shape
-        Which of them the rule states itself.
-    common_place : ndarray of shape (n_inputs,)
-    common : ndarray of shape (n_inputs, n_outputs)
-        The common line; zero where nothing is in common.
-    two_valued : ndarray of bool of shape (n_inputs,)
-        Inputs that are 0 or 1.
-    levels : dict of str to tuple of two str
-        Raw columns and levels of inputs that are indicators, by their names (``Reader.levels``).
-    """
-
-    model: TSKModel
-    says_where: np.ndarray
-    places: np.ndarray
-    values: np.ndarray
-    of_common: np.ndarray
-    slopes: np.ndarray
-    is_own: np.ndarray
-    common_place: np.ndarray
-    common: np.ndarray
-    two_valued: np.ndarray
-    levels: Mapping[str, tuple[str, str]]
+    model: TSKModel  # whose rules these are; its terms as they are written
+    says_where: np.ndarray  # terms whose name says where they turn, (n_terms,)
+    places: np.ndarray  # centers, to few digits; 0 or 1 where these are all, (n_rules, n_inputs)
+    values: np.ndarray  # what each rule says there, (n_rules, n_outputs)
+    of_common: np.ndarray  # what of it is the common line's part
+    slopes: np.ndarray  # those in common as well, (n_rules, n_inputs, n_outputs)
+    is_own: np.ndarray  # which of them the rule states itself
+    common_place: np.ndarray  # (n_inputs,)
+    common: np.ndarray  # the common line; zero where nothing is in common, (n_inputs, n_outputs)
+    two_valued: np.ndarray  # inputs that are 0 or 1, (n_inputs,)
+    levels: Mapping[str, tuple[str, str]]  # as ``Reader.levels``
 
     @classmethod
     def of(cls, model: TSKModel, precision: int = PRECISION, levels=None):
@@ -94,7 +72,9 @@ class Sentences:
         of_common = np.einsum("rj,rjo->ro", places - common_place, part)
         # Beside a common slope that of nothing is to be said as well.
         is_own = ~is_common[:, :, None] & ((slopes != 0.0) | (common != 0.0))
-        digits = min(precision + _more_digits(scale, noise), MOST_DIGITS)
+        # What terms may be off by is a part of the output's deviation, not of the noise.
+        more = int(np.floor(np.log10(scale / noise)).max(initial=0.0))
+        digits = min(precision + more, MOST_DIGITS)
         written, says_where = _written_terms(model, digits)
         return cls(
             written,
@@ -115,8 +95,7 @@ class Sentences:
         """The model that the written numbers are."""
         model = self.model
         own = np.where(self.is_own, self.slopes, 0.0)
-        part = np.where(self.is_own, 0.0, self.common)
-        part = np.where(model.common_slopes[:, :, None], part, 0.0)
+        part = np.where(model.common_slopes[:, :, None], self.common, 0.0)
         constant = self.values - self.of_common
         constant -= np.einsum("rj,rjo->ro", self.places - model.reference, own)
         constant -= np.einsum("j,rjo->ro", self.common_place - model.reference, part)
@@ -161,39 +140,46 @@ def _resolution(model, slopes):
     return scale, np.clip(noise, _FINEST * scale, scale)
 
 
-def _more_digits(scale, noise):
-    """Of terms: what they may be off by is a part of the output's deviation, not of the noise."""
-    return int(np.floor(np.log10(scale / noise)).max(initial=0.0))
-
-
 def _two_valued(model) -> np.ndarray:
     """Inputs that are 0 or 1 on all training rows; none where the rows are not known."""
     found = np.zeros(model.n_inputs, dtype=bool)
-    marginals = () if model.support is None else model.support.marginals
-    for j, (_, quantiles) in enumerate(marginals):
+    for j, (quantiles, _) in enumerate(_seen(model)):
         if (model.minimum[j], model.maximum[j]) == (0.0, 1.0):
-            seen = np.round(model.reference[j] + model.spread[j] * quantiles, _DIGITS_OF_CASE)
-            found[j] = np.isin(seen, (0.0, 1.0)).all()
+            found[j] = np.isin(np.round(quantiles, _DIGITS_OF_CASE), (0.0, 1.0)).all()
     return found
+
+
+def _seen(model):
+    """Of every input, quantiles of the training rows and values next to its terms, if known."""
+    marginals = () if model.support is None else model.support.marginals
+    scales = zip(model.reference, model.spread, marginals, strict=False)
+    return [[offset + scale * z for z in values] for offset, scale, (_, *values) in scales]
 
 
 def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
-    These are the sides of cuts; a name that somebody has given stays.
+    These are the sides of cuts; a name that somebody has given stays. Where every training row is
+    on one side, to so many digits, the width is left out, and the cut is crisp.
     """
     antecedent, box = model.antecedent, (model.minimum, model.maximum)
     default = default_term_names(antecedent, *box)
     of_digits = default_term_names(antecedent, *box, digits)
     names, says_where = list(model.term_names), np.zeros(len(default), dtype=bool)
-    groups, start = [], 0
+    groups, start, seen = [], 0, _seen(model)
+    sure = np.log(10.0 ** max(digits, PRECISION) - 1.0)
     for group in antecedent.groups:
         theta = _rounded_theta(group, digits)
         for k, t in enumerate(range(start, start + group.n_terms)):
             says_where[t] = group.family in SIGNS and names[t] == default[t]
             if says_where[t]:
                 names[t] = of_digits[t]
-                theta[:, k] = written_side(of_digits[t], group.theta[:, k])
+                theta[:, k] = cut, log_width = written_side(of_digits[t], group.theta[:, k])
+                on_input = np.concatenate(seen[group.inputs[k]]) if seen else cut
+                nearest = np.abs(on_input - cut).min()
+                if "±" in names[t] and nearest > sure * np.exp(log_width):
+                    names[t] = names[t].partition(" ±")[0]
+                    theta[1, k] -= np.log(CRISP)
         groups.append(replace(group, theta=theta))
         start += group.n_terms
     written = replace(antecedent, groups=tuple(groups))

@@ -9,7 +9,7 @@ import numpy as np
 from ..export.folding import last_step
 from ..model import TSKModel
 from ..search.choice import tolerated
-from .displays import _pyplot
+from .displays import _axes, _pyplot
 
 # Colours that the colour-blind can tell apart, and a marker for each kind.
 _KINDS = {"one rule": ("0.3", "s"), "grid": ("#0072b2", "o"), "scattered": ("#d55e00", "^")}
@@ -83,9 +83,8 @@ class StructureDisplay:
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the candidates on ``ax``, as of :meth:`from_estimator`."""
-        if ax is None:
-            ax = _pyplot().subplots(figsize=(5.6, 4.2), layout="constrained")[1]
-        self.ax_, self.figure_ = ax, ax.figure
+        ax = self.ax_ = _axes(ax)
+        self.figure_ = ax.figure
         structures = sorted(self.structures, key=lambda one: one["rules"])
         for kind in dict.fromkeys(one["kind"] for one in structures):
             own = _places([one for one in structures if one["kind"] == kind])

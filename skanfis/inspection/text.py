@@ -210,14 +210,19 @@ def _conclusion(said, r, k):
 
 
 def _slopes(said, slopes, places, is_said):
-    """Say "+5.8 per rooms from 6.3", or "-2.1 if private is 1"; what does most comes first."""
+    """Say "+5.8 per rooms from 6.3", "-2.1 if private is 1"; what does most comes first.
+
+    Of no slope, which stands in place of a common one, "no change with rooms".
+    """
     parts, does = [], np.abs(slopes) * said.model.spread
     for j in sorted(np.flatnonzero(is_said), key=lambda j: -does[j]):
         name, slope, place = said.model.input_names[j], slopes[j], places[j]
         if said.two_valued[j]:
             other = 1.0 - place
-            case = condition(name, plain(other), said.levels)
-            parts.append(f"{_signed(slope * (other - place))} if {case}")
+            change = _signed(slope * (other - place)) if slope else "no change"
+            parts.append(f"{change} if {condition(name, plain(other), said.levels)}")
+        elif not slope:
+            parts.append(f"no change with {name}")
         else:
             parts.append(f"{_signed(slope)} per {name} from {plain(place)}")
     return parts

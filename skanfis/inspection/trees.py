@@ -9,7 +9,7 @@ from .._validation import check_choice
 from ..antecedent import TreeAntecedent
 from ..export import fold
 from ..model import TSKModel
-from .displays import _position, _pyplot, _section
+from .displays import _axes, _position, _section
 from .labels import as_label, title_of
 from .rules import condition, parts_led, writable
 from .sentences import Sentences
@@ -118,7 +118,8 @@ class TreeDisplay:
         (order, ends), n_rules = tree.walk, model.n_rules
         names = [as_label(model.input_names[j]) for j in tree.term_inputs]
         # Above and below each node.
-        words = np.reshape(list(map(condition, names, model.term_names)), (2, -1)).T[order]
+        words = list(map(condition, names, self._said.model.term_names))
+        words = np.reshape(words, (2, -1)).T[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
         share = np.concatenate([parts_led(model), np.zeros(n_rules - 1)])
@@ -131,10 +132,8 @@ class TreeDisplay:
             height[n_rules + k], share[n_rules + k] = height[pair].mean(), share[pair].sum()
         step = _LETTER * max(map(len, words.ravel())) + _MARGIN
         last = _LETTER * max(map(len, self.leaves)) + _MARGIN
-        if ax is None:
-            size = step * depth.max() + last + _MARGIN, _LEAF * n_rules + _MARGIN
-            ax = _pyplot().subplots(figsize=size, layout="constrained")[1]
-        self.ax_ = ax
+        size = step * depth.max() + last + _MARGIN, _LEAF * n_rules + _MARGIN
+        ax = self.ax_ = _axes(ax, size)
         for k, pair in enumerate(ends):
             start = depth[n_rules + k], height[n_rules + k]
             for end, text in zip(pair, words[k], strict=True):
@@ -152,15 +151,9 @@ class TreeDisplay:
         ax.set_title(f"{name}: typical value (strongest on)", fontsize="small", loc="left")
 
     def _draw_plane(self, ax):
-        model, plt = self.model, _pyplot()
-        if ax is None:
-            ax = plt.subplots(figsize=(5.6, 4.2), layout="constrained")[1]
-        self.ax_ = ax
-        both = np.unique(model.antecedent.term_inputs)
-        low, high = model.minimum[both], model.maximum[both]
-        axes = np.linspace(low, high, _N_POINTS).T
-        values = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 2)
-        rows, held, _ = _section(model, both, values, None)
+        model, both = self.model, np.unique(self.model.antecedent.term_inputs)
+        ax = self.ax_ = _axes(ax)
+        axes, rows, held = _section(model, both, _N_POINTS)
         response = model.predict(rows)[:, self.output].reshape(_N_POINTS, _N_POINTS)
         colours = ax.pcolormesh(*axes, response, shading="nearest", rasterized=True)
         name = as_label(model.output_names[self.output])
@@ -172,5 +165,6 @@ class TreeDisplay:
         for value, center in zip(self.values, self._said.places[:, both], strict=True):
             ax.text(*center, plain(value), fontsize="small", ha="center", va="center", bbox=box)
         first, second = (as_label(model.input_names[j]) for j in both)
-        ax.set(xlabel=first, ylabel=second, xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+        xlim, ylim = zip(model.minimum[both], model.maximum[both], strict=True)
+        ax.set(xlabel=first, ylabel=second, xlim=xlim, ylim=ylim)
         ax.set_title(title_of(held), fontsize="small", loc="left")

@@ -88,8 +88,10 @@ def _conclusion(text, names):
 
 
 def _slopes(text, names):
-    """{input: (slope, place)} of "+5.8 per rooms from 6.3, -2 if private is 1"."""
-    name, found = "|".join(map(re.escape, names)), {}
+    """{input: (slope, place)} of "+5.8 per rooms from 6.3, -2 if new is 1, no change with age"."""
+    name = "|".join(map(re.escape, names))
+    unchanged = re.findall(rf"no change (?:with ({name})|if ({name}) is [01])(?:, |$)", text)
+    found = {one or other: (0.0, 0.0) for one, other in unchanged}
     pattern = rf"({NUMBER}) (?:per ({name}) from ({NUMBER})|if ({name}) is ([01]))(?:, |$)"
     for slope, by, place, column, other in re.findall(pattern, text):
         if by:

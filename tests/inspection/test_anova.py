@@ -85,9 +85,9 @@ def test_a_fit_keeps_the_moments_of_every_input_and_its_quantiles(n_rows):
     fitted = ANFISRegressor(n_mfs=[3, 2], max_iter=0, alpha=0.1, agreement=0.1)
     model = fitted.fit(X, y, sample_weight=weight).model_
     of_rows = blocks_of_rows(model, [(0,), (1,)], X, weight / weight.sum())
-    for (found, _), expected in zip(model.support.marginals, of_rows, strict=True):
+    for (found, *_), expected in zip(model.support.marginals, of_rows, strict=True):
         assert_allclose(found, expected.moments, rtol=0, atol=1e-11)
-    for j, (_, values) in enumerate(model.support.marginals):
+    for j, (_, values, _) in enumerate(model.support.marginals):
         z = np.sort(np.repeat((X[:, j] - model.reference[j]) / model.spread[j], weight))
         # Each is where so much of the weight lies below; of many rows, of a sample of these.
         below = np.searchsorted(z, values, side="right") / z.size
@@ -99,7 +99,7 @@ def test_of_rules_that_do_not_factor_a_fit_keeps_quantiles():
     model = MODELS["scattered, order 1, 1 outputs"]
     X = rows_of(model, 1.0, 30)
     kept = input_marginals(StandardisedData.of(X, X), model.antecedent)
-    for moments, values in kept:
+    for moments, values, _ in kept:
         assert moments is None
         assert values.shape == (200,)
 

@@ -190,6 +190,16 @@ def test_draws_are_said():
     assert_allclose(found.table, effects(model, X).table)
 
 
+def test_what_was_kept_of_a_tree_is_not_taken_for_its_rule_table(rng):
+    X = rng.uniform(-2.0, 2.0, (500, 2))
+    y = (np.abs(X[:, 0]) < 0.8) * (1.0 + X[:, 1]) + 0.05 * rng.normal(size=500)
+    model = ANFISRegressor(partition="tree", max_rules=3).fit(X, y).model_
+    table = model.as_rule_table()
+    assert max(map(len, model.antecedent.paths)) == 2
+    found = (effects(one).table["sobol"].loc["x0"] for one in (model, table))
+    assert_allclose(*found, atol=0.03)
+
+
 def test_models_that_know_of_no_rows_ask_for_them():
     X, y = np.random.default_rng(4).uniform(size=(40, 2)), np.arange(40.0)
     fitted = quick(n_mfs=2).fit(X, y)

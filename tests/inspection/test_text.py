@@ -100,6 +100,53 @@ def test_slopes_in_common_are_told_once(name, n_outputs):
     assert "time" in rules_html(model).partition("Common to the rules")[2]
 
 
+@pytest.mark.parametrize(
+    ("name", "said"), [("rate", "no change with rate"), ("on", "no change if on is [01]")]
+)
+def test_a_rule_without_a_slope_that_the_others_have_says_so(rng, name, said):
+    X = np.column_stack([rng.normal(size=(400, 2)), rng.integers(0, 2, 400)])
+    y = np.tanh(9.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
+    model = ANFISRegressor(partition="tree", max_rules=2).fit(X, y).model_
+    names = ("speed", "rate", "on")
+    # Three rules, of which two have a slope.
+    tree = model.antecedent.split(0, 1, 0.3, 0.0)
+    coefficients = np.zeros((3, 4, 1))
+    coefficients[:2, 1 + names.index(name)] = 0.7
+    support = model.support
+    support = replace(support, center=support.center[[0, 0, 1]], share=np.ones(3))
+    changes = {"antecedent": tree, "initial_antecedent": tree, "coefficients": coefficients}
+    changes |= {"rule_weights": np.full(3, 1 / 3), "rule_rows": np.full(3, 100.0)}
+    model = replace(model, **changes, support=support, posterior=None, term_names=())
+    text = export_text(model, precision=17, feature_names=names)
+    assert re.search(said, text.partition("Rule 2,")[2])
+    assert text.count("no change") == 1
+    assert_allclose(predicted(text, X, names), model.predict(X), atol=1e-9)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.3, 3.0])
+def test_a_width_is_left_out_where_every_row_is_on_one_side(rng, gap):
+    x = rng.normal(size=400)
+    X = np.column_stack([x + gap * np.sign(x), rng.normal(size=400)])
+    y = np.where(x > 0.0, 3.0, X[:, 1]) + 0.3 * rng.standard_normal(400)
+    model = ANFISRegressor(partition="tree", max_rules=2).fit(X, y)
+    node = model.model_.antecedent.groups[0]
+    assert list(node.inputs) == [0]
+    surest = np.abs(X[:, 0] - node.theta[0]).min() / np.exp(node.theta[1])
+    text = export_text(model)
+    assert (surest > np.log(99.0)) == (gap == 3.0)
+    assert ("±" not in text) == (gap == 3.0)
+    assert "±" in export_text(model, precision=17)
+    # Who reads the cut as crisp errs as the last line says.
+    said = predicted(text, X, ("x0", "x1"))
+    assert_allclose(said, Sentences.of(model.model_).printed.predict(X), atol=1e-9)
+    errors = [np.mean((p - y) ** 2) for p in (said[:, 0], model.predict(X))]
+    told = model.readability_.summary["text_over_model"]
+    assert told == pytest.approx(np.sqrt(errors[0] / errors[1]), rel=1e-3)
+    # Of a model that knows no rows the width is told.
+    unknown = replace(model.model_, support=replace(model.model_.support, marginals=()))
+    assert "±" in export_text(unknown)
+
+
 def test_a_rule_by_hand():
     # By the text alone, and for one row that anybody can follow.
     tree = TreeAntecedent.build(
