@@ -26,12 +26,13 @@ from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._headline import errors_and_verdict, rules_text
 from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
+from ._results import Results
 from ._source import open_source
 from ._split import choose_split
 from .c_code import export_c_compensator
 from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
-from .html_report import check_installed, report_page
+from .html_report import check_installed, report_page, specification
 from .log import find_logs, read
 from .metrics import rms
 from .targets.write import FILES, write_targets
@@ -84,11 +85,13 @@ def _calibrate(options, tell):
             reading.log, split, recipe, tell, reading.name_row, n_rows=reading.n_rows
         )
         tell("drawing the report")
-        _write(calibration, options, reading.digests, written)
+        checks = _write(calibration, options, reading.digests, written)
         targets = list(write_targets(calibration, options.target, written))
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(_summary(calibration, folder, reading.notes))
+    if checks:
+        _say([f"specification  {specification(checks)}"])
     _say(
         f"{'target' if is_written else 'REFUSED':14} {name}: {told}"
         for name, told, is_written in targets
@@ -202,6 +205,7 @@ def _default_inputs(log, at_rest):
 
 
 def _write(calibration, options, files, folder):
+    """Write all but the targets; what became of the limits is returned."""
     more = f" and {len(files) - 1} more" if len(files) > 1 else ""
     told = ReportOptions(
         made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z"),
@@ -211,7 +215,8 @@ def _write(calibration, options, files, folder):
         typed=options.typed,
         limits=tuple(options.limits),
     )
-    page = report_page(calibration, printable(f"{files[0][0]}{more}"), told)
+    results = Results(calibration, told)
+    page = report_page(results, printable(f"{files[0][0]}{more}"))
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")
     if options.pdf:
@@ -225,6 +230,7 @@ def _write(calibration, options, files, folder):
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
         export_c_compensator(compensator, folder / "compensator", std=options.c)
+    return results.checks
 
 
 def _summary(calibration, folder, notes):

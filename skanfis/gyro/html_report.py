@@ -25,8 +25,6 @@ from ._headline import (
     rules_text,
     written_text,
 )
-from ._options import ReportOptions
-from ._results import Results
 from ._simpler import NAMES, NOTHING
 from .c_code import notes_on, units_of
 from .compose import FrozenRules
@@ -70,9 +68,9 @@ class Block(NamedTuple):
     title: str = ""
 
 
-def report_page(calibration, title, options=None):
-    """The report of a calibration, as the text of an HTML file; ``options`` a ReportOptions."""
-    results = Results(calibration, options or ReportOptions())
+def report_page(results, title):
+    """The report of a calibration, as the text of an HTML file; ``results`` a Results."""
+    calibration = results.calibration
     recipe, name = calibration.recipe, calibration.written
     what = "Arcsine law and fuzzy rules" if recipe.physics else "Fuzzy rules (ANFIS)"
     what = what if calibration.writes_model else ARTICLES[name].capitalize()
@@ -137,13 +135,18 @@ def _reasons(results):
     """Why the verdict is as it is, and whether the specification is kept."""
     yield headline(results.calibration, results.unit)[1]
     if results.checks:
-        told = Counter(check.result for check in results.checks)
-        parts = [f"{told['pass']} of {len(results.checks)} limits are kept"]
-        for result, words in (("fail", "not kept"), ("not measured", "could not be measured")):
-            names = [_words(c.limit.figure) for c in results.checks if c.result == result]
-            parts += [f"{words}: {', '.join(names)}"] if names else []
-        yield f"Specification: {'; '.join(parts)}."
+        yield f"Specification: {specification(results.checks)}."
     yield f"The files, and the figures below, are of {written_text(results.calibration)}."
+
+
+def specification(checks):
+    """How many limits are kept, and which are not."""
+    told = Counter(check.result for check in checks)
+    parts = [f"{told['pass']} of {len(checks)} limits are kept"]
+    for result, words in (("fail", "not kept"), ("not measured", "could not be measured")):
+        names = [_words(check.limit.figure) for check in checks if check.result == result]
+        parts += [f"{words}: {', '.join(names)}"] if names else []
+    return "; ".join(parts)
 
 
 def _summary(results):

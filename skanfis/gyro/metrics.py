@@ -210,7 +210,8 @@ def allan_figures(tau, deviation):
     """Of each figure its value, NaN where the curve [s, deg/h] has none, and why it has none.
 
     A slope is found where a line through three neighbouring points has it within 0.15; the lowest
-    such line counts, before the minimum for N and after it for K. A minimum at an end is none.
+    such line counts, before the minimum and any rise for N and after the minimum for K. A minimum
+    at an end is none.
     """
     if tau.size < _POINTS_PER_SLOPE:
         raise ValueError(f"The curve has {tau.size} points; at least {_POINTS_PER_SLOPE} needed.")
@@ -222,7 +223,11 @@ def allan_figures(tau, deviation):
         side = "rises from its shortest" if lowest == 0 else "still falls at its longest"
         minimum = np.nan
         no_minimum = f"no minimum: the curve {side} averaging time, {tau[lowest]:g} s"
-    walk, no_walk = _level(tau[: lowest + 1], deviation[: lowest + 1], -0.5)
+    # White noise falls from the shortest averaging time on: a curve that has risen falls again
+    # behind a hump, such as steps of the error at every new rate leave.
+    rises = np.flatnonzero(np.diff(deviation[: lowest + 1]) > 0)
+    white = slice(rises[0] + 1 if rises.size else lowest + 1)
+    walk, no_walk = _level(tau[white], deviation[white], -0.5)
     drift, no_drift = _level(tau[lowest:], deviation[lowest:], 0.5)
     return {
         # sigma sqrt(tau) is N where the slope is -1/2: 1 deg/h at 1 s is 1/60 deg/sqrt(h).

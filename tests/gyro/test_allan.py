@@ -33,6 +33,18 @@ def test_planted_curve_is_read_back():
     assert notes == {}
 
 
+def test_what_falls_behind_a_hump_is_no_white_noise():
+    """White noise beside steps, which lift the curve at the time of a dwell and fall behind it."""
+    white, steps = 180.0 / TAU, np.zeros(TAU.size)
+    steps[5:] = 4e4 / (TAU[5:] / TAU[5]) ** 1.0
+    assert read(TAU, np.sqrt(white + steps))[0]["angle_random_walk"] == pytest.approx(
+        np.sqrt(180.0) / 60.0, rel=1e-9
+    )
+    values, notes = read(TAU[4:], np.sqrt(white + steps)[4:])
+    assert np.isnan(values["angle_random_walk"])
+    assert notes["angle_random_walk"] == "no slope of -1/2"
+
+
 def test_pure_slopes_are_exact_and_a_figure_that_is_not_there_is_said():
     values, notes = read(TAU, 60.0 * 0.05 / np.sqrt(TAU))
     assert values.pop("angle_random_walk") == pytest.approx(0.05, rel=1e-12)

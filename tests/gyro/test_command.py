@@ -48,9 +48,7 @@ def log():
 @pytest.fixture
 def no_report(monkeypatch, few_rivals):
     """Leave out the report and what it compares with, which take longer than all else together."""
-    monkeypatch.setattr(
-        "skanfis.gyro.command.report_page", lambda calibration, title, options: title
-    )
+    monkeypatch.setattr("skanfis.gyro.command.report_page", lambda results, title: title)
 
 
 @pytest.fixture
@@ -180,8 +178,10 @@ def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind,
 def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     path = write_log(tmp_path / "log.csv", log[log["run"] < 3])
-    assert main([path, "--inputs", "temperature", "output"]) == 0
+    limits = ["--limits", "residual_rms=90deg/s", "residual_rms=1e-9deg/s"]
+    assert main([path, "--inputs", "temperature", "output", *limits]) == 0
     out, err = capsys.readouterr()
+    assert "specification  1 of 2 limits are kept; not kept: residual rms" in out
     assert (tmp_path / "log-compensator" / "report.html").exists()
     for text in ("reading", "270 rows, 3 runs", "fold 3 of 3", "done"):
         assert text in err

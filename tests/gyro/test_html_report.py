@@ -85,7 +85,7 @@ def options(calibration):
 
 @pytest.fixture(scope="module")
 def page(calibration, options, coarse_report):
-    return report_page(calibration, TITLE, options)
+    return report_page(Results(calibration, options), TITLE)
 
 
 @pytest.fixture
@@ -130,7 +130,7 @@ def test_physics_shows_its_law(few_rivals, no_drawing):
     inputs = ("temperature", "temperature_rate", "output")
     settings = {"terms": (1, 1, 1), "physics": True, "outside": "linear"}
     calibration = calibration_of(log, inputs, **settings)
-    text = " ".join(Outline(report_page(calibration, "law.csv")).text)
+    text = " ".join(Outline(report_page(Results(calibration, ReportOptions()), "law.csv")).text)
     law, found = calibration.compensator.estimator.base_, calibration.rules[-1].model_
     assert f"{law.sagnac_factor_[0]:.8g}" in text
     assert rules_text(calibration).splitlines()[0] in text
@@ -162,7 +162,7 @@ def test_the_formula_of_what_is_simpler_can_be_computed(calibration, name):
 
 def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(calibration, no_drawing):
     cubic = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="cubic")
-    text = " ".join(Outline(report_page(cubic, TITLE)).text)
+    text = " ".join(Outline(report_page(Results(cubic, ReportOptions()), TITLE)).text)
     assert "and the value at the edge is held" in text
     assert "largest compensation, proven" in text
     assert "addition to the arcsine law" not in text
@@ -171,7 +171,7 @@ def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(calibration,
 def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
     log = make_ofog(n_devices=1, n_runs=3, duration=600.0, rates=[0.0], random_state=0)
     calibration = calibration_of(log, inputs=("temperature",), terms=(2,), outside="nan")
-    text = " ".join(Outline(report_page(calibration, "rest.csv")).text)
+    text = " ".join(Outline(report_page(Results(calibration, ReportOptions()), "rest.csv")).text)
     assert "°/h" in text
     assert "Scale-factor error against rate" not in text
     assert "there is no value" in text
@@ -186,7 +186,7 @@ def test_the_verdict_comes_first(page, calibration):
     assert "are of the fuzzy rules, as --write asks" in text
     assert f"leaves {figures(verdict.rms['arcsine law'])} °/s RMS" in text
     simple = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="recommended")
-    text = "".join(Outline(report_page(simple, TITLE)).text)
+    text = "".join(Outline(report_page(Results(simple, ReportOptions()), TITLE)).text)
     model = next(each for each in simple.simpler if each.name == "arcsine law").estimator.base_
     assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What is written") :]
     assert "are of the arcsine law, as recommended" in text
@@ -196,7 +196,7 @@ def test_the_verdict_comes_first(page, calibration):
 def test_one_unit_throughout(page, calibration, no_drawing, monkeypatch):
     """Of errors; rates, and the formula of what to use instead, are in deg/s."""
     monkeypatch.setattr("skanfis.gyro._results._SMALL", np.inf)
-    hourly = report_page(calibration, TITLE)
+    hourly = report_page(Results(calibration, ReportOptions()), TITLE)
     rms = np.sqrt(np.mean((calibration.after - calibration.rate)[calibration.in_range] ** 2))
     for text, unit, factor, other in ((page, "°/s", 1.0, "°/h"), (hourly, "°/h", 3600.0, "°/s")):
         text = " ".join(Outline(text).text)
@@ -242,7 +242,10 @@ def test_the_way_to_get_what_is_missing_is_said(calibration, monkeypatch, no_dra
     with pytest.raises(ImportError, match="the report needs weasyprint: pip install weasyprint"):
         check_installed(pdf=True)
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    for make in (check_installed, lambda: report_page(calibration, "log.csv")):
+    for make in (
+        check_installed,
+        lambda: report_page(Results(calibration, ReportOptions()), "log.csv"),
+    ):
         with pytest.raises(ImportError, match="pip install jinja2"):
             make()
 
@@ -265,6 +268,6 @@ def test_a_pdf_of_one_run_has_five_pages_at_most():
                     rates=np.arange(-90.0, 91.0, 15.0))  # fmt: skip
     inputs = ("temperature", "temperature_rate", "output")
     calibration = calibration_of(log, inputs, terms=(1, 1, 2))
-    page = report_page(calibration, TITLE)
+    page = report_page(Results(calibration, ReportOptions()), TITLE)
     assert weasyprint.HTML(string=page).write_pdf().startswith(b"%PDF")
     assert 2 <= len(weasyprint.HTML(string=page).render().pages) <= 5
