@@ -16,20 +16,27 @@ _CERTAIN, _MUCH = 4.0, 0.25
 _MOST_ROWS, _ROWS_TOLD, _PARTS = 2048, 5, 3
 
 
-def contradicted(free, held, inequalities, rows, raised):
+def contradicted(free, held, inequalities, fixed, rows, raised):
     """A sentence for every output whose constraints the data contradict.
 
-    ``free`` and ``held`` are models in the user's units, ``rows`` X, y and their numbers, and
-    ``raised`` the squared error of training over the free fit's.
+    ``free`` and ``held`` are models in the user's units, ``fixed`` the fixed points and the outputs
+    there, ``rows`` X, y and their numbers, and ``raised`` the squared error of training over the
+    free fit's.
     """
     if free.posterior is None or raised <= _PLAIN:
         return
     X, y, numbers = rows
     some = X[:: max(len(X) // _MOST_ROWS, 1)]
+    points, values = fixed
+    gap = np.zeros(values.shape)
+    if len(points):
+        # NaN, where an output is not fixed, is no gap.
+        gap = np.abs(free.predict(points) - values) - _CERTAIN * _deviation(free, points).T
     for k, output in enumerate(free.output_names):
         guilty = [
             one.name for one in inequalities if one.output == k and _speaks_against(one, free, some)
         ]
+        guilty += [f"FixedPoint at {points[i]}" for i in np.flatnonzero(gap[:, k] > 0.0)]
         if not guilty:
             continue
         before, after = ((y[:, k] - model.predict(X)[:, k]) ** 2 for model in (free, held))
@@ -46,9 +53,7 @@ def _speaks_against(one, free, X):
     """Whether the free fit is certain of what an inequality forbids."""
     excess = one.excess(free, X)
     if one.input is None:
-        of_rows, of_noise = free.posterior.inside(free, X.T), free.posterior.noise[:, None]
-        deviation = np.sqrt(np.maximum(of_rows**2 - of_noise**2, 0.0))[one.output]
-        return bool((excess > _CERTAIN * deviation).any())
+        return bool((excess > _CERTAIN * _deviation(free, X)[one.output]).any())
     if excess[excess > 0.0].sum() <= _MUCH * np.abs(excess).sum():
         return False
     column = X[:, one.input]
@@ -62,3 +67,9 @@ def _speaks_against(one, free, X):
         if falls > _CERTAIN * deviation:
             return True
     return False
+
+
+def _deviation(free, X):
+    """Of what the free fit says, without the noise, (n_outputs, n_rows)."""
+    of_rows, of_noise = free.posterior.inside(free, X.T), free.posterior.noise[:, None]
+    return np.sqrt(np.maximum(of_rows**2 - of_noise**2, 0.0))

@@ -84,7 +84,8 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     if rows is not None:
         held = replace(fit.model, coefficients=kept.coefficients)
         free = replace(model, target=None)
-        for message in contradicted(free, held, fit.inequalities, rows, after / before):
+        fixed = constraints.points, constraints.values
+        for message in contradicted(free, held, fit.inequalities, fixed, rows, after / before):
             warn_user(message, ConstraintWarning)
     if drawn and after > _FAR * before:
         names = ", ".join(one.name for one in fit.inequalities)

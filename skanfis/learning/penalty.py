@@ -137,8 +137,12 @@ class CommonLine:
     def pull(self, penalty: Penalty):
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
         weights = self.weights(penalty)[len(WEIGHTS) :]
-        rooted = np.sqrt(weights)[self._part, None] * self._rows
-        matrix = rooted.T @ rooted
+        if penalty.pulls:
+            rooted = np.sqrt(weights)[self._part, None] * self._rows
+            matrix = rooted.T @ rooted
+        else:
+            rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
+            matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
         if self._to_none.size:
             # What is constant has no slope to learn, but one that is held.
             matrix += penalty.slope * self._to_none.T @ self._to_none
