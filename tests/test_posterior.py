@@ -354,7 +354,7 @@ def test_out_of_range_it_is_the_deviation_of_the_tangent(kind):
         "one slope": {"consequent_features": [1]},
         "bell": {"mf": "bell"},
         "clusters": {"n_mfs": "auto", "partition": KMEANS},
-        "known": {"constraints": [FixedPoint([20.0, 0.0, 0.0], 0.3)]},
+        "known": {"constraints": [FixedPoint([20.0, 0.0, 0.0], 0.02)]},
     }.get(kind, {})
     model = ANFISRegressor(**settings).fit(X, y).model_
     out = model.spread * rng.normal(size=(60, 3)) * [1.0, 1.0, 0.5]
