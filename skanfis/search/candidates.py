@@ -3,7 +3,7 @@
 All kinds begin with one rule, a line. A grid grows by one term at a time, beside those that have
 learnt already (``trials`` knows on which input); an input that asks for no terms gets none. Of a
 tree, one leaf at a time is split (``splits``). Scattered rules stand on the clusters of k-means,
-half as many again each time.
+half as many again each time, with terms on the inputs that smaller ones have asked for.
 """
 
 from dataclasses import dataclass, replace
@@ -29,6 +29,7 @@ class Candidate:
 
     counts: tuple[int, ...]
     n_clusters: int = 0  # of scattered rules
+    inputs: tuple[int, ...] = ()  # on which these have terms
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
     has_sparse_slopes: bool = False  # where the evidence asks for no more
 
@@ -49,11 +50,12 @@ class Candidate:
         """Number of rules."""
         return self.n_clusters or prod(self.counts) + len(self.splits)
 
-    def n_terms(self, inputs):
-        """Number of terms, of scattered rules on so many inputs."""
-        if self.splits:
-            return len(self.splits)
-        return self.n_clusters * inputs.size or sum(count for count in self.counts if count > 1)
+    @property
+    def n_terms(self):
+        """Number of terms."""
+        if self.is_grid:
+            return sum(count for count in self.counts if count > 1)
+        return self.n_clusters * len(self.inputs) or len(self.splits)
 
     def describe(self):
         """In words."""
@@ -69,17 +71,16 @@ class Candidate:
         counts[j] += 1
         return replace(self, counts=tuple(counts))
 
-    def with_more_clusters(self):
-        """Half as many scattered rules again, two at least."""
+    def with_more_clusters(self, inputs):
+        """Half as many scattered rules again, two at least, with terms on these inputs too."""
         number = max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters)))
-        return replace(self, n_clusters=number)
+        return replace(self, n_clusters=number, inputs=tuple(sorted({*self.inputs, *inputs})))
 
 
-def rule_base(candidate, rows, families, inputs, spacing, seed, smaller=None):
+def rule_base(candidate, rows, families, spacing, seed, smaller=None):
     """The antecedent that a candidate begins with.
 
-    Clusters are sought in the ``rows``, on the ``inputs`` that may have terms; grids and trees keep
-    what a ``smaller`` one has learnt.
+    Clusters are sought in the ``rows``; grids and trees keep what a ``smaller`` one has learnt.
     """
     if candidate.splits:
         *before, last = candidate.splits
@@ -97,7 +98,7 @@ def rule_base(candidate, rows, families, inputs, spacing, seed, smaller=None):
         labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
         return labels[np.argsort(order)]
 
-    return clustered_antecedent(families, rows, label, inputs)
+    return clustered_antecedent(families, rows, label, np.array(candidate.inputs))
 
 
 def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):

@@ -27,7 +27,15 @@ from .candidates import Candidate, rule_base, term_scores
 from .grid import Spacing
 from .sample import effective_weight, unit_scale
 from .splits import best_splits
-from .tuning import FEW_TURNS, FIRST_PENALTY, FIRST_STEPS, Tuned, tune, with_sparse_slopes
+from .tuning import (
+    FEW_TURNS,
+    FIRST_PENALTY,
+    FIRST_STEPS,
+    MOST_TURNS,
+    Tuned,
+    tune,
+    with_sparse_slopes,
+)
 
 # Rows that a candidate sees for each of its parameters, and at least.
 _ROWS_EACH, FEWEST_ROWS = 40, 1000
@@ -79,16 +87,9 @@ class Trials:
         self.one_rule = Candidate((1,) * rows.X.shape[1])
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
-        self.scattered_inputs = plan.premise_inputs
         # A line has no premises to move: begun is done.
         line = self._train(self._problem(self.one_rule), first_steps=FIRST_STEPS)
         self._begun[self.one_rule] = self._found[self.one_rule] = line
-        # Scattered rules have terms on those inputs of which the line's residual says something.
-        scores = self._scores(self.one_rule)
-        asked = scores > _SIGNIFICANT
-        self.scattered_inputs = plan.premise_inputs[
-            asked if asked.any() else scores == scores.max(initial=0)
-        ]
 
     def _scores(self, candidate):
         # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
@@ -105,7 +106,12 @@ class Trials:
     def larger(self, kind, candidate) -> Candidate | None:
         """The next of a kind; None where there are not the rows."""
         if kind == "scattered":
-            grown = [candidate.with_more_clusters()] if self.scattered_inputs.size else []
+            scores = self._scores(candidate)
+            asked = scores > _SIGNIFICANT
+            if not (candidate.inputs or asked.any()):
+                asked = scores == scores.max(initial=0)
+            inputs = self.plan.premise_inputs[asked].tolist()
+            grown = [candidate.with_more_clusters(inputs)] if inputs or candidate.inputs else []
         elif kind == "tree":
             splits = best_splits(self.tuned(candidate), self.plan.premise_inputs, _TRIED)
             grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
@@ -128,7 +134,7 @@ class Trials:
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
         n_basis = 1 + self.plan.consequent_inputs.size
-        return candidate.n_rules * n_basis + 2 * candidate.n_terms(self.scattered_inputs)
+        return candidate.n_rules * n_basis + 2 * candidate.n_terms
 
     def _is_small(self, candidate):
         most = self.plan.max_rules or np.inf
@@ -150,8 +156,10 @@ class Trials:
                 trained = self.tuned(replace(candidate, has_sparse_slopes=False))
                 found = with_sparse_slopes(trained, self.plan.free)
             else:
+                # Grids and trees go on from what a smaller one has learnt, clusters begin anew.
+                turns = MOST_TURNS if candidate.n_clusters else FEW_TURNS
                 begun = self._begun[candidate]
-                found = self._train(begun.problem, evaluation=begun.evaluation)
+                found = self._train(begun.problem, turns, evaluation=begun.evaluation)
             self._found[candidate] = found
         return self._found[candidate]
 
@@ -173,11 +181,11 @@ class Trials:
         known, penalty = None, plan.first
         if smaller is not None:
             known, penalty = smaller.evaluation.antecedent, smaller.penalty
-        inputs, spacing, slopes = self.scattered_inputs, self.spacing, plan.consequent_inputs
-        antecedent = rule_base(candidate, rows, plan.families, inputs, spacing, plan.seed, known)
+        antecedent = rule_base(candidate, rows, plan.families, self.spacing, plan.seed, known)
+        slopes = plan.consequent_inputs
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
 
-    def _train(self, problem, turns=FEW_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
+    def _train(self, problem, turns=MOST_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
         free, weight = self.plan.free, effective_weight(problem.rows)
         premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
         return tune(problem, premise, free, weight, turns, first_steps, evaluation)

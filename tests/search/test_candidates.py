@@ -34,10 +34,10 @@ class TestCandidate:
     def test_kinds_are_told_in_words(self):
         one = Candidate((1, 1, 1))
         grid = one.with_more_terms(2).with_more_terms(0).with_more_terms(2)
-        scattered = one.with_more_clusters()
+        scattered = one.with_more_clusters([2, 0])
         assert [c.kind for c in (one, grid, scattered)] == ["one rule", "grid", "scattered"]
         assert [c.n_rules for c in (one, grid, scattered)] == [1, 6, 2]
-        assert [c.n_terms(np.array([0, 2])) for c in (one, grid, scattered)] == [0, 5, 4]
+        assert [c.n_terms for c in (one, grid, scattered)] == [0, 5, 4]
         assert [c.describe() for c in (one, grid, scattered)] == [
             "one rule",
             "grid [2, 1, 3]",
@@ -47,8 +47,12 @@ class TestCandidate:
     def test_scattered_rules_are_half_as_many_again(self):
         found = [Candidate((1,))]
         for _ in range(6):
-            found.append(found[-1].with_more_clusters())
+            found.append(found[-1].with_more_clusters([0]))
         assert [c.n_rules for c in found] == [1, 2, 3, 5, 8, 12, 18]
+
+    def test_inputs_of_scattered_rules_stay(self):
+        larger = Candidate((1,) * 4).with_more_clusters([3, 1]).with_more_clusters([0, 1])
+        assert larger == Candidate((1,) * 4, 3, (0, 1, 3))
 
 
 def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
@@ -59,7 +63,7 @@ def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
     rows = sample_of(X, clump.sum(axis=1), rng.uniform(0.5, 2.0, 90))
     turned = replace(rows, X=rows.X[:, ::-1])
     found = [
-        rule_base(Candidate((1, 1, 1), 3), own, [Gaussian] * 3, np.array([0, 2]), Spacing(own), 7)
+        rule_base(Candidate((1, 1, 1), 3, (0, 2)), own, [Gaussian] * 3, Spacing(own), 7)
         for own in (rows, turned)
     ]
     labels = rows.X[:, [0, 2]] > 0.5

@@ -121,14 +121,25 @@ class TestSequences:
         # The others say nothing of the target.
         assert sum(found[-1].counts[2:]) == 2
 
-    def test_scattered_rules_look_at_inputs_that_the_line_asks_for(self, rng):
+    def test_scattered_rules_look_at_inputs_that_smaller_ones_ask_for(self, rng):
         X, y = surface(rng, 400, 4)
         trials = trials_of(X, y + X[:, 3])
-        assert_array_equal(trials.scattered_inputs, [0, 1])
-        larger = trials.larger("scattered", trials.larger("scattered", trials.one_rule))
-        assert larger == Candidate((1, 1, 1, 1), 3)
-        groups = trials.tuned(larger).problem.antecedent.groups
+        two = trials.larger("scattered", trials.one_rule)
+        assert two == Candidate((1, 1, 1, 1), 2, (0, 1))
+        groups = trials.tuned(two).problem.antecedent.groups
         assert {int(j) for group in groups for j in group.inputs} == {0, 1}
+        assert trials.larger("scattered", two) == Candidate((1, 1, 1, 1), 3, (0, 1))
+
+    def test_a_weak_input_is_asked_for_once_the_strong_one_is_told(self, rng):
+        X = rng.uniform(-1.0, 1.0, (600, 4))
+        y = 30.0 * np.abs(X[:, 0]) + np.sin(3.0 * X[:, 2]) + 0.1 * rng.normal(size=600)
+        trials, found = trials_of(X, y), []
+        one = trials.one_rule
+        for _ in range(4):
+            one = trials.larger("scattered", one)
+            found.append(one.inputs)
+        assert found[0] == (0,)
+        assert found[-1] == (0, 2)
 
     @pytest.mark.parametrize("kind", ["grid", "tree", "scattered"])
     @pytest.mark.parametrize("most", [None, 4])
@@ -164,7 +175,7 @@ def test_a_candidate_sees_as_many_rows_as_its_parameters_need(rng):
         (20, 8000),
         (90, 9000),
     ):
-        candidate = Candidate((1, 1), n_clusters)
+        candidate = Candidate((1, 1), n_clusters, (0, 1) if n_clusters else ())
         assert trials.n_parameters(candidate) == max(n_clusters, 1) * 3 + 4 * n_clusters
         rows = trials.rows_for(candidate)
         assert rows.n_rows == n_rows
