@@ -121,6 +121,18 @@ def make_parser():
     return parser
 
 
+def check_kind(parser, options):
+    """UsageError for options that say nothing of what is asked for: a calibration, or --apply."""
+    of_apply = {"apply", "trust"}
+    of_both = {"logs", "columns", "units", "output", "force", "quiet"}
+    idle = vars(options).keys() - of_both - of_apply if options.apply else of_apply
+    given = [name for name in sorted(idle) if getattr(options, name) != parser.get_default(name)]
+    if given:
+        named = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+        what = "a calibration, and --apply takes a model as it is" if options.apply else "--apply"
+        raise UsageError(f"{named}: that is of {what}.")
+
+
 def request_of(options, require, assumed=None):
     """What the options ask of a reading; UsageError where they name an unknown part or unit.
 

@@ -25,7 +25,7 @@ from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._headline import errors_and_verdict, rules_text
-from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
+from ._options import PROGRAM, ReportOptions, check_kind, check_once, make_parser, request_of
 from ._results import Results
 from ._source import open_source
 from ._split import choose_split
@@ -52,9 +52,10 @@ def main(arguments=None):
     """Run the command; returns its exit code."""
     parser = make_parser()
     options = parser.parse_args(arguments)
-    options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
     tell = _progress(options.quiet)
     try:
+        check_kind(parser, options)
+        options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
         if arguments is None:
             # Which __main__.py has set aside.
             for number in (signal.SIGINT, signal.SIGTERM):
@@ -297,7 +298,12 @@ def _compensator_of(options):
     _write_to(sys.stderr, f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
     if not options.trust:
         raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
-    found = joblib.load(path)
+    try:
+        found = joblib.load(path)
+    except OSError:
+        raise
+    except Exception as error:  # whatever a damaged pickle raises
+        raise UsageError(f"{path} is no file of joblib, or a damaged one.") from error
     if not isinstance(found, GyroCompensator):
         raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
     return found
@@ -309,12 +315,13 @@ def _summary_of_rates(target, rates, rate=None):
     for name, bit in STATUS.items():
         if count := ((status & bit) != 0).sum():
             yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}"
-    good = status == 0
-    if rate is not None and good.any():
-        before, after = (
-            rms((rates[f"rate_{k}"] - rate)[good]) for k in ("indicated", "compensated")
-        )
-        yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after (rows with status 0)"
+    for rows, where in ((status == 0, "rows with status 0"), (status != 0, "flagged rows")):
+        rows &= rates["rate_compensated"].notna()
+        if rate is not None and rows.any():
+            before, after = (
+                rms((rates[f"rate_{k}"] - rate)[rows]) for k in ("indicated", "compensated")
+            )
+            yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after ({where})"
 
 
 def _progress(quiet):

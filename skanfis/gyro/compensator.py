@@ -199,6 +199,8 @@ class GyroCompensator:
             return cls(**_settings(json.loads(data.decode("utf-8"))))
         except (ValueError, RecursionError) as error:
             reason = str(error).removesuffix(".")
+            if isinstance(error, UnicodeDecodeError | json.JSONDecodeError):
+                reason = "it is not the JSON that a compensator.json holds"
             raise ValueError(f"{path} is no gyro compensator: {reason}.") from error
 
 

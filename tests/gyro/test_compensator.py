@@ -237,5 +237,6 @@ def test_what_is_no_json_is_refused(tmp_path):
     path = tmp_path / "compensator.json"
     for content in (b"\xff", b"{", b"[" * 100_000):
         path.write_bytes(content)
-        with pytest.raises(ValueError, match="is no gyro compensator"):
+        with pytest.raises(ValueError, match="is no gyro compensator") as refused:
             GyroCompensator.read_json(path)
+        assert ("it is not the JSON that" in str(refused.value)) == (len(content) == 1)
