@@ -150,12 +150,21 @@ def _settle_rest(reading, tell):
     except LogError as error:
         if "rate" in log:
             return False
+        layout = reading.files[0].layout
         raise LogError(
-            f"there is no column 'rate' for the true rate among "
-            f"{', '.join(map(repr, reading.files[0].layout.header[:20]))}, and the output "
-            f"{error.reason} Say which it is (--columns rate=NAME)."
+            f"{layout.name('output')!r} is taken for the output, no column for the true rate is "
+            f"found among {', '.join(map(repr, layout.header[:20]))}, and the output "
+            f"{error.reason} Say which they are (--columns output=NAME rate=NAME)."
         ) from error
-    what = "the rate is zero throughout" if "rate" in log else "there is no column for the rate"
+    what = "there is no column for the rate"
+    if "rate" in log:
+        name, largest = reading.files[0].layout.name("rate"), log["rate"].abs().max()
+        what = f"the rate of {name!r} is zero throughout"
+        if largest:
+            what = (
+                f"the rate of {name!r} is within {largest:.3g} deg/s of zero and not used (if that "
+                f"is the gyro's own: --columns 'output={name}')"
+            )
     reading.notes.append(f"{what}, and the output does not move: taken as at rest")
     tell(f"note: {reading.notes[-1]}")
     reading.log = log.assign(rate=0.0)

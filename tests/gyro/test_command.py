@@ -434,6 +434,27 @@ def test_a_thermal_cycle_at_rest(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("no_report")
+def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(tmp_path, capsys):
+    log = thermal_cycle(20, -20, 60, 20).rename(columns={"gyro_y_dps": "rate [dps]"})
+    log["rate [dps]"] *= 0.05
+    path, options = tmp_path / "mems.csv", ["--write", "constant"]
+    log.to_csv(path, index=False)
+    assert main([str(path), *options, "--output", str(tmp_path / "out")]) == 0
+    told = f"within {log['rate [dps]'].abs().max():.3g} deg/s of zero and not used (if that is the"
+    assert told in capsys.readouterr().out
+    log.assign(gyro_x_dps=3).to_csv(path, index=False)
+    assert main([str(path), *options]) == 3
+    assert "all values are 3" in (said := capsys.readouterr().err)
+    assert "--columns output=NAME" in said
+    log.drop(columns="rate [dps]").assign(gyro_x_dps=3).to_csv(path, index=False)
+    assert main([str(path), *options]) == 3
+    assert "'gyro_x_dps' is taken for the output, no column for the true rate" in (
+        said := capsys.readouterr().err
+    )
+    assert "the output is 3 throughout: no gyro gives that." in said
+
+
+@pytest.mark.usefixtures("no_report")
 def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_path, capsys):
     log = thermal_cycle(-20, 60, -20)
     log["gyro_x_lsb"] = (131.0 * log["gyro_x_dps"]).round()
