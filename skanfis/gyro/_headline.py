@@ -157,8 +157,7 @@ def proven_bounds(calibration):
     if isinstance(getattr(rules, "base_", None), Polynomial):
         error = ErrorModel(compensator, rules, X)
         return Proven(float(np.abs(error.ranges(*error.ends.T[:, :, None])[0]).max()))
-    rules = getattr(rules, "residual_", rules)
-    rules = rules.model if isinstance(rules, FrozenRules) else rules
+    rules = getattr(rules, "residual_", rules).model
     found = bounds(rules, max_boxes=_MOST_BOXES)
     largest = float(np.abs([found.lower, found.upper]).max())
     if compensator.predicts == "rate" or "output" not in X:

@@ -234,9 +234,7 @@ def _write(calibration, options, files, folder):
 
         weasyprint.HTML(string=page).write_pdf(folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
-    # To the last bit the same, at the edge of its range too.
-    same = GyroCompensator.read_json(folder / "compensator.json")
-    joblib.dump(same, folder / "compensator.joblib")
+    joblib.dump(compensator, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
         export_c_compensator(compensator, folder / "compensator", std=options.c)

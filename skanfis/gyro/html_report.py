@@ -27,7 +27,6 @@ from ._headline import (
 )
 from ._simpler import NAMES, NOTHING
 from .c_code import notes_on, units_of
-from .compose import FrozenRules
 from .displays import figures, signs
 from .metrics import rms
 
@@ -84,7 +83,8 @@ def report_page(results, title):
     kept = kept and all(check.result == "pass" for check in results.checks)
     return _template().render(
         title=f"Gyro compensation: {title}",
-        subtitle=f"{what}: the gyro's {target} from {', '.join(map(_words, recipe.inputs))}.",
+        subtitle=f"{what}: the gyro's {target} from "
+        f"{', '.join(map(_words, calibration.compensator.inputs))}.",
         verdict=headline(calibration, results.unit)[0],
         verdict_kind="good" if kept else "bad",
         reasons=map(signs, _reasons(results)),
@@ -261,9 +261,7 @@ def _pictures(results):
 def _use(results):
     calibration = results.calibration
     compensator = calibration.compensator
-    rules = compensator.estimator
-    rules = getattr(rules, "residual_", rules)
-    model = rules.model if isinstance(rules, FrozenRules) else rules[-1].model_
+    model = getattr(compensator.estimator, "residual_", compensator.estimator).model
     policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     text = (
         f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
@@ -339,9 +337,10 @@ def _log(results):
 
 
 def _box(calibration, caption=""):
+    X = calibration.X[list(calibration.compensator.inputs)]
     lines = [
         (_words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name))
-        for name, low, high in calibration.X.agg(["min", "max"]).T.itertuples()
+        for name, low, high in X.agg(["min", "max"]).T.itertuples()
     ]
     return _table(["input", "from", "to", "unit"], lines, caption)
 

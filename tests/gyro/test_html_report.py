@@ -138,9 +138,8 @@ def test_physics_shows_its_law(few_rivals, no_drawing):
     assert f"{law.thermometer_lag_:.8g} s * temperature_rate [degC/s]" in text
     # The simulated thermometer's, of 180 s to 20 %, less that of the low-pass of its rate.
     assert 100.0 < law.thermometer_lag_ < 260.0
-    estimator = calibration.compensator.estimator
     taught = calibration.rate - law.predict(calibration.X)
-    findings = readability(estimator.residual_, calibration.X, taught).findings
+    findings = readability(calibration.rules, calibration.X, taught).findings
     section = text[text.index("Can the rules be read?") :]
     for sentence in findings or ["Nothing measured here speaks against"]:
         assert sentence in section
