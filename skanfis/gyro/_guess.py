@@ -10,7 +10,7 @@ import pandas as pd
 from ._checks import PARTS
 from ._columns import CANONICAL, declared_units, unit_in
 from ._source import Clock, as_numbers
-from ._units import assumed_text, settle_units
+from ._units import settle_units
 from .errors import LogError
 
 _SAMPLE_ROWS = 100_000
@@ -101,7 +101,7 @@ def checked_request(request):
 class Layout:
     """Places of the parts in a file and their units there; ``others`` would do as well.
 
-    ``assumed`` has sentences by part on units that are neither told nor in the names.
+    ``assumed`` are parts whose units are neither told nor in the names.
     """
 
     header: list
@@ -109,7 +109,7 @@ class Layout:
     units: dict
     notes: list = field(default_factory=list)
     others: dict = field(default_factory=dict)
-    assumed: dict = field(default_factory=dict)
+    assumed: list = field(default_factory=list)
 
     def name(self, part):
         return self.header[self.places[part]] if part in self.places else part
@@ -275,11 +275,7 @@ def _settle_units(columns, layout, of_first):
     else:
         found = {part: of_first.get(part, CANONICAL[part]) for part in lacking}
     layout.units |= found
-    layout.assumed = {
-        part: assumed_text(values[part], part, layout.name(part), found[part])
-        for part in PARTS
-        if part in found
-    }
+    layout.assumed = [part for part in PARTS if part in found]
 
 
 def _sentences(layout):

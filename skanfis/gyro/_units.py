@@ -55,7 +55,8 @@ def settle_by_all(log, layout):
 
 
 def assumed_text(values, part, name, unit):
-    """What was assumed of a part, with its range and another reading."""
+    """What was assumed of a part, with its range and another reading; of values as in a log."""
+    values = convert_back(np.array([values.min(), values.max()]), part, unit)
     if unit in SIGNALS:
         return f"{name!r} has no unit, taken as a raw signal ({_range(values)})"
     other = {"temperature": "degF", "time": "ms"}.get(part, "rad/s")

@@ -20,7 +20,7 @@ from ._checks import LABELS, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, checked_request, settle
 from ._source import NO_VALUE, Clock, as_numbers, open_source
-from ._units import settle_by_all
+from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
 from .metrics import rows_by_run
 
@@ -152,6 +152,10 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
+    assumed = {
+        part: assumed_text(table[part], part, layout.name(part), layout.units[part])
+        for part in layout.assumed
+    }
     n_rows, every = len(table), 1
     while len(table) > most_rows * every:
         every *= 2
@@ -175,7 +179,7 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if "device" in layout.places:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
     notes = list(dict.fromkeys(notes))
-    return Reading(log, file, row, files, notes, n_rows, digests, layout.assumed)
+    return Reading(log, file, row, files, notes, n_rows, digests, assumed)
 
 
 class LogFile:
