@@ -84,6 +84,10 @@ def flagged_text(calibration):
     n_rows, n_flagged = calibration.inside.size, np.count_nonzero(~calibration.inside)
     if not n_flagged:
         return f"None of the {n_rows:,} held-out rows was flagged."
+    X, counts = calibration.X, 0
+    for train, test in calibration.split.folds:
+        flagged, seen = X.iloc[test][~calibration.inside[test]], X.iloc[train]
+        counts += n_beyond(flagged, seen.min(), seen.max())
     share = n_flagged / n_rows
     advice = "They are the ends of the range, which no other group reaches."
     if share > _MANY_FLAGGED:
@@ -91,7 +95,21 @@ def flagged_text(calibration):
             "That is much: the figures say nothing of these rows. Log groups that overlap more, "
             "above all at both ends of the range."
         )
-    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged. {advice}"
+    return (
+        f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged{to_blame(counts)}. "
+        f"{advice}"
+    )
+
+
+def n_beyond(rows, low, high):
+    """How many rows of a table lie out of the range of each input."""
+    return ((rows < low) | (rows > high)).sum()
+
+
+def to_blame(counts):
+    """The inputs that rows are flagged for, in words."""
+    named = [f"{name} in {n:,}" for name, n in counts.sort_values(ascending=False).items() if n]
+    return f" ({', '.join(named)})" if named else ""
 
 
 def errors_and_verdict(calibration):

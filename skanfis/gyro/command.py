@@ -24,13 +24,14 @@ from ..inspection.text import counted
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._headline import errors_and_verdict, rules_text
+from ._headline import errors_and_verdict, n_beyond, rules_text, to_blame
 from ._options import PROGRAM, ReportOptions, check_kind, check_once, make_parser, request_of
 from ._results import Results
 from ._source import open_source
 from ._split import choose_split
 from .c_code import export_c_compensator
-from .compensator import INPUTS, GyroCompensator
+from .compensator import INPUTS, GyroCompensator, features
+from .compose import FrozenRules
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, specification
 from .log import find_logs, read
@@ -287,7 +288,12 @@ def _apply(options, tell):
     with _staged(target.parent) as folder:
         # Twelve digits are beyond any gyro, and short beside the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
-    _say(_summary_of_rates(target, rates, log.get("rate")))
+    rules, flagged = getattr(compensator.estimator, "residual_", compensator.estimator), ""
+    if isinstance(rules, FrozenRules):  # as in all that the command writes
+        X = features(log, compensator.inputs, compensator.time_constant)[rates["status"] & 1 != 0]
+        ends = rules.model.minimum, rules.model.maximum
+        flagged = to_blame(n_beyond(X.iloc[:, rules.positions], *ends))
+    _say(_summary_of_rates(target, rates, flagged, log.get("rate")))
     tell("done")
     return DONE
 
@@ -316,12 +322,13 @@ def _compensator_of(options):
     return found
 
 
-def _summary_of_rates(target, rates, rate=None):
+def _summary_of_rates(target, rates, flagged, rate=None):
     status = rates["status"]
     yield f"written        {target}: {len(rates):,} rows, {(status != 0).sum():,} flagged"
     for name, bit in STATUS.items():
         if count := ((status & bit) != 0).sum():
-            yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}"
+            told = flagged if name == "OUT_OF_RANGE" else ""
+            yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}{told}"
     for rows, where in ((status == 0, "rows with status 0"), (status != 0, "flagged rows")):
         rows &= rates["rate_compensated"].notna()
         if rate is not None and rows.any():

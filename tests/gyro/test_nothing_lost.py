@@ -105,6 +105,7 @@ def test_apply_tells_errors_of_flagged_rows_apart(files, tmp_path, capsys):
     out = capsys.readouterr().out
     assert "1.5 deg/s before, 1 after (rows with status 0)" in out
     assert "2.5 deg/s before, 2 after (flagged rows)" in out
+    assert "3 rows out of range (temperature in 3)" in out
 
 
 @pytest.mark.parametrize(
