@@ -113,7 +113,8 @@ def make_parser():
     add("--output", told, type=Path)
     told = "what is recommended (default), or another: the rules of the model, or what is simpler"
     add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
-    add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
+    told = "also write the model as C, by this standard, in double precision or in float"
+    add("--c", told, choices=("c99", "c89", "c99:float", "c89:float"))
     told = f"also a simple target, where it is good enough: {_TARGETS}"
     add("--target", told, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")

@@ -238,7 +238,8 @@ def _write(calibration, options, files, folder):
     joblib.dump(compensator, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
-        export_c_compensator(compensator, folder / "compensator", std=options.c)
+        std, _, dtype = options.c.partition(":")
+        export_c_compensator(compensator, folder / "compensator", std=std, dtype=dtype or "double")
     return results.checks
 
 

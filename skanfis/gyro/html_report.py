@@ -12,7 +12,7 @@ import sklearn
 
 from .. import __version__
 from ..inspection.labels import printable
-from ..policies import policy_in_words
+from ..policies import SILENT, policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
 from ._headline import (
     ARTICLES,
@@ -26,7 +26,7 @@ from ._headline import (
     written_text,
 )
 from ._simpler import NAMES, NOTHING
-from .c_code import notes_on, units_of
+from .c_code import LAW_GOES_ON, notes_on, units_of
 from .displays import figures, signs
 from .metrics import rms
 
@@ -263,8 +263,11 @@ def _use(results):
     compensator = calibration.compensator
     model = getattr(compensator.estimator, "residual_", compensator.estimator).model
     policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
+    if compensator.predicts == "rate" and model.out_of_bounds not in SILENT:
+        policy = f"of what is added to the law {policy}"
+        policy = policy if model.coefficients.any() else LAW_GOES_ON
     text = (
-        f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
+        f"Outside the ranges below, input by input, a row is flagged (status 1), and {policy}. "
         "Inside them, rows near which there are hardly any data "
         f"(coverage below {compensator.min_coverage:g}) are flagged too (status 4). The C code "
         "that --c writes flags the same rows with the same numbers."

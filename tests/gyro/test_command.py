@@ -135,17 +135,17 @@ def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path
 
 @pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize(
-    ("write", "kind"),
+    ("write", "kind", "c"),
     [
-        ("recommended", "the arcsine law"),
-        ("none", "no compensation"),
-        ("cubic", "a cubic polynomial"),
-        ("line", "a straight line"),
+        ("recommended", "the arcsine law", "c99:float"),
+        ("none", "no compensation", "c89"),
+        ("cubic", "a cubic polynomial", "c89:float"),
+        ("line", "a straight line", "c99"),
     ],
 )
-def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind, capsys):
+def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind, c, capsys):
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
-    arguments = [path, "--inputs", "temperature", "output", "--terms", "1,1", "--c", "c99"]
+    arguments = [path, "--inputs", "temperature", "output", "--terms", "1,1", "--c", c]
     assert main([*arguments, "--write", write, "--output", str(out)]) == 0
     said = capsys.readouterr().out
     assert f"written is     {kind}, as" in said
@@ -166,6 +166,11 @@ def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind,
     header = (out / "compensator.h").read_text(encoding="ascii")
     assert "Unit assumed: 'output' has no unit, taken as deg/s" in header
     assert "[0] temperature" in header
+    assert f"; {c[:3].upper()}, {'float' if 'float' in c else 'double'}." in header
+    # A law alone has no rules, and no edge that is held.
+    goes_on = "Outside this range the law goes on as it is." in header
+    assert goes_on == (write == "recommended")
+    assert "the rules" not in header
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.index("&#39;output&#39; has no unit, taken as deg/s") < page.index("<section>")
     assert compensator.units["output"] == "deg/s"
