@@ -9,7 +9,7 @@ import pandas as pd
 
 from ._checks import PARTS
 from ._columns import CANONICAL, declared_units, unit_in
-from ._source import Clock, as_numbers
+from ._source import CLOCK, Clock, as_numbers, dated
 from ._units import settle_units
 from .errors import LogError
 
@@ -110,6 +110,7 @@ class Layout:
     notes: list = field(default_factory=list)
     others: dict = field(default_factory=dict)
     assumed: list = field(default_factory=list)
+    dates: list = field(default_factory=list)  # places of those of a time without a date
 
     def name(self, part):
         return self.header[self.places[part]] if part in self.places else part
@@ -167,6 +168,11 @@ def _guess(source, request, layout, first):
         layout.places.setdefault("rate", called_rate)
     of_first = request.assumed if first is None else first.units
     _settle_axis(columns, layout)
+    place, taken = layout.places.get("time"), set(layout.places.values())
+    if place is not None and columns[place].is_time and Clock(sample[place]).form == CLOCK:
+        texts = [each.place for each in columns if each.numbers.size == 0]
+        moments = {k: Clock(dated(sample[k], sample[place])) for k in texts if k not in taken}
+        layout.dates = [k for k, clock in moments.items() if clock.form][:1]
     _settle_units(columns, layout, of_first)
     layout.notes += _sentences(layout)
 
@@ -287,6 +293,7 @@ def _sentences(layout):
         told.append(
             f"{part} = {name!r}"
             + (f" in {unit}" if unit else "")
+            + "".join(f" on {layout.header[k]!r}" for k in layout.dates if part == "time")
             + (f" ({others} would do too)" if others else "")
         )
     yield f"columns: {'; '.join(told)}. Say otherwise with --columns and --units"

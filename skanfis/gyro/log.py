@@ -19,7 +19,7 @@ import pandas as pd
 from ._checks import LABELS, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, checked_request, settle
-from ._source import NO_VALUE, Clock, as_numbers, open_source
+from ._source import NO_VALUE, Clock, as_numbers, dated, open_source
 from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
 from .metrics import rows_by_run
@@ -250,14 +250,16 @@ class LogFile:
 
     def _converted(self):
         """All rows, in the units of a log."""
-        places = self.layout.places
+        places, dates = self.layout.places, self.layout.dates
         labels = [places[part] for part in LABELS if part in places]
         columns: dict = {part: [] for part in places}
-        for table in self.source.pieces(list(places.values()), _ROWS, labels):
+        for table in self.source.pieces([*places.values(), *dates], _ROWS, labels):
             self.n_rows += len(table)
             try:
                 for part, place in places.items():
                     values = table[place]
+                    if part == "time" and dates:
+                        values = dated(table[dates[0]], values)
                     if part not in LABELS:
                         values = pd.Series(self._numbers(values, part), table.index)
                     check_values(values, part, self._is_command)
