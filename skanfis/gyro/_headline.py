@@ -7,6 +7,7 @@ import numpy as np
 from ..bounds import bounds, gradient_bounds
 from ..export import fold
 from ..inspection import export_text, readability
+from ..inspection.readability import GREATEST_ERROR
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NAMES, NOTHING
 from .compose import FrozenRules, Polynomial
@@ -17,6 +18,7 @@ from .targets.error_model import ErrorModel
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
+_DIGITS = 4  # of what the noise makes of numbers: with them the text errs as the rules do
 _MOST_ROWS = 20_000  # evenly chosen, to see whether the rules can be read
 _MANY_FLAGGED = 0.2  # of the rows
 _MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter
@@ -133,8 +135,8 @@ def errors_and_verdict(calibration):
     title, reason = headline(calibration, "deg/s")
     lines.append(f"VERDICT        {title}. {reason}")
     lines.append(f"written is     {written_text(calibration)}")
-    if calibration.writes_model and (findings := readability_of(calibration).findings):
-        lines.append(f"rules          against reading them one by one: {findings[0]}")
+    if calibration.writes_model and (against := against_reading(calibration)):
+        lines.append(f"rules          against reading them one by one: {against[0]}")
     return lines
 
 
@@ -145,16 +147,19 @@ def written_text(calibration):
     return f"{ARTICLES.get(calibration.written, 'the fuzzy rules')}, {others}"
 
 
-def readability_of(calibration):
-    """Whether the rules can be read: against what the law leaves of the rate, or the error."""
+def against_reading(calibration):
+    """What speaks against reading the rules, of what the law leaves of the rate or the error.
+
+    Not that they err in few digits: their text has more.
+    """
     places = evenly_chosen(len(calibration.X), _MOST_ROWS)
-    X, estimator = calibration.X.iloc[places], calibration.model
-    if not calibration.recipe.physics:
-        return readability(estimator, X, (calibration.before - calibration.rate)[places])
-    left = calibration.rate[places] - estimator.base_.predict(X)
+    X, left = calibration.X.iloc[places], (calibration.before - calibration.rate)[places]
+    if calibration.recipe.physics:
+        left = calibration.rate[places] - calibration.model.base_.predict(X)
     # Rows that the law refuses are no business of the rules.
     known = np.isfinite(left)
-    return readability(calibration.rules, X[known], left[known])
+    found = readability(calibration.rules, X[known], left[known])
+    return found.findings[int(found.summary["text_over_model"] > GREATEST_ERROR) :]
 
 
 class Proven(NamedTuple):
@@ -200,25 +205,24 @@ def formula_of(calibration, name):
     return f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n{text}"
 
 
-def rules_text(calibration, found=None):
+def rules_text(calibration):
     """What is written, as text: a formula, or the rules as sentences.
 
     Before these stand what speaks against reading them, and the law's formula.
     """
     if not calibration.writes_model:
         return f"{formula_of(calibration, calibration.written)}\n"
-    found = readability_of(calibration) if found is None else found
-    caution = ""
-    if found.findings:
+    recipe, law, caution = calibration.recipe, "", ""
+    if against := against_reading(calibration):
         head = "What speaks against reading the rules one by one:"
-        caution = "\n".join([head, *found.findings, "", ""])
-    estimator = calibration.model
+        caution = "\n".join([head, *against, "", ""])
+    if recipe.physics:
+        law = f"{law_text(calibration.model.base_, recipe)}\nTo this rate is added what the rules "
+        law += "give.\n\n"
     # Folded, a model knows of no readability in training, and the text has the caution once.
-    if calibration.recipe.physics:
-        rules = export_text(fold(estimator.residual_), output_names=["rate beyond the law"])
-        law = law_text(estimator.base_, calibration.recipe)
-        return f"{law}\nTo this rate is added what the rules give.\n\n{caution}{rules}\n"
-    return f"{caution}{export_text(fold(estimator), output_names=['error'])}\n"
+    names = ["rate beyond the law" if recipe.physics else "error"]
+    rules = export_text(fold(calibration.rules), precision=_DIGITS, output_names=names)
+    return f"{law}{caution}{rules}\n"
 
 
 def law_text(law, recipe):

@@ -16,12 +16,12 @@ from ..policies import SILENT, policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
 from ._headline import (
     ARTICLES,
+    against_reading,
     flagged_text,
     formula_of,
     headline,
     held_out_groups,
     proven_bounds,
-    readability_of,
     rules_text,
     written_text,
 )
@@ -300,19 +300,19 @@ def _written(results):
         )
         formula = Block("open", formula_of(calibration, name), "What to compute")
         return "What is written", [Block("text", text), formula, _on_board(calibration)]
-    found = readability_of(calibration)
+    against = against_reading(calibration)
     n_rules, terms = calibration.rules[-1].n_rules_, " × ".join(map(str, calibration.terms))
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         Block("pictures", list(results.memberships())),
         Block(
             "details",
-            rules_text(calibration, found),
+            rules_text(calibration),
             f"All rules as text ({n_rules}, terms {terms})",
         ),
         _on_board(calibration),
         Block("heading", "Can the rules be read?"),
-        *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
+        *([Block("warn", sentence) for sentence in against] or [Block("text", fit)]),
     ]
 
 
