@@ -119,10 +119,10 @@ def errors_and_verdict(calibration):
     before, after = (rates - calibration.rate for rates in (calibration.before, calibration.after))
     inside = calibration.in_range
     outside = ~calibration.inside & np.isfinite(after)
-    peak = np.abs(after[inside]).max()
+    peak, constant = np.abs(after[inside]).max(), calibration.verdict.rms["constant"]
     lines = [
-        f"error before   {rms(before[inside]):.4g} deg/s RMS, on {inside.sum():,} held-out rows "
-        "in range",
+        f"error before   {rms(before[inside]):.4g} deg/s RMS, {constant:.4g} once a constant (the "
+        f"output at rest) is taken off, on {inside.sum():,} held-out rows in range",
         f"error after    {rms(after[inside]):.4g} deg/s RMS, peak {peak:.4g}, on the same rows",
     ]
     if outside.any():

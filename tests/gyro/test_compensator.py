@@ -12,6 +12,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis.datasets import make_ofog
+from skanfis.export import export_c
 from skanfis.gyro import (
     GyroCompensator,
     OpenLoopArcsineRegressor,
@@ -121,6 +122,10 @@ def test_json_gives_the_same_compensator(log, compensator, parameters, tmp_path)
         used = tuple(name for name in INPUTS if name in {"output", "time", *taken.values()})
     assert (read.inputs, read.scale_factor) == (used, FACTOR)
     if parameters is None:
+        with pytest.raises(TypeError, match=r"got FrozenRules.* Its model is one\.$"):
+            export_c(read.estimator, name="gyro")
+        code = export_c(read.estimator.model, name="gyro")
+        assert code.source == export_c(compensator.estimator, name="gyro").source
         return
     # What was read can be written as C too.
     codes = [export_c_physics(part.estimator, name="gyro") for part in (compensator, read)]
