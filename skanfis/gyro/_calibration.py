@@ -82,10 +82,6 @@ class Verdict:
     def model(self):
         return list(self.rms)[-1]
 
-    @property
-    def model_is_worth_it(self):
-        return self.recommended == self.model
-
 
 @dataclass(frozen=True, eq=False)
 class Calibration:

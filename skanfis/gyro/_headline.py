@@ -30,7 +30,7 @@ def headline(calibration, unit):
     left = {
         name: f"{figures(RATE_UNITS[unit] * error)} {unit}" for name, error in verdict.rms.items()
     }
-    if verdict.model_is_worth_it:
+    if verdict.recommended == verdict.model:
         simpler = [name for name in verdict.rms if name not in (NOTHING, verdict.model)]
         best = min(simpler, key=verdict.rms.get)
         gain = verdict.gains[best]
@@ -86,30 +86,23 @@ def flagged_text(calibration):
     n_rows, n_flagged = calibration.inside.size, np.count_nonzero(~calibration.inside)
     if not n_flagged:
         return f"None of the {n_rows:,} held-out rows was flagged."
-    X, counts = calibration.X, 0
-    for train, test in calibration.split.folds:
-        flagged, seen = X.iloc[test][~calibration.inside[test]], X.iloc[train]
-        counts += n_beyond(flagged, seen.min(), seen.max())
-    share = n_flagged / n_rows
+    X, share = calibration.X, n_flagged / n_rows
+    named = beyond(
+        (X.iloc[test][~calibration.inside[test]], *X.iloc[train].agg(["min", "max"]).to_numpy())
+        for train, test in calibration.split.folds
+    )
     advice = "They are the ends of the range, which no other group reaches."
     if share > _MANY_FLAGGED:
         advice = (
             "That is much: the figures say nothing of these rows. Log groups that overlap more, "
             "above all at both ends of the range."
         )
-    return (
-        f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged{to_blame(counts)}. "
-        f"{advice}"
-    )
+    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged{named}. {advice}"
 
 
-def n_beyond(rows, low, high):
-    """How many rows of a table lie out of the range of each input."""
-    return ((rows < low) | (rows > high)).sum()
-
-
-def to_blame(counts):
-    """The inputs that rows are flagged for, in words."""
+def beyond(parts):
+    """In how many rows each input is out of its range, in words: of tables, lows and highs."""
+    counts = sum(((rows < low) | (rows > high)).sum() for rows, low, high in parts)
     named = [f"{name} in {n:,}" for name, n in counts.sort_values(ascending=False).items() if n]
     return f" ({', '.join(named)})" if named else ""
 
@@ -148,10 +141,7 @@ def written_text(calibration):
 
 
 def against_reading(calibration):
-    """What speaks against reading the rules, of what the law leaves of the rate or the error.
-
-    Not that they err in few digits: their text has more.
-    """
+    """What speaks against reading the rules; not that they err in few digits: the text has more."""
     places = evenly_chosen(len(calibration.X), _MOST_ROWS)
     X, left = calibration.X.iloc[places], (calibration.before - calibration.rate)[places]
     if calibration.recipe.physics:
@@ -217,8 +207,7 @@ def rules_text(calibration):
         head = "What speaks against reading the rules one by one:"
         caution = "\n".join([head, *against, "", ""])
     if recipe.physics:
-        law = f"{law_text(calibration.model.base_, recipe)}\nTo this rate is added what the rules "
-        law += "give.\n\n"
+        law = f"{law_text(calibration.model.base_, recipe)}\nTo this rate the rules add:\n\n"
     # Folded, a model knows of no readability in training, and the text has the caution once.
     names = ["rate beyond the law" if recipe.physics else "error"]
     rules = export_text(fold(calibration.rules), precision=_DIGITS, output_names=names)

@@ -113,8 +113,8 @@ def make_parser():
     add("--output", told, type=Path)
     told = "what is recommended (default), or another: the rules of the model, or what is simpler"
     add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
-    told = "also write the model as C, by this standard, in double precision or in float"
-    add("--c", told, choices=("c99", "c89", "c99:float", "c89:float"))
+    stds = ("c99", "c89", "c99:float", "c89:float")
+    add("--c", "also write the model as C, by this standard, in double or float", choices=stds)
     told = f"also a simple target, where it is good enough: {_TARGETS}"
     add("--target", told, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")
@@ -123,15 +123,13 @@ def make_parser():
 
 
 def check_kind(parser, options):
-    """UsageError for options that say nothing of what is asked for: a calibration, or --apply."""
-    of_apply = {"apply", "trust"}
-    of_both = {"logs", "columns", "units", "output", "force", "quiet"}
-    idle = vars(options).keys() - of_both - of_apply if options.apply else of_apply
+    """UsageError for options that have no say with --apply, or without it."""
+    of_both = {"logs", "columns", "units", "output", "force", "quiet", "apply", "trust"}
+    idle = vars(options).keys() - of_both if options.apply else {"trust"}
     given = [name for name in sorted(idle) if getattr(options, name) != parser.get_default(name)]
     if given:
         named = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-        what = "a calibration, and --apply takes a model as it is" if options.apply else "--apply"
-        raise UsageError(f"{named}: that is of {what}.")
+        raise UsageError(f"{named}: of no use with{'' if options.apply else 'out'} --apply.")
 
 
 def request_of(options, require, assumed=None):

@@ -86,10 +86,9 @@ def kinds(inputs, policy="linear"):
     """Name, what it predicts, and what fits it to rows: to X, y, and a rule that gives zero."""
 
     def law(X, y, zero):
-        # Flagged by the inputs that it takes: it is asked for no others.
         fitted = make_law(inputs, 1, policy).fit(X, y)
-        places = np.sort(fitted.columns_)
-        rule = fitted_rule(X.iloc[:, places], np.zeros(len(X)), 0, policy)
+        places = np.sort(fitted.columns_)  # the inputs that it is asked for, and flagged by
+        rule = fitted_rule(X.iloc[:, places], 0.0 * y, 0, policy)
         return joined(fitted, replace(rule, positions=places))
 
     def law_and_line(X, y, zero):

@@ -5,6 +5,7 @@ It writes files all together or not at all.
 
 import contextlib
 import os
+import pickle
 import platform
 import shlex
 import shutil
@@ -16,6 +17,7 @@ from datetime import datetime
 from pathlib import Path
 
 import joblib
+import numpy as np
 import pandas as pd
 
 from ..export.c.dialect import STATUS
@@ -24,7 +26,7 @@ from ..inspection.text import counted
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._headline import errors_and_verdict, n_beyond, rules_text, to_blame
+from ._headline import beyond, errors_and_verdict, rules_text
 from ._options import PROGRAM, ReportOptions, check_kind, check_once, make_parser, request_of
 from ._results import Results
 from ._source import open_source
@@ -145,13 +147,12 @@ def _read(options, paths, tell):
 
 def _settle_rest(reading, tell):
     """Whether the gyro was at rest; the log then has a rate of zero."""
-    log = reading.log
+    log, layout = reading.log, reading.files[0].layout
     try:
         check_at_rest(log, reading.units["output"])
     except LogError as error:
         if "rate" in log:
             return False
-        layout = reading.files[0].layout
         raise LogError(
             f"{layout.name('output')!r} is taken for the output, no column for the true rate is "
             f"found among {', '.join(map(repr, layout.header[:20]))}, and the output "
@@ -159,13 +160,9 @@ def _settle_rest(reading, tell):
         ) from error
     what = "there is no column for the rate"
     if "rate" in log:
-        name, largest = reading.files[0].layout.name("rate"), log["rate"].abs().max()
-        what = f"the rate of {name!r} is zero throughout"
-        if largest:
-            what = (
-                f"the rate of {name!r} is within {largest:.3g} deg/s of zero and not used (if that "
-                f"is the gyro's own: --columns 'output={name}')"
-            )
+        name, largest = layout.name("rate"), log["rate"].abs().max()
+        own = f" (if it is the gyro's own: --columns 'output={name}')" if largest else ""
+        what = f"the rate of {name!r} is {largest:.3g} deg/s at most and not used{own}"
     reading.notes.append(f"{what}, and the output does not move: taken as at rest")
     tell(f"note: {reading.notes[-1]}")
     reading.log = log.assign(rate=0.0)
@@ -289,12 +286,12 @@ def _apply(options, tell):
     with _staged(target.parent) as folder:
         # Twelve digits are beyond any gyro, and short beside the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
-    rules, flagged = getattr(compensator.estimator, "residual_", compensator.estimator), ""
+    rules, to_blame = getattr(compensator.estimator, "residual_", compensator.estimator), {}
     if isinstance(rules, FrozenRules):  # as in all that the command writes
         X = features(log, compensator.inputs, compensator.time_constant)[rates["status"] & 1 != 0]
-        ends = rules.model.minimum, rules.model.maximum
-        flagged = to_blame(n_beyond(X.iloc[:, rules.positions], *ends))
-    _say(_summary_of_rates(target, rates, flagged, log.get("rate")))
+        box = rules.model.minimum, rules.model.maximum
+        to_blame["OUT_OF_RANGE"] = beyond([(X.iloc[:, rules.positions], *box)])
+    _say(_summary_of_rates(target, rates, to_blame, log.get("rate", np.nan)))
     tell("done")
     return DONE
 
@@ -314,29 +311,25 @@ def _compensator_of(options):
         raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
     try:
         found = joblib.load(path)
-    except OSError:
-        raise
-    except Exception as error:  # whatever a damaged pickle raises
+    except (LookupError, EOFError, AttributeError, TypeError, pickle.UnpicklingError) as error:
         raise UsageError(f"{path} is no file of joblib, or a damaged one.") from error
     if not isinstance(found, GyroCompensator):
         raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
     return found
 
 
-def _summary_of_rates(target, rates, flagged, rate=None):
+def _summary_of_rates(target, rates, to_blame, rate):
     status = rates["status"]
     yield f"written        {target}: {len(rates):,} rows, {(status != 0).sum():,} flagged"
     for name, bit in STATUS.items():
         if count := ((status & bit) != 0).sum():
-            told = flagged if name == "OUT_OF_RANGE" else ""
-            yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}{told}"
-    for rows, where in ((status == 0, "rows with status 0"), (status != 0, "flagged rows")):
-        rows &= rates["rate_compensated"].notna()
-        if rate is not None and rows.any():
-            before, after = (
-                rms((rates[f"rate_{k}"] - rate)[rows]) for k in ("indicated", "compensated")
-            )
-            yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after ({where})"
+            told = name.lower().replace("_", " ") + to_blame.get(name, "")
+            yield f"status {bit}       {count:,} rows {told}"
+    errors = rates[["rate_indicated", "rate_compensated"]].sub(rate, axis=0).dropna()
+    kinds = np.where(status[errors.index] == 0, "rows with status 0", "the flagged rows")
+    for where, part in errors.groupby(kinds):
+        before, after = map(rms, part.to_numpy().T)
+        yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after ({where})"
 
 
 def _progress(quiet):

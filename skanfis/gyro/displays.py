@@ -161,9 +161,8 @@ class ErrorDisplay(GyroDisplay):
         }
 
     def _draw(self, axes, points, bands, whole):
-        places = bands.iloc[:, :2].to_numpy().ravel()
+        places = bands.iloc[:, :2].to_numpy().ravel()  # both ends of every band, which is level
         for place, (panel, (side, color)) in enumerate(zip(axes, SIDES.items(), strict=True)):
-            # Both ends of every band: one beside bands without rows is as wide as any.
             ends = bands.iloc[:, 2 + 2 * place : 4 + 2 * place].to_numpy().T
             style = {"color": color, "alpha": 0.22, "linewidth": 0}
             panel.fill_between(places, *np.repeat(ends, 2, axis=1), **style)

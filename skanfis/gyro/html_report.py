@@ -264,8 +264,7 @@ def _use(results):
     model = getattr(compensator.estimator, "residual_", compensator.estimator).model
     policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     if compensator.predicts == "rate" and model.out_of_bounds not in SILENT:
-        policy = f"of what is added to the law {policy}"
-        policy = policy if model.coefficients.any() else LAW_GOES_ON
+        policy = f"beside the law {policy}" if model.coefficients.any() else LAW_GOES_ON
     text = (
         f"Outside the ranges below, input by input, a row is flagged (status 1), and {policy}. "
         "Inside them, rows near which there are hardly any data "
@@ -305,11 +304,7 @@ def _written(results):
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         Block("pictures", list(results.memberships())),
-        Block(
-            "details",
-            rules_text(calibration),
-            f"All rules as text ({n_rules}, terms {terms})",
-        ),
+        Block("details", rules_text(calibration), f"All rules as text ({n_rules}, terms {terms})"),
         _on_board(calibration),
         Block("heading", "Can the rules be read?"),
         *([Block("warn", sentence) for sentence in against] or [Block("text", fit)]),

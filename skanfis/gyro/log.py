@@ -152,10 +152,7 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
-    assumed = {
-        part: assumed_text(table[part], part, layout.name(part), layout.units[part])
-        for part in layout.assumed
-    }
+    assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}
     n_rows, every = len(table), 1
     while len(table) > most_rows * every:
         every *= 2

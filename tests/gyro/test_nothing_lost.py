@@ -84,9 +84,15 @@ def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, capsys):
 @pytest.mark.usefixtures("files")
 def test_apply_refuses_options_of_a_calibration_by_name(tmp_path, capsys):
     for arguments, told in (
-        (["--apply", "model.json", "--terms", "1", "--write", "law"], "--terms, --write: that is"),
-        (["--apply", "model.json", "--scale-factor", "3"], "--scale-factor: that is of a calib"),
-        (["--trust"], "--trust: that is of --apply."),
+        (
+            ["--apply", "model.json", "--terms", "1", "--write", "law"],
+            "--terms, --write: of no use with --apply.",
+        ),
+        (
+            ["--apply", "model.json", "--scale-factor", "3"],
+            "--scale-factor: of no use with --apply.",
+        ),
+        (["--trust"], "--trust: of no use without --apply."),
     ):
         with pytest.raises(SystemExit, match="2"):
             main(["log.csv", *arguments])
@@ -104,7 +110,7 @@ def test_apply_tells_errors_of_flagged_rows_apart(files, tmp_path, capsys):
     assert main(["--apply", "model.json", "new.csv"]) == 0
     out = capsys.readouterr().out
     assert "1.5 deg/s before, 1 after (rows with status 0)" in out
-    assert "2.5 deg/s before, 2 after (flagged rows)" in out
+    assert "2.5 deg/s before, 2 after (the flagged rows)" in out
     assert "3 rows out of range (temperature in 3)" in out
 
 
