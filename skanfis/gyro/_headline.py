@@ -3,13 +3,16 @@
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from ..bounds import bounds, gradient_bounds
 from ..export import fold
+from ..export.c.dialect import STATUS
 from ..inspection import export_text, readability
 from ..inspection.readability import GREATEST_ERROR
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NAMES, NOTHING
+from .compensator import features
 from .compose import FrozenRules, Polynomial
 from .displays import figures
 from .metrics import rms
@@ -131,6 +134,26 @@ def errors_and_verdict(calibration):
     if calibration.writes_model and (against := against_reading(calibration)):
         lines.append(f"rules          against reading them one by one: {against[0]}")
     return lines
+
+
+def of_rates(compensator, log, rates):
+    """Lines on the rates of a log: status, inputs out of range, errors where they are known."""
+    status, blame = rates["status"], {}
+    rules = getattr(compensator.estimator, "residual_", compensator.estimator)
+    if isinstance(rules, FrozenRules):  # as in all that the command writes
+        X = features(log, compensator.inputs, compensator.time_constant)[status & 1 != 0]
+        parts = [(X.iloc[:, rules.positions], rules.model.minimum, rules.model.maximum)]
+        blame["OUT_OF_RANGE"] = beyond(parts)
+    yield f"flagged        {(status != 0).sum():,} rows"
+    for name, bit in STATUS.items():
+        if count := ((status & bit) != 0).sum():
+            told = name.lower().replace("_", " ")
+            yield f"status {bit}       {count:,} rows {told}{blame.get(name, '')}"
+    errors = rates[["rate_indicated", "rate_compensated"]].sub(log.get("rate", np.nan), axis=0)
+    kinds = np.where(status == 0, "rows with status 0", "the flagged rows")
+    for where, part in errors.dropna().groupby(pd.Series(kinds, errors.index)):
+        before, after = map(rms, part.to_numpy().T)
+        yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after ({where})"
 
 
 def written_text(calibration):

@@ -17,27 +17,23 @@ from datetime import datetime
 from pathlib import Path
 
 import joblib
-import numpy as np
 import pandas as pd
 
-from ..export.c.dialect import STATUS
 from ..inspection.labels import printable
 from ..inspection.text import counted
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._headline import beyond, errors_and_verdict, rules_text
+from ._headline import errors_and_verdict, of_rates, rules_text
 from ._options import PROGRAM, ReportOptions, check_kind, check_once, make_parser, request_of
 from ._results import Results
 from ._source import open_source
 from ._split import choose_split
 from .c_code import export_c_compensator
-from .compensator import INPUTS, GyroCompensator, features
-from .compose import FrozenRules
+from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, specification
 from .log import find_logs, read
-from .metrics import rms
 from .targets.write import FILES, write_targets
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
@@ -286,12 +282,7 @@ def _apply(options, tell):
     with _staged(target.parent) as folder:
         # Twelve digits are beyond any gyro, and short beside the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
-    rules, to_blame = getattr(compensator.estimator, "residual_", compensator.estimator), {}
-    if isinstance(rules, FrozenRules):  # as in all that the command writes
-        X = features(log, compensator.inputs, compensator.time_constant)[rates["status"] & 1 != 0]
-        box = rules.model.minimum, rules.model.maximum
-        to_blame["OUT_OF_RANGE"] = beyond([(X.iloc[:, rules.positions], *box)])
-    _say(_summary_of_rates(target, rates, to_blame, log.get("rate", np.nan)))
+    _say([f"written        {target}: {len(rates):,} rows", *of_rates(compensator, log, rates)])
     tell("done")
     return DONE
 
@@ -316,20 +307,6 @@ def _compensator_of(options):
     if not isinstance(found, GyroCompensator):
         raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
     return found
-
-
-def _summary_of_rates(target, rates, to_blame, rate):
-    status = rates["status"]
-    yield f"written        {target}: {len(rates):,} rows, {(status != 0).sum():,} flagged"
-    for name, bit in STATUS.items():
-        if count := ((status & bit) != 0).sum():
-            told = name.lower().replace("_", " ") + to_blame.get(name, "")
-            yield f"status {bit}       {count:,} rows {told}"
-    errors = rates[["rate_indicated", "rate_compensated"]].sub(rate, axis=0).dropna()
-    kinds = np.where(status[errors.index] == 0, "rows with status 0", "the flagged rows")
-    for where, part in errors.groupby(kinds):
-        before, after = map(rms, part.to_numpy().T)
-        yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after ({where})"
 
 
 def _progress(quiet):
