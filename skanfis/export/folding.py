@@ -309,9 +309,10 @@ def _refuse(label, step, reason):
 def _model_of(label, estimator):
     """The frozen model of the last step, with the policy that its parameters ask for now."""
     if isinstance(estimator, type) or not hasattr(estimator, "fit"):
+        hint = " Its model is one." * isinstance(getattr(estimator, "model", None), TSKModel)
         raise TypeError(
             f"estimator must be a fitted ANFIS estimator, a Pipeline that ends in one, or a "
-            f"TSKModel; got {estimator!r}."
+            f"TSKModel; got {estimator!r}.{hint}"
         )
     model = getattr(estimator, "model_", None)
     if not isinstance(model, TSKModel):

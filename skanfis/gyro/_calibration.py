@@ -18,7 +18,7 @@ from ._columns import SIGNALS, ask
 from ._models import fit_model, some_rows
 from ._simpler import NAMES, Simpler, simpler_compensations
 from ._split import Split
-from .compensator import GyroCompensator, features
+from .compensator import GyroCompensator, as_written, features
 from .errors import LogError
 from .metrics import rms, scale_factor
 
@@ -81,10 +81,6 @@ class Verdict:
     @property
     def model(self):
         return list(self.rms)[-1]
-
-    @property
-    def model_is_worth_it(self):
-        return self.recommended == self.model
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +187,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     verdict = judge(errors, split.labels[judged], split.kind == "piece" and not np.ptp(rate))
     written = _to_write(recipe, verdict, simpler)
     chosen = next(each for each in every if each.name == written)
-    compensator = GyroCompensator(
+    whole = GyroCompensator(
         chosen.estimator,
         recipe.inputs,
         predicts=chosen.predicts,
@@ -203,7 +199,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     )
     return Calibration(
         recipe=recipe,
-        compensator=compensator,
+        compensator=as_written(whole),
         written=written,
         model=estimator,
         split=split,

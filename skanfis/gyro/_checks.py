@@ -178,6 +178,8 @@ def check_at_rest(log, unit):
         if abs(rate[row]) > _LARGEST_AT_REST:
             raise LogError(f"{rate[row]:.4g} deg/s: the gyro was not at rest.", "rate", row)
     output = log["output"].to_numpy()
+    if np.ptp(output) == 0.0:
+        raise LogError(f"is {output[0]:g} throughout: no gyro gives that.", "output")
     if unit not in SIGNALS:
         low, high = np.quantile(output, [0.01, 0.99])
         if high - low > _WIDEST_AT_REST:
@@ -247,12 +249,11 @@ def _check_output_follows_rate(log, units):
     output, rate = log["output"].to_numpy(), log["rate"].to_numpy()
     for part, values in (("rate", rate), ("output", output)):
         if values.max() == values.min():
-            raise LogError(
-                f"all values are {values[0]:g}; a scale factor cannot be learnt from a log at one "
-                "rate. Log at several rates, or learn the bias alone: leave output out of the "
-                "inputs.",
-                part,
-            )
+            advice = "Is another column the gyro's (--columns output=NAME)?"
+            if part == "rate":
+                advice = "Log at several rates, or learn the bias: leave output out of the inputs."
+            told = f"all values are {values[0]:g}, which tells no scale factor. {advice}"
+            raise LogError(told, part)
     if np.array_equal(output, rate):
         raise LogError("equals the column of the rate: one of them is the wrong one.", "output")
     correlation = np.corrcoef(output, rate)[0, 1]

@@ -9,8 +9,8 @@ import pandas as pd
 
 from ._checks import PARTS
 from ._columns import CANONICAL, declared_units, unit_in
-from ._source import Clock, as_numbers
-from ._units import assumed_text, settle_units
+from ._source import CLOCK, Clock, as_numbers, dated
+from ._units import settle_units
 from .errors import LogError
 
 _SAMPLE_ROWS = 100_000
@@ -101,7 +101,7 @@ def checked_request(request):
 class Layout:
     """Places of the parts in a file and their units there; ``others`` would do as well.
 
-    ``assumed`` has sentences by part on units that are neither told nor in the names.
+    ``assumed`` are parts whose units are neither told nor in the names.
     """
 
     header: list
@@ -109,7 +109,8 @@ class Layout:
     units: dict
     notes: list = field(default_factory=list)
     others: dict = field(default_factory=dict)
-    assumed: dict = field(default_factory=dict)
+    assumed: list = field(default_factory=list)
+    dates: list = field(default_factory=list)  # places of those of a time without a date
 
     def name(self, part):
         return self.header[self.places[part]] if part in self.places else part
@@ -167,6 +168,11 @@ def _guess(source, request, layout, first):
         layout.places.setdefault("rate", called_rate)
     of_first = request.assumed if first is None else first.units
     _settle_axis(columns, layout)
+    place, taken = layout.places.get("time"), set(layout.places.values())
+    if place is not None and columns[place].is_time and Clock(sample[place]).form == CLOCK:
+        texts = [each.place for each in columns if each.numbers.size == 0]
+        moments = {k: Clock(dated(sample[k], sample[place])) for k in texts if k not in taken}
+        layout.dates = [k for k, clock in moments.items() if clock.form][:1]
     _settle_units(columns, layout, of_first)
     layout.notes += _sentences(layout)
 
@@ -275,11 +281,7 @@ def _settle_units(columns, layout, of_first):
     else:
         found = {part: of_first.get(part, CANONICAL[part]) for part in lacking}
     layout.units |= found
-    layout.assumed = {
-        part: assumed_text(values[part], part, layout.name(part), found[part])
-        for part in PARTS
-        if part in found
-    }
+    layout.assumed = [part for part in PARTS if part in found]
 
 
 def _sentences(layout):
@@ -291,6 +293,7 @@ def _sentences(layout):
         told.append(
             f"{part} = {name!r}"
             + (f" in {unit}" if unit else "")
+            + "".join(f" on {layout.header[k]!r}" for k in layout.dates if part == "time")
             + (f" ({others} would do too)" if others else "")
         )
     yield f"columns: {'; '.join(told)}. Say otherwise with --columns and --units"

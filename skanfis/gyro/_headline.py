@@ -3,12 +3,16 @@
 from typing import NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from ..bounds import bounds, gradient_bounds
 from ..export import fold
+from ..export.c.dialect import STATUS
 from ..inspection import export_text, readability
+from ..inspection.readability import GREATEST_ERROR
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NAMES, NOTHING
+from .compensator import features
 from .compose import FrozenRules, Polynomial
 from .displays import figures
 from .metrics import rms
@@ -17,6 +21,7 @@ from .targets.error_model import ErrorModel
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
+_DIGITS = 4  # of what the noise makes of numbers: with them the text errs as the rules do
 _MOST_ROWS = 20_000  # evenly chosen, to see whether the rules can be read
 _MANY_FLAGGED = 0.2  # of the rows
 _MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter
@@ -28,7 +33,7 @@ def headline(calibration, unit):
     left = {
         name: f"{figures(RATE_UNITS[unit] * error)} {unit}" for name, error in verdict.rms.items()
     }
-    if verdict.model_is_worth_it:
+    if verdict.recommended == verdict.model:
         simpler = [name for name in verdict.rms if name not in (NOTHING, verdict.model)]
         best = min(simpler, key=verdict.rms.get)
         gain = verdict.gains[best]
@@ -84,14 +89,25 @@ def flagged_text(calibration):
     n_rows, n_flagged = calibration.inside.size, np.count_nonzero(~calibration.inside)
     if not n_flagged:
         return f"None of the {n_rows:,} held-out rows was flagged."
-    share = n_flagged / n_rows
+    X, share = calibration.X, n_flagged / n_rows
+    named = beyond(
+        (X.iloc[test][~calibration.inside[test]], *X.iloc[train].agg(["min", "max"]).to_numpy())
+        for train, test in calibration.split.folds
+    )
     advice = "They are the ends of the range, which no other group reaches."
     if share > _MANY_FLAGGED:
         advice = (
             "That is much: the figures say nothing of these rows. Log groups that overlap more, "
             "above all at both ends of the range."
         )
-    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged. {advice}"
+    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged{named}. {advice}"
+
+
+def beyond(parts):
+    """In how many rows each input is out of its range, in words: of tables, lows and highs."""
+    counts = sum(((rows < low) | (rows > high)).sum() for rows, low, high in parts)
+    named = [f"{name} in {n:,}" for name, n in counts.sort_values(ascending=False).items() if n]
+    return f" ({', '.join(named)})" if named else ""
 
 
 def errors_and_verdict(calibration):
@@ -99,10 +115,10 @@ def errors_and_verdict(calibration):
     before, after = (rates - calibration.rate for rates in (calibration.before, calibration.after))
     inside = calibration.in_range
     outside = ~calibration.inside & np.isfinite(after)
-    peak = np.abs(after[inside]).max()
+    peak, constant = np.abs(after[inside]).max(), calibration.verdict.rms["constant"]
     lines = [
-        f"error before   {rms(before[inside]):.4g} deg/s RMS, on {inside.sum():,} held-out rows "
-        "in range",
+        f"error before   {rms(before[inside]):.4g} deg/s RMS, {constant:.4g} once a constant (the "
+        f"output at rest) is taken off, on {inside.sum():,} held-out rows in range",
         f"error after    {rms(after[inside]):.4g} deg/s RMS, peak {peak:.4g}, on the same rows",
     ]
     if outside.any():
@@ -115,9 +131,29 @@ def errors_and_verdict(calibration):
     title, reason = headline(calibration, "deg/s")
     lines.append(f"VERDICT        {title}. {reason}")
     lines.append(f"written is     {written_text(calibration)}")
-    if calibration.writes_model and (findings := readability_of(calibration).findings):
-        lines.append(f"rules          against reading them one by one: {findings[0]}")
+    if calibration.writes_model and (against := against_reading(calibration)):
+        lines.append(f"rules          against reading them one by one: {against[0]}")
     return lines
+
+
+def of_rates(compensator, log, rates):
+    """Lines on the rates of a log: status, inputs out of range, errors where they are known."""
+    status, blame = rates["status"], {}
+    rules = getattr(compensator.estimator, "residual_", compensator.estimator)
+    if isinstance(rules, FrozenRules):  # as in all that the command writes
+        X = features(log, compensator.inputs, compensator.time_constant)[status & 1 != 0]
+        parts = [(X.iloc[:, rules.positions], rules.model.minimum, rules.model.maximum)]
+        blame["OUT_OF_RANGE"] = beyond(parts)
+    yield f"flagged        {(status != 0).sum():,} rows"
+    for name, bit in STATUS.items():
+        if count := ((status & bit) != 0).sum():
+            told = name.lower().replace("_", " ")
+            yield f"status {bit}       {count:,} rows {told}{blame.get(name, '')}"
+    errors = rates[["rate_indicated", "rate_compensated"]].sub(log.get("rate", np.nan), axis=0)
+    kinds = np.where(status == 0, "rows with status 0", "the flagged rows")
+    for where, part in errors.dropna().groupby(pd.Series(kinds, errors.index)):
+        before, after = map(rms, part.to_numpy().T)
+        yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after ({where})"
 
 
 def written_text(calibration):
@@ -127,16 +163,16 @@ def written_text(calibration):
     return f"{ARTICLES.get(calibration.written, 'the fuzzy rules')}, {others}"
 
 
-def readability_of(calibration):
-    """Whether the rules can be read: against what the law leaves of the rate, or the error."""
+def against_reading(calibration):
+    """What speaks against reading the rules; not that they err in few digits: the text has more."""
     places = evenly_chosen(len(calibration.X), _MOST_ROWS)
-    X, estimator = calibration.X.iloc[places], calibration.model
-    if not calibration.recipe.physics:
-        return readability(estimator, X, (calibration.before - calibration.rate)[places])
-    left = calibration.rate[places] - estimator.base_.predict(X)
+    X, left = calibration.X.iloc[places], (calibration.before - calibration.rate)[places]
+    if calibration.recipe.physics:
+        left = calibration.rate[places] - calibration.model.base_.predict(X)
     # Rows that the law refuses are no business of the rules.
     known = np.isfinite(left)
-    return readability(calibration.rules, X[known], left[known])
+    found = readability(calibration.rules, X[known], left[known])
+    return found.findings[int(found.summary["text_over_model"] > GREATEST_ERROR) :]
 
 
 class Proven(NamedTuple):
@@ -157,8 +193,7 @@ def proven_bounds(calibration):
     if isinstance(getattr(rules, "base_", None), Polynomial):
         error = ErrorModel(compensator, rules, X)
         return Proven(float(np.abs(error.ranges(*error.ends.T[:, :, None])[0]).max()))
-    rules = getattr(rules, "residual_", rules)
-    rules = rules.model if isinstance(rules, FrozenRules) else rules
+    rules = getattr(rules, "residual_", rules).model
     found = bounds(rules, max_boxes=_MOST_BOXES)
     largest = float(np.abs([found.lower, found.upper]).max())
     if compensator.predicts == "rate" or "output" not in X:
@@ -183,25 +218,23 @@ def formula_of(calibration, name):
     return f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n{text}"
 
 
-def rules_text(calibration, found=None):
+def rules_text(calibration):
     """What is written, as text: a formula, or the rules as sentences.
 
     Before these stand what speaks against reading them, and the law's formula.
     """
     if not calibration.writes_model:
         return f"{formula_of(calibration, calibration.written)}\n"
-    found = readability_of(calibration) if found is None else found
-    caution = ""
-    if found.findings:
+    recipe, law, caution = calibration.recipe, "", ""
+    if against := against_reading(calibration):
         head = "What speaks against reading the rules one by one:"
-        caution = "\n".join([head, *found.findings, "", ""])
-    estimator = calibration.model
+        caution = "\n".join([head, *against, "", ""])
+    if recipe.physics:
+        law = f"{law_text(calibration.model.base_, recipe)}\nTo this rate the rules add:\n\n"
     # Folded, a model knows of no readability in training, and the text has the caution once.
-    if calibration.recipe.physics:
-        rules = export_text(fold(estimator.residual_), output_names=["rate beyond the law"])
-        law = law_text(estimator.base_, calibration.recipe)
-        return f"{law}\nTo this rate is added what the rules give.\n\n{caution}{rules}\n"
-    return f"{caution}{export_text(fold(estimator), output_names=['error'])}\n"
+    names = ["rate beyond the law" if recipe.physics else "error"]
+    rules = export_text(fold(calibration.rules), precision=_DIGITS, output_names=names)
+    return f"{law}{caution}{rules}\n"
 
 
 def law_text(law, recipe):

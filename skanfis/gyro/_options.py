@@ -113,12 +113,23 @@ def make_parser():
     add("--output", told, type=Path)
     told = "what is recommended (default), or another: the rules of the model, or what is simpler"
     add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
-    add("--c", "also write the model as C, by this standard", choices=("c99", "c89"))
+    stds = ("c99", "c89", "c99:float", "c89:float")
+    add("--c", "also write the model as C, by this standard, in double or float", choices=stds)
     told = f"also a simple target, where it is good enough: {_TARGETS}"
     add("--target", told, type=_target, **several)
     add("--force", "replace files that exist", action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
     return parser
+
+
+def check_kind(parser, options):
+    """UsageError for options that have no say with --apply, or without it."""
+    of_both = {"logs", "columns", "units", "output", "force", "quiet", "apply", "trust"}
+    idle = vars(options).keys() - of_both if options.apply else {"trust"}
+    given = [name for name in sorted(idle) if getattr(options, name) != parser.get_default(name)]
+    if given:
+        named = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+        raise UsageError(f"{named}: of no use with{'' if options.apply else 'out'} --apply.")
 
 
 def request_of(options, require, assumed=None):

@@ -200,12 +200,13 @@ class Results:
     def coverage(self):
         """The picture of the coverage; none where temperature or output is no input."""
         calibration = self.calibration
-        if not {"temperature", "output"} <= set(calibration.X):
+        X = calibration.X[list(calibration.compensator.inputs)]
+        if not {"temperature", "output"} <= set(X):
             return
         figure = _figure()
         display = CoverageDisplay.from_estimator(
             calibration.compensator.estimator,
-            calibration.X,
+            X,
             min_coverage=calibration.compensator.min_coverage,
             output_unit=calibration.recipe.output_unit,
             ax=figure,

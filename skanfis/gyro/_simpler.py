@@ -86,7 +86,10 @@ def kinds(inputs, policy="linear"):
     """Name, what it predicts, and what fits it to rows: to X, y, and a rule that gives zero."""
 
     def law(X, y, zero):
-        return joined(make_law(inputs, 1, policy).fit(X, y), zero)
+        fitted = make_law(inputs, 1, policy).fit(X, y)
+        places = np.sort(fitted.columns_)  # the inputs that it is asked for, and flagged by
+        rule = fitted_rule(X.iloc[:, places], 0.0 * y, 0, policy)
+        return joined(fitted, replace(rule, positions=places))
 
     def law_and_line(X, y, zero):
         both = make_law(inputs, 1, policy), _unfitted_rule(1, policy)

@@ -29,9 +29,9 @@ _NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
 _VALUE = re.compile(r"[+-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
 _FRACTION = re.compile(r"[+-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
 
-_CLOCK = "hours:minutes:seconds"
+CLOCK = "hours:minutes:seconds"
 _FORMATS = [
-    _CLOCK,
+    CLOCK,
     "ISO8601",
     *(
         f"{date} {clock}"
@@ -306,7 +306,7 @@ class Clock:
         """Times that go on past midnight, and where the clock was put one hour back."""
         first, last = self._ends or (values[0], values[0])
         steps = np.diff(values, prepend=last)
-        added = self._added + _DAY * np.cumsum((steps < -0.5 * _DAY) & (self.form == _CLOCK))
+        added = self._added + _DAY * np.cumsum((steps < -0.5 * _DAY) & (self.form == CLOCK))
         usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else np.inf
         back = (steps < 0.0) & (np.abs(steps + _HOUR - usual) <= 3.0 * usual)
         # An hour back to where all began is a clock that was set anew.
@@ -321,9 +321,14 @@ class Clock:
         return values + added
 
 
+def dated(dates, times):
+    """Dates and times of day of two columns as texts of one."""
+    return _texts(dates).str.cat(_texts(times), sep=" ")
+
+
 def _moments(texts, form):
     texts = texts.str.replace(r",?\s+", " ", regex=True).str.replace(",", ".")
-    if form == _CLOCK:
+    if form == CLOCK:
         clocks = texts.where(
             texts.str.fullmatch(r"[0-9]{1,6}(:[0-9]{1,2}){2}(\.[0-9]*)?", na=False)
         )

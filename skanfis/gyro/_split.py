@@ -97,8 +97,8 @@ def group_by_rate_level(rate: ArrayLike) -> np.ndarray:
     return labels
 
 
-def level_numbers(rate):
-    """Number of each row's level, lowest first; None where the rate changes continuously."""
+def level_numbers(rate, fewest=1):
+    """Number of each row's level of so many rows, lowest first; None where most are in none."""
     values, inverse, n_rows = np.unique(rate, return_inverse=True, return_counts=True)
     gaps = np.diff(values)
     smallest = _SMALLEST_TOLERANCE * np.abs(values).max()
@@ -117,7 +117,10 @@ def level_numbers(rate):
     others = np.sort(n_rows)[:-1]  # a gyro may rest for most of the log
     typical = np.median(np.repeat(others, others)) if others.size else 0
     centers = 0.5 * (low + high)
-    levels = centers[n_rows >= _FEW_ROWS * typical]
+    is_level = n_rows >= max(_FEW_ROWS * typical, fewest)
+    if 2 * n_rows[is_level].sum() < len(rate):
+        return None
+    levels = centers[is_level]
     is_spread = len(levels) * smallest > _SHARE_COVERED * (high[-1] - low[0]) > 0
     if tolerance == smallest and is_spread:
         return None
@@ -159,8 +162,8 @@ def choose_split(log, kind="auto", *, uses_output=True):
         for name in ("device", "run")
         if name in log
     }
-    levels = _levels(log) if uses_output else None
-    if levels is not None:
+    levels = level_numbers(np.abs(log["rate"].to_numpy()), _ROWS_PER_LEVEL)
+    if levels is not None and uses_output:
         groups["level"] = levels
     if "temperature" in log:
         groups["leg"] = groups["piece"] = find_legs(log["temperature"].to_numpy(), log.get("run"))
@@ -218,14 +221,6 @@ def _check(part, counts):
             f"cannot hold out by {part}: the log has {counts[part]} {name}(s), and at least "
             f"{_FEWEST[part]} are needed."
         )
-
-
-def _levels(log):
-    """Number of each row's level of |rate|; None where the rate changes continuously."""
-    levels = level_numbers(np.abs(log["rate"].to_numpy()))
-    # A level for nearly every row is none: holding it out would hold out single rows.
-    is_row_by_row = levels is not None and np.unique(levels).size * _ROWS_PER_LEVEL > levels.size
-    return None if is_row_by_row else levels
 
 
 def _fold_numbers(part, groups, n_parts):

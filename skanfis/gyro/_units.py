@@ -54,8 +54,10 @@ def settle_by_all(log, layout):
     return settle_units(values, told)
 
 
-def assumed_text(values, part, name, unit):
-    """What was assumed of a part, with its range and another reading."""
+def assumed_text(values, part, layout):
+    """What was assumed of a part, with its range and another reading; of values as in a log."""
+    name, unit = layout.name(part), layout.units[part]
+    values = convert_back(np.array([values.min(), values.max()]), part, unit)
     if unit in SIGNALS:
         return f"{name!r} has no unit, taken as a raw signal ({_range(values)})"
     other = {"temperature": "degF", "time": "ms"}.get(part, "rad/s")

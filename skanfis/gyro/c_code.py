@@ -36,6 +36,7 @@ from .physics import past_phase, phase_of
 
 _SUFFIX = "_r"
 SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
+LAW_GOES_ON = "the law goes on as it is"
 _TAKE = "y[0] is the compensated rate: take it in the place of the raw rate."
 
 # Of inputs of a compensator: units, and how they are made.
@@ -328,13 +329,16 @@ def _header(whole, dialect, price, units, notes):
     if model.n_rules == 1:
         rules = ", and a line" if model.order else ", and a constant"
     what, output = "The rate of an open-loop gyro: arcsine law", "rate"
-    where, policies = "Of the rules alone: outside their range", []
+    beyond, policies = policy_line(model, "Outside this range"), []
     if whole.is_cubic:
         what, output = f"A polynomial of the third degree with {len(law.powers)} terms", "error"
-        where = "Outside this range"
     else:
         past = past_phase(law.out_of_bounds, "output")
         policies = [f"Beyond a phase of {law.max_phase:g} rad {past}."]
+        if model.coefficients.any():
+            beyond = policy_line(model, "Of what is added to the law: outside this range")
+        elif model.out_of_bounds not in SILENT:
+            beyond = f"Outside this range {LAW_GOES_ON}."
     what += rules if model.coefficients.any() else ""
     lines = [
         *map(remark, notes),
@@ -346,7 +350,7 @@ def _header(whole, dialect, price, units, notes):
         f"  [0] {output}, in {units.get('rate', 'the unit of the training data')}",
         "",
         *policies,
-        policy_line(model, where),
+        beyond,
         "A row that is not finite gets no output either way, nor does one whose rate is not.",
     ]
     if part.min_coverage is not None:
@@ -437,7 +441,7 @@ def _answering(part):
     return "linear" if part.out_of_bounds == "linear" else "clip"
 
 
-def export_c_compensator(compensator, path, *, std) -> CCode:
+def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
     """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
     found, units = found_by_search(compensator.estimator), units_of(compensator)
     export: Any = export_c_physics
@@ -448,6 +452,7 @@ def export_c_compensator(compensator, path, *, std) -> CCode:
     return export(
         found,
         path,
+        dtype=dtype,
         std=std,
         min_coverage=compensator.min_coverage,
         units=units,

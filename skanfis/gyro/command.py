@@ -5,6 +5,7 @@ It writes files all together or not at all.
 
 import contextlib
 import os
+import pickle
 import platform
 import shlex
 import shutil
@@ -18,14 +19,13 @@ from pathlib import Path
 import joblib
 import pandas as pd
 
-from ..export.c.dialect import STATUS
 from ..inspection.labels import printable
 from ..inspection.text import counted
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
-from ._headline import errors_and_verdict, rules_text
-from ._options import PROGRAM, ReportOptions, check_once, make_parser, request_of
+from ._headline import errors_and_verdict, of_rates, rules_text
+from ._options import PROGRAM, ReportOptions, check_kind, check_once, make_parser, request_of
 from ._results import Results
 from ._source import open_source
 from ._split import choose_split
@@ -34,7 +34,6 @@ from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, specification
 from .log import find_logs, read
-from .metrics import rms
 from .targets.write import FILES, write_targets
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
@@ -52,9 +51,10 @@ def main(arguments=None):
     """Run the command; returns its exit code."""
     parser = make_parser()
     options = parser.parse_args(arguments)
-    options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
     tell = _progress(options.quiet)
     try:
+        check_kind(parser, options)
+        options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
         if arguments is None:
             # Which __main__.py has set aside.
             for number in (signal.SIGINT, signal.SIGTERM):
@@ -143,18 +143,22 @@ def _read(options, paths, tell):
 
 def _settle_rest(reading, tell):
     """Whether the gyro was at rest; the log then has a rate of zero."""
-    log = reading.log
+    log, layout = reading.log, reading.files[0].layout
     try:
         check_at_rest(log, reading.units["output"])
     except LogError as error:
         if "rate" in log:
             return False
         raise LogError(
-            f"there is no column 'rate' for the true rate among "
-            f"{', '.join(map(repr, reading.files[0].layout.header[:20]))}, and the output "
-            f"{error.reason} Say which it is (--columns rate=NAME)."
+            f"{layout.name('output')!r} is taken for the output, no column for the true rate is "
+            f"found among {', '.join(map(repr, layout.header[:20]))}, and the output "
+            f"{error.reason} Say which they are (--columns output=NAME rate=NAME)."
         ) from error
-    what = "the rate is zero throughout" if "rate" in log else "there is no column for the rate"
+    what = "there is no column for the rate"
+    if "rate" in log:
+        name, largest = layout.name("rate"), log["rate"].abs().max()
+        own = f" (if it is the gyro's own: --columns 'output={name}')" if largest else ""
+        what = f"the rate of {name!r} is {largest:.3g} deg/s at most and not used{own}"
     reading.notes.append(f"{what}, and the output does not move: taken as at rest")
     tell(f"note: {reading.notes[-1]}")
     reading.log = log.assign(rate=0.0)
@@ -224,12 +228,11 @@ def _write(calibration, options, files, folder):
 
         weasyprint.HTML(string=page).write_pdf(folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
-    # To the last bit the same, at the edge of its range too.
-    same = GyroCompensator.read_json(folder / "compensator.json")
-    joblib.dump(same, folder / "compensator.joblib")
+    joblib.dump(compensator, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
-        export_c_compensator(compensator, folder / "compensator", std=options.c)
+        std, _, dtype = options.c.partition(":")
+        export_c_compensator(compensator, folder / "compensator", std=std, dtype=dtype or "double")
     return results.checks
 
 
@@ -279,7 +282,7 @@ def _apply(options, tell):
     with _staged(target.parent) as folder:
         # Twelve digits are beyond any gyro, and short beside the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
-    _say(_summary_of_rates(target, rates, log.get("rate")))
+    _say([f"written        {target}: {len(rates):,} rows", *of_rates(compensator, log, rates)])
     tell("done")
     return DONE
 
@@ -297,24 +300,13 @@ def _compensator_of(options):
     _write_to(sys.stderr, f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
     if not options.trust:
         raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
-    found = joblib.load(path)
+    try:
+        found = joblib.load(path)
+    except (LookupError, EOFError, AttributeError, TypeError, pickle.UnpicklingError) as error:
+        raise UsageError(f"{path} is no file of joblib, or a damaged one.") from error
     if not isinstance(found, GyroCompensator):
         raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
     return found
-
-
-def _summary_of_rates(target, rates, rate=None):
-    status = rates["status"]
-    yield f"written        {target}: {len(rates):,} rows, {(status != 0).sum():,} flagged"
-    for name, bit in STATUS.items():
-        if count := ((status & bit) != 0).sum():
-            yield f"status {bit}       {count:,} rows {name.lower().replace('_', ' ')}"
-    good = status == 0
-    if rate is not None and good.any():
-        before, after = (
-            rms((rates[f"rate_{k}"] - rate)[good]) for k in ("indicated", "compensated")
-        )
-        yield f"RMS error      {before:.4g} deg/s before, {after:.4g} after (rows with status 0)"
 
 
 def _progress(quiet):

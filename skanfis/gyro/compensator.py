@@ -150,28 +150,7 @@ class GyroCompensator:
         OSError
             If the file cannot be written.
         """
-        found, law, polynomial = found_by_search(self.estimator), None, None
-        if isinstance(found, ResidualRegressor):
-            fitted, rules = law_and_rules(found)
-            if isinstance(fitted, Polynomial):
-                polynomial = {key: getattr(fitted, key).tolist() for key in _OF_POLYNOMIAL}
-            else:
-                law = _law_document(fitted, self.inputs)
-        else:
-            rules = FrozenRules.of(found, len(self.inputs))
-        document = {
-            "format": _FORMAT,
-            "version": _VERSION,
-            **{key: getattr(self, key) for key in _KEYS},
-            "law": law,
-            "polynomial": polynomial,
-            "columns": [self.inputs[j] for j in rules.positions],
-            "model": json.loads(export_json(rules.model)),
-        }
-        text = json.dumps(document, indent=1, allow_nan=False) + "\n"
-        # What could not be read again is not written.
-        _settings(json.loads(text))
-        Path(path).write_text(text, encoding="utf-8", newline="\n")
+        Path(path).write_text(_text_of(self), encoding="utf-8", newline="\n")
 
     @classmethod
     def read_json(cls, path: str | PathLike[str]) -> Self:
@@ -199,7 +178,43 @@ class GyroCompensator:
             return cls(**_settings(json.loads(data.decode("utf-8"))))
         except (ValueError, RecursionError) as error:
             reason = str(error).removesuffix(".")
+            if isinstance(error, UnicodeDecodeError | json.JSONDecodeError):
+                reason = "it is not the JSON that a compensator.json holds"
             raise ValueError(f"{path} is no gyro compensator: {reason}.") from error
+
+
+def as_written(compensator):
+    """What reading a compensator gives that is written: to the last bit, at its edges too."""
+    return GyroCompensator(**_settings(json.loads(_text_of(compensator))))
+
+
+def _text_of(compensator):
+    """What is written of a compensator, whose inputs are those that its parts take."""
+    found, law, polynomial = found_by_search(compensator.estimator), None, None
+    if isinstance(found, ResidualRegressor):
+        fitted, rules = law_and_rules(found)
+        if isinstance(fitted, Polynomial):
+            polynomial = {key: getattr(fitted, key).tolist() for key in _OF_POLYNOMIAL}
+        else:
+            law = _law_document(fitted, compensator.inputs)
+    else:
+        rules = FrozenRules.of(found, len(compensator.inputs))
+    columns = [compensator.inputs[j] for j in rules.positions]
+    used = {*columns, *(law["columns"] if law else [])}
+    document = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        **{key: getattr(compensator, key) for key in _KEYS},
+        "inputs": [name for name in compensator.inputs if name in used],
+        "law": law,
+        "polynomial": polynomial,
+        "columns": columns,
+        "model": json.loads(export_json(rules.model)),
+    }
+    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+    # What could not be read again is not written.
+    _settings(json.loads(text))
+    return text
 
 
 def features(log, inputs, time_constant):

@@ -161,13 +161,11 @@ class ErrorDisplay(GyroDisplay):
         }
 
     def _draw(self, axes, points, bands, whole):
-        # Every band is a step, and the last one ends.
-        steps = pd.concat([bands, bands.tail(1)]).to_numpy(copy=True)
-        steps[-1, 0] = steps[-1, 1]
+        places = bands.iloc[:, :2].to_numpy().ravel()  # both ends of every band, which is level
         for place, (panel, (side, color)) in enumerate(zip(axes, SIDES.items(), strict=True)):
-            low, high = steps[:, 2 + 2 * place : 4 + 2 * place].T
-            style = {"step": "post", "color": color, "alpha": 0.22, "linewidth": 0}
-            panel.fill_between(steps[:, 0], low, high, **style)
+            ends = bands.iloc[:, 2 + 2 * place : 4 + 2 * place].to_numpy().T
+            style = {"color": color, "alpha": 0.22, "linewidth": 0}
+            panel.fill_between(places, *np.repeat(ends, 2, axis=1), **style)
             style = {"color": color, "markersize": 2.5, "alpha": 0.6, "mew": 0}
             panel.plot(points.iloc[:, 0], points.iloc[:, 1 + place], ".", **style)
             size, peak = map(figures, whole.iloc[place, 1:])

@@ -12,22 +12,21 @@ import sklearn
 
 from .. import __version__
 from ..inspection.labels import printable
-from ..policies import policy_in_words
+from ..policies import SILENT, policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
 from ._headline import (
     ARTICLES,
+    against_reading,
     flagged_text,
     formula_of,
     headline,
     held_out_groups,
     proven_bounds,
-    readability_of,
     rules_text,
     written_text,
 )
 from ._simpler import NAMES, NOTHING
-from .c_code import notes_on, units_of
-from .compose import FrozenRules
+from .c_code import LAW_GOES_ON, notes_on, units_of
 from .displays import figures, signs
 from .metrics import rms
 
@@ -84,7 +83,8 @@ def report_page(results, title):
     kept = kept and all(check.result == "pass" for check in results.checks)
     return _template().render(
         title=f"Gyro compensation: {title}",
-        subtitle=f"{what}: the gyro's {target} from {', '.join(map(_words, recipe.inputs))}.",
+        subtitle=f"{what}: the gyro's {target} from "
+        f"{', '.join(map(_words, calibration.compensator.inputs))}.",
         verdict=headline(calibration, results.unit)[0],
         verdict_kind="good" if kept else "bad",
         reasons=map(signs, _reasons(results)),
@@ -261,12 +261,12 @@ def _pictures(results):
 def _use(results):
     calibration = results.calibration
     compensator = calibration.compensator
-    rules = compensator.estimator
-    rules = getattr(rules, "residual_", rules)
-    model = rules.model if isinstance(rules, FrozenRules) else rules[-1].model_
+    model = getattr(compensator.estimator, "residual_", compensator.estimator).model
     policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
+    if compensator.predicts == "rate" and model.out_of_bounds not in SILENT:
+        policy = f"beside the law {policy}" if model.coefficients.any() else LAW_GOES_ON
     text = (
-        f"Outside the ranges below, input by input, a row is flagged (status 1) and {policy}. "
+        f"Outside the ranges below, input by input, a row is flagged (status 1), and {policy}. "
         "Inside them, rows near which there are hardly any data "
         f"(coverage below {compensator.min_coverage:g}) are flagged too (status 4). The C code "
         "that --c writes flags the same rows with the same numbers."
@@ -299,19 +299,15 @@ def _written(results):
         )
         formula = Block("open", formula_of(calibration, name), "What to compute")
         return "What is written", [Block("text", text), formula, _on_board(calibration)]
-    found = readability_of(calibration)
+    against = against_reading(calibration)
     n_rules, terms = calibration.rules[-1].n_rules_, " × ".join(map(str, calibration.terms))
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         Block("pictures", list(results.memberships())),
-        Block(
-            "details",
-            rules_text(calibration, found),
-            f"All rules as text ({n_rules}, terms {terms})",
-        ),
+        Block("details", rules_text(calibration), f"All rules as text ({n_rules}, terms {terms})"),
         _on_board(calibration),
         Block("heading", "Can the rules be read?"),
-        *([Block("warn", sentence) for sentence in found.findings] or [Block("text", fit)]),
+        *([Block("warn", sentence) for sentence in against] or [Block("text", fit)]),
     ]
 
 
@@ -339,9 +335,10 @@ def _log(results):
 
 
 def _box(calibration, caption=""):
+    X = calibration.X[list(calibration.compensator.inputs)]
     lines = [
         (_words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name))
-        for name, low, high in calibration.X.agg(["min", "max"]).T.itertuples()
+        for name, low, high in X.agg(["min", "max"]).T.itertuples()
     ]
     return _table(["input", "from", "to", "unit"], lines, caption)
 

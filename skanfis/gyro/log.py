@@ -19,8 +19,8 @@ import pandas as pd
 from ._checks import LABELS, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, checked_request, settle
-from ._source import NO_VALUE, Clock, as_numbers, open_source
-from ._units import settle_by_all
+from ._source import NO_VALUE, Clock, as_numbers, dated, open_source
+from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
 from .metrics import rows_by_run
 
@@ -152,6 +152,7 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
+    assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}
     n_rows, every = len(table), 1
     while len(table) > most_rows * every:
         every *= 2
@@ -175,7 +176,7 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if "device" in layout.places:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
     notes = list(dict.fromkeys(notes))
-    return Reading(log, file, row, files, notes, n_rows, digests, layout.assumed)
+    return Reading(log, file, row, files, notes, n_rows, digests, assumed)
 
 
 class LogFile:
@@ -246,14 +247,16 @@ class LogFile:
 
     def _converted(self):
         """All rows, in the units of a log."""
-        places = self.layout.places
+        places, dates = self.layout.places, self.layout.dates
         labels = [places[part] for part in LABELS if part in places]
         columns: dict = {part: [] for part in places}
-        for table in self.source.pieces(list(places.values()), _ROWS, labels):
+        for table in self.source.pieces([*places.values(), *dates], _ROWS, labels):
             self.n_rows += len(table)
             try:
                 for part, place in places.items():
                     values = table[place]
+                    if part == "time" and dates:
+                        values = dated(table[dates[0]], values)
                     if part not in LABELS:
                         values = pd.Series(self._numbers(values, part), table.index)
                     check_values(values, part, self._is_command)

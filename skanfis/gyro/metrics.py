@@ -19,7 +19,7 @@ from ._columns import PER_HOUR, check_column, check_labels
 
 _PPM = 1e6
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
-_HYSTERESIS_BINS, _ROWS_PER_MEAN = 20, 5
+HYSTERESIS_BINS, ROWS_PER_MEAN = 20, 5
 # A nonlinearity is looked for in means over such parts of the range of rates.
 _RATE_BINS = 101
 # The largest value of a resample says nothing of the largest to come.
@@ -158,16 +158,16 @@ def hysteresis(error, temperature, temperature_rate) -> float:
         raise ValueError("No hysteresis: the temperature does not both rise and fall.")
     low = max(temperature[side].min() for side in sides)
     high = max(low, min(temperature[side].max() for side in sides))
-    edges = np.linspace(low, high, _HYSTERESIS_BINS + 1)
+    edges = np.linspace(low, high, HYSTERESIS_BINS + 1)
     shared = (temperature >= low) & (temperature <= high) & (temperature_rate != 0)
-    bins = np.digitize(temperature[shared], edges[1:-1]) + _HYSTERESIS_BINS * sides[0][shared]
-    counts, sums = (np.bincount(bins, w, 2 * _HYSTERESIS_BINS) for w in (None, error[shared]))
-    means = np.where(counts < _ROWS_PER_MEAN, np.nan, sums / np.maximum(counts, 1))
+    bins = np.digitize(temperature[shared], edges[1:-1]) + HYSTERESIS_BINS * sides[0][shared]
+    counts, sums = (np.bincount(bins, w, 2 * HYSTERESIS_BINS) for w in (None, error[shared]))
+    means = np.where(counts < ROWS_PER_MEAN, np.nan, sums / np.maximum(counts, 1))
     gaps = np.abs(np.subtract(*means.reshape(2, -1)))
     if np.isnan(gaps).all():
         raise ValueError(
             "No hysteresis: warming and cooling share no temperature at which both have "
-            f"{_ROWS_PER_MEAN} rows."
+            f"{ROWS_PER_MEAN} rows."
         )
     return float(PER_HOUR * np.nanmax(gaps))
 

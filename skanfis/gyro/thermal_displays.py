@@ -7,11 +7,10 @@ import pandas as pd
 
 from ._columns import ask, check_column, evenly_chosen
 from .displays import SIDES, TWO_ROWS, GyroDisplay, bins_of, dress, figures, mark_decades, signs
+from .metrics import HYSTERESIS_BINS, ROWS_PER_MEAN
 
 # Odd, so that a bin has the rest in its middle; near rest, a bias over the rate would fill it.
 _N_BANDS, _N_RATES, _SMALLEST_SHARE = 3, 41, 0.05
-# Enough to show a loop, and few enough that every bin has rows; fewer rows have no mean.
-_N_TEMPERATURES, _FEWEST_ROWS = 25, 3
 SLOWEST = 0.05  # degC/min, below which a temperature neither rises nor falls
 _BRANCHES = {"warming": ("^-", "#c8443c"), "cooling": ("v-", "#3a6ea5")}
 # Odd ones: what an error of the scale factor adds changes its sign with the rate.
@@ -100,8 +99,8 @@ class HysteresisDisplay(GyroDisplay):
     Examples
     --------
     >>> from skanfis.gyro import HysteresisDisplay
-    >>> options = {"temperature": range(60), "temperature_rate": [1, 1, 1, -1, -1, -1] * 10}
-    >>> rates = [0] * 60, [0.01, 0.01, 0.01, 0, 0, 0] * 10, [0] * 60
+    >>> options = {"temperature": range(200), "temperature_rate": [1, -1] * 100}
+    >>> rates = [0] * 200, [0.01, 0] * 100, [0] * 200
     >>> display = HysteresisDisplay.from_predictions(*rates, **options)
     >>> round(display.tables()["bias"]["bias before, warming [deg/h]"].max())
     36
@@ -113,7 +112,7 @@ class HysteresisDisplay(GyroDisplay):
 
     @classmethod
     def _computed(cls, rows, unit):
-        bins, edges = bins_of(rows["temperature"], _N_TEMPERATURES)
+        bins, edges = bins_of(rows["temperature"], HYSTERESIS_BINS)
         branch = np.where(rows["temperature_rate"] > 0, *_BRANCHES)
         rows = rows.assign(bin=bins, branch=branch)
         moving = rows[rows["temperature_rate"].abs() >= SLOWEST]
@@ -149,8 +148,8 @@ def _bias_of_branches(rows, side):
     left = rows[side] - rows[side].groupby(keys).transform("mean")
     coefficients = np.linalg.lstsq(design, left, rcond=None)[0]
     found = (rows[side] - powers @ coefficients).groupby(keys).agg(["mean", "size"])
-    means = found["mean"].where(found["size"] >= _FEWEST_ROWS).unstack("branch")
-    return means.reindex(index=range(_N_TEMPERATURES), columns=list(_BRANCHES))
+    means = found["mean"].where(found["size"] >= ROWS_PER_MEAN).unstack("branch")
+    return means.reindex(index=range(HYSTERESIS_BINS), columns=list(_BRANCHES))
 
 
 class ResidualSurfaceDisplay(GyroDisplay):

@@ -125,7 +125,9 @@ def test_before_after_and_what_is_simpler_are_of_the_same_rows():
         left[test] -= before[train].mean()
     assert verdict.rms["constant"] == pytest.approx(np.sqrt(np.mean(left[rows] ** 2)))
     shown = errors_and_verdict(calibration)[0]
-    assert f"{verdict.rms['no compensation']:.4g} deg/s RMS, on {rows.sum():,} held" in shown
+    errors = [f"{verdict.rms[name]:.4g}" for name in ("no compensation", "constant")]
+    assert f"{errors[0]} deg/s RMS, {errors[1]} once a constant (the output at rest)" in shown
+    assert f"is taken off, on {rows.sum():,} held-out rows in range" in shown
 
 
 @pytest.mark.floors

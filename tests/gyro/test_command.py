@@ -135,17 +135,17 @@ def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path
 
 @pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize(
-    ("write", "kind"),
+    ("write", "kind", "c"),
     [
-        ("recommended", "the arcsine law"),
-        ("none", "no compensation"),
-        ("cubic", "a cubic polynomial"),
-        ("line", "a straight line"),
+        ("recommended", "the arcsine law", "c99:float"),
+        ("none", "no compensation", "c89"),
+        ("cubic", "a cubic polynomial", "c89:float"),
+        ("line", "a straight line", "c99"),
     ],
 )
-def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind, capsys):
+def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind, c, capsys):
     path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
-    arguments = [path, "--inputs", "temperature", "output", "--terms", "1,1", "--c", "c99"]
+    arguments = [path, "--inputs", "temperature", "output", "--terms", "1,1", "--c", c]
     assert main([*arguments, "--write", write, "--output", str(out)]) == 0
     said = capsys.readouterr().out
     assert f"written is     {kind}, as" in said
@@ -166,6 +166,11 @@ def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind,
     header = (out / "compensator.h").read_text(encoding="ascii")
     assert "Unit assumed: 'output' has no unit, taken as deg/s" in header
     assert "[0] temperature" in header
+    assert f"; {c[:3].upper()}, {'float' if 'float' in c else 'double'}." in header
+    # A law alone has no rules, and no edge that is held.
+    goes_on = "Outside this range the law goes on as it is." in header
+    assert goes_on == (write == "recommended")
+    assert "the rules" not in header
     page = (out / "report.html").read_text(encoding="utf-8")
     assert page.index("&#39;output&#39; has no unit, taken as deg/s") < page.index("<section>")
     assert compensator.units["output"] == "deg/s"
@@ -431,6 +436,27 @@ def test_a_thermal_cycle_at_rest(tmp_path, capsys):
     log = pd.DataFrame({"time": [0.0, 1e4], "temperature": 10.0, "output": 0.31})
     # Neither warming nor cooling: between the two.
     assert compensator.apply(log)["rate_compensated"].abs().max() < 0.02
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(tmp_path, capsys):
+    log = thermal_cycle(20, -20, 60, 20).rename(columns={"gyro_y_dps": "rate [dps]"})
+    log["rate [dps]"] *= 0.05
+    path, options = tmp_path / "mems.csv", ["--write", "constant"]
+    log.to_csv(path, index=False)
+    assert main([str(path), *options, "--output", str(tmp_path / "out")]) == 0
+    told = f"is {log['rate [dps]'].abs().max():.3g} deg/s at most and not used (if it is the gyro's"
+    assert told in capsys.readouterr().out
+    log.assign(gyro_x_dps=3).to_csv(path, index=False)
+    assert main([str(path), *options]) == 3
+    assert "all values are 3" in (said := capsys.readouterr().err)
+    assert "--columns output=NAME" in said
+    log.drop(columns="rate [dps]").assign(gyro_x_dps=3).to_csv(path, index=False)
+    assert main([str(path), *options]) == 3
+    assert "'gyro_x_dps' is taken for the output, no column for the true rate" in (
+        said := capsys.readouterr().err
+    )
+    assert "the output is 3 throughout: no gyro gives that." in said
 
 
 @pytest.mark.usefixtures("no_report")

@@ -12,6 +12,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis.datasets import make_ofog
+from skanfis.export import export_c
 from skanfis.gyro import (
     GyroCompensator,
     OpenLoopArcsineRegressor,
@@ -115,8 +116,16 @@ def test_json_gives_the_same_compensator(log, compensator, parameters, tmp_path)
     np.testing.assert_allclose(two, one, rtol=1e-9, atol=1e-12)
     read.write_json(tmp_path / "again.json")
     assert (tmp_path / "again.json").read_text() == path.read_text()
-    assert (read.inputs, read.scale_factor) == (INPUTS, FACTOR)
+    used = INPUTS
+    if parameters is not None:
+        taken = {"temperature": "temperature"} | parameters
+        used = tuple(name for name in INPUTS if name in {"output", "time", *taken.values()})
+    assert (read.inputs, read.scale_factor) == (used, FACTOR)
     if parameters is None:
+        with pytest.raises(TypeError, match=r"got FrozenRules.* Its model is one\.$"):
+            export_c(read.estimator, name="gyro")
+        code = export_c(read.estimator.model, name="gyro")
+        assert code.source == export_c(compensator.estimator, name="gyro").source
         return
     # What was read can be written as C too.
     codes = [export_c_physics(part.estimator, name="gyro") for part in (compensator, read)]
@@ -237,5 +246,6 @@ def test_what_is_no_json_is_refused(tmp_path):
     path = tmp_path / "compensator.json"
     for content in (b"\xff", b"{", b"[" * 100_000):
         path.write_bytes(content)
-        with pytest.raises(ValueError, match="is no gyro compensator"):
+        with pytest.raises(ValueError, match="is no gyro compensator") as refused:
             GyroCompensator.read_json(path)
+        assert ("it is not the JSON that" in str(refused.value)) == (len(content) == 1)

@@ -143,6 +143,18 @@ def test_error_band_keeps_every_peak_and_leaves_gaps_open(log):
     assert refused.tables()["whole"]["RMS error [deg/s]"][1] == pytest.approx(0.001, rel=0.1)
 
 
+def test_a_band_between_bands_without_rows_is_drawn_too():
+    position, error = np.repeat(np.arange(10.0), 2), np.tile([-1.0, 2.0], 10)
+    rates = np.zeros(20), error, 0.1 * error
+    display = ErrorDisplay.from_predictions(*rates, position=position)
+    bands = display.tables()["bands"].dropna()
+    assert len(bands) == 10
+    for panel, size in zip(display.axes_, (1.0, 0.1), strict=True):
+        boxes = [path.get_extents() for path in panel.collections[0].get_paths()]
+        np.testing.assert_allclose(bands.iloc[:, :2], [box.intervalx for box in boxes])
+        np.testing.assert_allclose([box.intervaly for box in boxes], [[-size, 2.0 * size]] * 10)
+
+
 def test_hysteresis_is_that_of_the_law(log):
     bias = (0.5 * log["temperature"] + 10.0 * log["temperature_rate"]) / 3600.0
     # A scale factor that changes with temperature, and its cube, are no bias.

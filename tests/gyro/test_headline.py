@@ -9,7 +9,7 @@ import pytest
 from skanfis.datasets import make_ofog
 from skanfis.gyro import OpenLoopArcsineRegressor
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._headline import law_text, proven_bounds
+from skanfis.gyro._headline import flagged_text, law_text, proven_bounds, rules_text
 from skanfis.gyro._split import choose_split
 
 pytestmark = pytest.mark.usefixtures("few_rivals")
@@ -41,6 +41,32 @@ def test_largest_compensation_of_a_line_is_that_of_its_corner():
     corner = np.abs(output - (output - 0.005 - 2e-4 * heat) / 1.001).max()
     assert certain.largest == pytest.approx(corner, rel=1e-3)
     assert certain.rate_rises is True
+
+
+def test_the_text_of_the_rules_gives_what_they_give():
+    """Read with a pencil: off by less than a hundredth of the noise."""
+    calibration = calibrated(lambda t: 0.005 + 1e-3 * t, gain=1.001, scatter=0.0)
+    text = rules_text(calibration)
+    sentence = " ".join(text[text.index("THEN error") :].partition("\n\n")[0].split())
+    value = float(re.search(r"is about (\S+?)[:.]? ", f"{sentence} ")[1])
+    for slope, name, place in re.findall(r"([+-]\S+) per (\w+) from ([-.e\d]*\d)", sentence):
+        value = value + float(slope) * (calibration.X[name] - float(place))
+    off = value - calibration.model.predict(calibration.X)
+    assert np.sqrt(np.mean(off**2)) < 0.01 * NOISE
+    assert "digits" not in text
+
+
+def test_flagged_rows_are_counted_by_the_input_to_blame():
+    calibration = calibrated(lambda t: 1e-3 * t)
+    X, labels, counts = calibration.X, calibration.split.labels, {}
+    for name in X:
+        # The rows beyond all that the other folds' runs reach.
+        folds = [(np.isin(labels, labels[test]), test) for _, test in calibration.split.folds]
+        ends = [(X[name][~own].min(), X[name][~own].max(), test) for own, test in folds]
+        counts[name] = sum((~X[name].iloc[test].between(*at)).sum() for *at, test in ends)
+    named = ", ".join(f"{name} in {counts[name]}" for name in sorted(counts, key=counts.get)[::-1])
+    assert min(counts.values()) > 0
+    assert f"were flagged ({named})." in flagged_text(calibration)
 
 
 @pytest.mark.parametrize(("unit", "gain"), [("deg/s", -0.5), ("counts", -131.0)])

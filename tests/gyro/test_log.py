@@ -191,7 +191,9 @@ def test_a_log_at_rest_is_told_from_one_that_moves(log):
     at_rest = make_ofog(n_devices=1, n_runs=3, rates=[0.0], profile="ramps", random_state=0)
     check_at_rest(at_rest, "deg/s")
     check_at_rest(at_rest.assign(output=3e4 * at_rest["output"]).round(0), "counts")
-    check_at_rest(at_rest.assign(output=0.5, rate=0.0042), "deg/s")
+    check_at_rest(at_rest.assign(rate=0.0042), "deg/s")
+    with pytest.raises(LogError, match="is 3 throughout: no gyro gives that"):
+        check_at_rest(at_rest.assign(output=3.0), "deg/s")
     with pytest.raises(LogError, match="deg/s: the gyro was not at rest") as caught:
         check_at_rest(log, "deg/s")
     assert caught.value.column == "rate"

@@ -261,6 +261,22 @@ def test_what_is_no_log_is_refused_in_words(tmp_path, content, message):
         found(path)
 
 
+@pytest.mark.parametrize("form", ["%Y-%m-%d", "%d.%m.%Y"])
+def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
+    """Runs a day apart, by whose hours alone each would go on from the one before."""
+    clock = 36_000 + 10 * np.arange(300) + 86_400 * truth["run"].astype(int)
+    moment = pd.Timestamp("2024-02-27") + pd.to_timedelta(clock, unit="s")
+    table = truth[["temperature", "output", "rate"]].assign(
+        Remark="", Date=moment.dt.strftime(form), Time=moment.dt.strftime("%H:%M:%S")
+    )
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    same(reading, truth)
+    np.testing.assert_array_equal(np.diff(reading.log["time"]), np.diff(clock))
+    assert (reading.log["run"].astype(int) == truth["run"].astype(int) + 1).all()
+    assert "time = 'Time' on 'Date'; " in "; ".join(reading.notes)
+
+
 LVM = """LabVIEW Measurement\t
 Writer_Version\t2
 Separator\tTab

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import joblib
 import numpy as np
@@ -68,11 +69,49 @@ def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, capsys):
     assert "runs the code" in capsys.readouterr().err
     rates = pd.read_csv("log-compensated.csv")
     np.testing.assert_allclose(rates["rate_compensated"], files["output"] - 0.5)
+    Path("damaged.joblib").write_bytes(b"{}")
     joblib.dump({"a": 1}, "model.joblib")
-    for model, message in (("model.joblib", "holds a dict"), ("model.json", "JSON needs none")):
+    for model, message in (
+        ("model.joblib", "holds a dict"),
+        ("damaged.joblib", "is no file of joblib, or a damaged one"),
+        ("model.json", "JSON needs none"),
+    ):
         with pytest.raises(SystemExit, match="2"):
             main(["--apply", model, "log.csv", "--trust", "--force"])
         assert message in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("files")
+def test_apply_refuses_options_of_a_calibration_by_name(tmp_path, capsys):
+    for arguments, told in (
+        (
+            ["--apply", "model.json", "--terms", "1", "--write", "law"],
+            "--terms, --write: of no use with --apply.",
+        ),
+        (
+            ["--apply", "model.json", "--scale-factor", "3"],
+            "--scale-factor: of no use with --apply.",
+        ),
+        (["--trust"], "--trust: of no use without --apply."),
+    ):
+        with pytest.raises(SystemExit, match="2"):
+            main(["log.csv", *arguments])
+        assert told in capsys.readouterr().err
+    assert not list(tmp_path.glob("log-compen*"))
+
+
+def test_apply_tells_errors_of_flagged_rows_apart(files, tmp_path, capsys):
+    # The model takes 0.5 off; three rows are hotter than all that it has seen.
+    hot = np.arange(len(files)) < 3
+    log = files.assign(
+        rate=files["output"] - np.where(hot, 2.5, 1.5), temperature=files["temperature"] + 99 * hot
+    )
+    log.to_csv(tmp_path / "new.csv", columns=["temperature", "output", "rate"], index=False)
+    assert main(["--apply", "model.json", "new.csv"]) == 0
+    out = capsys.readouterr().out
+    assert "1.5 deg/s before, 1 after (rows with status 0)" in out
+    assert "2.5 deg/s before, 2 after (the flagged rows)" in out
+    assert "3 rows out of range (temperature in 3)" in out
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,8 @@ from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
 from skanfis.gyro._models import make_law
 from skanfis.gyro._simpler import fitted_rule, kinds
+from skanfis.gyro.c_code import export_c_compensator
+from skanfis.gyro.compensator import as_written
 
 INPUTS = ("time", "temperature", "output")
 CUBIC = make_pipeline(StandardScaler(), PolynomialFeatures(3), LinearRegression())
@@ -59,13 +61,19 @@ def test_it_gives_what_the_model_gives_and_knows_the_rows(case, log):
 
 
 def test_the_file_of_it_gives_the_same(case, log, tmp_path):
-    _, estimator, predicts = case
+    kind, estimator, predicts = case
     compensator = GyroCompensator(estimator, INPUTS, predicts=predicts)
     compensator.write_json(tmp_path / "it.json")
     again = GyroCompensator.read_json(tmp_path / "it.json")
+    # The law has no use for the time: neither the file nor the C code asks for it.
+    assert again.inputs == (INPUTS[1:] if kind == "arcsine law" else INPUTS)
+    assert again.inputs == as_written(compensator).inputs
+    header = export_c_compensator(again, tmp_path / "it", std="c99").header
+    assert ("time is that since power-on" in header) == ("time" in again.inputs)
     warm = log.assign(temperature=log["temperature"] + 10.0, output=1.2 * log["output"])
     for rows in (log, warm):
-        found, expected = again.apply(rows), compensator.apply(rows)
+        found = again.apply(rows[[*again.inputs]])
+        expected = compensator.apply(rows)
         np.testing.assert_array_equal(found.to_numpy(), expected.to_numpy())
 
 

@@ -107,6 +107,17 @@ def test_a_choice_never_leaks():
         assert not np.isin(log["run"][test], log["run"][train]).any()
 
 
+def test_a_rate_of_one_row_or_two_is_no_level():
+    rate = np.repeat([10.0, 20, 30, 40, 50, 64, 77], [5, 5, 5, 5, 5, 1, 2])
+    columns = {"rate": rate, "output": rate, "temperature": np.linspace(0.0, 50.0, rate.size)}
+    split = choose_split(pd.DataFrame(columns), "level")
+    assert "(5 levels, 5 folds" in split.sentence
+    # Its rows go with the nearest.
+    assert np.unique(split.labels, return_counts=True)[1].tolist() == [5, 5, 5, 5, 8]
+    with pytest.raises(LogError, match="the log has 4 level"):
+        choose_split(pd.DataFrame(columns)[5:], "level")
+
+
 def test_levels_do_not_matter_to_a_compensator_that_does_not_see_the_output():
     log = log_of(n_devices=1, n_runs=4, rates=LEVELS)
     assert choose_split(log, uses_output=False).kind == "run"

@@ -114,9 +114,11 @@ def test_all_files_tell_what_the_first_leaves_open(tmp_path, truth):
     log = truth.assign(temperature=np.linspace(50.0, 10.0, len(truth)))
     found = reading(tmp_path, log, NAMES, (1, 1, 1, 1), paths=4)
     assert found.units["temperature"] == "degC"
+    assert "taken as degC (10 to 50; degF?" in found.assumed["temperature"]
     fahrenheit = reading(tmp_path, log.assign(temperature=log["temperature"] + 5), NAMES,
                          (1, 1.8, 1, 1), (0, 32, 0, 0), paths=4)  # fmt: skip
     assert fahrenheit.units["temperature"] == "degF"
+    assert "taken as degF (59 to 131; degC?" in fahrenheit.assumed["temperature"]
     np.testing.assert_allclose(fahrenheit.log["temperature"], log["temperature"] + 5, atol=1e-9)
 
 
