@@ -160,14 +160,14 @@ def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
     These are the sides of cuts; a name that somebody has given stays. Where every training row is
-    on one side, to so many digits, the width is left out, and the cut is crisp.
+    on one side, to so many digits but not to all, the width is left out, and the cut is crisp.
     """
     antecedent, box = model.antecedent, (model.minimum, model.maximum)
     default = default_term_names(antecedent, *box)
     of_digits = default_term_names(antecedent, *box, digits)
     names, says_where = list(model.term_names), np.zeros(len(default), dtype=bool)
     groups, start, seen = [], 0, _seen(model)
-    sure = np.log(10.0 ** max(digits, PRECISION) - 1.0)
+    sure = np.log(10.0 ** max(digits, PRECISION) - 1.0) if digits < MOST_DIGITS else np.inf
     for group in antecedent.groups:
         theta = _rounded_theta(group, digits)
         for k, t in enumerate(range(start, start + group.n_terms)):

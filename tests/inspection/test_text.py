@@ -15,6 +15,7 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
+from skanfis.export import export_json, read_json
 from skanfis.inspection import export_text, rules_html
 from skanfis.inspection.sentences import Sentences, rounded
 from skanfis.inspection.text import number
@@ -145,6 +146,21 @@ def test_a_width_is_left_out_where_every_row_is_on_one_side(rng, gap):
     # Of a model that knows no rows the width is told.
     unknown = replace(model.model_, support=replace(model.model_.support, marginals=()))
     assert "±" in export_text(unknown)
+
+
+def test_all_digits_leave_no_width_out(rng, tmp_path):
+    X = rng.uniform(size=(400, 2)) + [100.0, 0.0] * (np.arange(400) < 100)[:, None]
+    y = np.where(X[:, 0] > 50.0, 3.0, X[:, 1]) + 0.1 * rng.standard_normal(400)
+    model = ANFISRegressor(partition="tree", max_rules=2).fit(X, y).model_
+    # In the middle of the gap, so narrow that the cut is crisp on all rows to the last bit.
+    narrow = TreeAntecedent.build([0], np.array([[50.0], [0.0]]), model.antecedent.paths)
+    model = replace(model, antecedent=narrow, term_names=())
+    assert "±" not in export_text(model)
+    text, between = export_text(model, precision=17), np.full((11, 2), 0.5)
+    between[:, 0] = np.linspace(45.0, 55.0, 11)
+    assert_allclose(predicted(text, between, ("x0", "x1")), model.predict(between), atol=1e-9)
+    export_json(model, tmp_path / "tree.json")
+    assert "x0 > 50 ± 2.1972" in export_text(read_json(tmp_path / "tree.json"))
 
 
 def test_a_rule_by_hand():
