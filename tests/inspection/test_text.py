@@ -16,7 +16,7 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
 from skanfis.export import export_json, read_json
-from skanfis.inspection import export_text, rules_html
+from skanfis.inspection import export_text, readability, rules_html
 from skanfis.inspection.sentences import Sentences, rounded
 from skanfis.inspection.text import number
 
@@ -232,6 +232,10 @@ def test_a_level_of_a_category_is_called_by_its_column():
     assert re.search(r"[-+][01]\S* if fibre is SM", told)
     assert "fibre_" not in told
     assert "fibre is not PM" in rules_html(pipe)
+    # The encoder moves columns: measured on the whole, the text errs as the fit had found.
+    measured = readability(pipe, X, y).line
+    assert "the text as printed errs" in measured
+    assert f"\n{measured}.\n" in export_text(pipe)
 
 
 @ALL
