@@ -23,7 +23,7 @@ from .rules import (
 )
 from .sentences import MOST_DIGITS, PRECISION, Sentences, rounded
 
-# Letters of a line; digits of a range.
+# Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 3
 # How to compute a prediction; the parts in braces where there is such a thing.
 _HOW = (
@@ -112,16 +112,16 @@ def export_text(
     premises, words = premise_texts(model, said.levels), ["THEN", *[" AND"] * model.n_outputs]
     for r in chosen:
         heading = ", ".join([f"Rule {r}", *_on_rows(model, found, r)])
-        parts.append(f"{heading}:\n  IF {premises[r]}")
+        lines = [f"IF {premises[r]}"]
         for k, (word, name) in enumerate(zip(words, model.output_names, strict=False)):
-            line = f"{word} {name} is {_conclusion(said, r, k)}"
-            then = fill(line, _WIDTH, initial_indent="  ", subsequent_indent="       ")
-            parts[-1] += f"\n{then}"
+            lines.append(f"{word} {name} is {_conclusion(said, r, k)}")
+        lines = [fill(one, _WIDTH, initial_indent="  ", subsequent_indent=7 * " ") for one in lines]
+        parts.append("\n".join([f"{heading}:", *lines]))
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
     if show_terms:
         parts.append(_legend(said, precision))
-    parts.append("\n".join(_last_lines(said, found, precision)))
+    parts.append("\n".join(fill(one, _WIDTH) for one in _last_lines(said, found, precision)))
     return "\n\n".join(parts)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.cluster import KMeans
 from sklearn.compose import TransformedTargetRegressor, make_column_transformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder, StandardScaler
@@ -243,6 +244,20 @@ def test_every_rule_is_told_once_the_weightiest_first(model):
     labels = [label for label, _, _ in read_text(export_text(model), NAMES).rules]
     assert sorted(labels) == list(range(model.n_rules))
     assert labels == sorted(labels, key=lambda r: (-model.rule_weights[r], r))
+
+
+def test_long_sentences_are_wrapped_and_read_as_ever(rng):
+    X = rng.normal(size=(200, 9))
+    y = 2.0 * np.abs(X[:, 0]) + 0.1 * rng.standard_normal(200)
+    names = [f"column number {j}" for j in range(9)]
+    model = ANFISRegressor(partition=KMeans(4, random_state=0), agreement=0.0).fit(X, y)
+    text = export_text(model, feature_names=names)
+    premise, findings = text.partition("  IF ")[2], text.partition("Rules go different ways")[2]
+    assert "\n" in premise.partition("\n  THEN")[0]
+    assert "\n" in findings.partition(".\n")[0]
+    assert max(map(len, text.splitlines())) <= 96
+    said = Sentences.of(model.model_).printed.predict(X)
+    assert_allclose(predicted(text, X, names), said, atol=1e-9)
 
 
 def test_rules_that_matter_and_a_line_for_the_rest():
