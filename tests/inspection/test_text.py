@@ -233,10 +233,27 @@ def test_a_level_of_a_category_is_called_by_its_column():
     assert re.search(r"[-+][01]\S* if fibre is SM", told)
     assert "fibre_" not in told
     assert "fibre is not PM" in rules_html(pipe)
+    # A category is an input in one line.
+    assert re.search(r"trained:\n  rate: \S+ to \S+\n  fibre: HB, PM, SM\nOut", export_text(pipe))
     # The encoder moves columns: measured on the whole, the text errs as the fit had found.
     measured = readability(pipe, X, y).line
     assert "the text as printed errs" in measured
     assert f"\n{measured}.\n" in export_text(pipe)
+
+
+def test_a_category_is_listed_by_its_levels(rng):
+    X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 300), "on": rng.choice(["y", "n"], 300)})
+    X["rate"] = rng.normal(size=300)
+    y = (X["sort"] == "b") + (X["on"] == "y") * X["rate"] + 0.1 * rng.normal(size=300)
+    encoder = OneHotEncoder(drop="if_binary", sparse_output=False)
+    encoder = make_column_transformer((encoder, ["sort", "on"]), remainder="passthrough")
+    pipe = make_pipeline(encoder, ANFISRegressor(n_mfs=[1, 2, 1, 1, 1])).fit(X, y)
+    lines = export_text(pipe).partition("trained:\n")[2].partition("\nOut")[0].splitlines()
+    # An indicator with terms of its own stays by itself; without it not every row has a level.
+    assert lines[0] == "  sort_b: 0 to 1"
+    assert [line.partition(":")[0] for line in lines[1:3]] == ["    low", "    high"]
+    assert lines[3].startswith("  rate: ")
+    assert lines[4:] == ["  sort: a, c, other", "  on: y, other"]
 
 
 @ALL
