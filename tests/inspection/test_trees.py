@@ -1,10 +1,15 @@
 """Pictures of a tree whose shape, values and shares are known."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from sklearn.compose import make_column_transformer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import OneHotEncoder
 
 from skanfis.inspection import TreeDisplay, export_text, rules_html
 
@@ -57,6 +62,21 @@ def test_branches_are_as_thick_as_the_rows_that_take_them():
     # The first two come from the root, which all rows pass.
     assert_allclose(widths[:2].sum(), 2 * 0.6 + 6.0)
     assert_allclose(widths[0], 0.6 + 6.0 * LEADS[:3].sum())
+
+
+def test_cuts_are_called_as_in_the_text(rng):
+    X = pd.DataFrame({"price in $": rng.normal(size=400), "shelf": rng.choice(["a", "b"], 400)})
+    y = np.where(X["shelf"] == "b", 3.0, np.tanh(9.0 * X["price in $"])) + rng.normal(size=400) / 9
+    encoder = make_column_transformer(
+        (OneHotEncoder(drop="if_binary", sparse_output=False), ["shelf"]), remainder="passthrough"
+    )
+    pipe = make_pipeline(encoder, quick(partition="tree", max_rules=3, order=0)).fit(X, y)
+    told = re.findall(r"^  IF (.*)$", export_text(pipe), flags=re.MULTILINE)
+    asked = {part for premise in told for part in premise.split(" AND ")}
+    assert {"shelf is b", "shelf is not b"} < asked
+    display = TreeDisplay.from_estimator(pipe)
+    shown = {text.replace(r"\$", "$") for text in texts(display)}
+    assert shown == asked | set(display.leaves)
 
 
 def plane(rng, n_rows=300):
