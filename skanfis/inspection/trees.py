@@ -14,7 +14,7 @@ from .displays import _axes, _position, _section
 from .labels import as_label, title_of
 from .rules import condition, parts_led, writable
 from .sentences import Sentences
-from .text import percent, plain
+from .text import counted, percent, plain
 
 # Inches: of a letter, of a leaf, around the tree.
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
@@ -85,8 +85,8 @@ class TreeDisplay:
         model = writable(folded)
         if not isinstance(model.antecedent, TreeAntecedent):
             raise ValueError(
-                f"The {model.n_rules} rules are no tree: there are no cuts to draw. Fit with "
-                "partition='tree'."
+                f"The model has {counted(model.n_rules, 'rule')} and is no tree: there are no cuts "
+                "to draw. partition='tree' makes one where it finds two rules or more."
             )
         inputs = np.unique(model.antecedent.term_inputs)
         if kind == "plane" and inputs.size != 2:
