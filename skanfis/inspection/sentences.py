@@ -57,10 +57,10 @@ class Sentences:
         slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
         scale, noise = _resolution(model, slopes)
         two_valued = _two_valued(model)
-        digits = max(_DIGITS_OF_PLACE, precision)
+        digits, centers = max(_DIGITS_OF_PLACE, precision), rule_centers(model)
         places, common_place = (
             np.where(two_valued, np.round(np.clip(at, 0.0, 1.0)), rounded(at, model.spread, digits))
-            for at in (rule_centers(model), model.reference)
+            for at in (centers, model.reference)
         )
         away = places - model.reference
         values = model.coefficients[:, 0] + np.einsum("rj,rjo->ro", away, slopes)
@@ -69,6 +69,10 @@ class Sentences:
         first = is_common.argmax(axis=0), np.arange(model.n_inputs)
         common = np.where(np.any(is_common, axis=0, keepdims=True).T, slopes[first], 0.0)
         part = np.where(is_common[:, :, None], common, 0.0)
+        if precision < MOST_DIGITS:
+            # A case that all rows of a rule are, or none is, changes nothing there.
+            is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
+            slopes[is_fixed[:, :, None] & (common == 0.0)] = 0.0
         of_common = np.einsum("rj,rjo->ro", places - common_place, part)
         # Beside a common slope that of nothing is to be said as well.
         is_own = ~is_common[:, :, None] & ((slopes != 0.0) | (common != 0.0))

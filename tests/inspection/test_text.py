@@ -241,6 +241,27 @@ def test_a_level_of_a_category_is_called_by_its_column():
     assert f"\n{measured}.\n" in export_text(pipe)
 
 
+def test_a_rule_says_nothing_of_cases_that_none_of_its_rows_are(rng):
+    group, on = rng.integers(0, 3, 300), rng.integers(0, 2, 300)
+    X = np.column_stack([group[:, None] == [0, 1, 2], on]).astype(float)
+    y = np.where(group == 1, 5.0 * on, 3.0 + group) + 0.5 * rng.normal(size=300)
+    # Where alpha is given no slope is in common, and a weak one draws slopes together.
+    model = ANFISRegressor(partition="tree", max_rules=2, alpha=0.01).fit(X, y).model_
+    assert (model.coefficients[:, 1:4, 0] != 0.0).all()
+    names = ["a", "b", "c", "on"]
+    text, full = (export_text(model, precision=n, feature_names=names) for n in (2, 17))
+    read = {dict(asked)["b"]: said["y"][2] for _, asked, said in read_text(text, names).rules}
+    assert list(read["1"]) == ["on"]
+    assert "b" not in read["0"]
+    assert {"a", "c"} < read["0"].keys()
+    said = Sentences.of(model).printed.predict(X)
+    assert_allclose(predicted(text, X, names), said, atol=1e-9)
+    assert np.abs(said - model.predict(X)).max() < 0.1
+    # To the last digit the model is told of rows as well that are two cases at once.
+    both = np.array([[1.0, 1.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0]])
+    assert_allclose(predicted(full, both, names), model.predict(both), atol=1e-9)
+
+
 def test_a_category_is_listed_by_its_levels(rng):
     X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 300), "on": rng.choice(["y", "n"], 300)})
     X["rate"] = rng.normal(size=300)
