@@ -16,6 +16,7 @@ PAGES = ("quickstart", "from_matlab")
 # How many lines of code there are at least: a page that lost them is no page that works.
 WITH_PROMPTS = {
     "add_a_membership": 5,
+    "choosing": 15,
     "files": 5,
     "how_sure": 15,
     "large_data": 5,
@@ -64,6 +65,12 @@ def test_page_with_prompts(page, tmp_path, monkeypatch):
     failed, tried = doctest.testfile(path, module_relative=False, optionflags=LOOSELY)
     assert tried > WITH_PROMPTS[page]
     assert failed == 0
+
+
+def test_every_page_with_prompts_is_run():
+    assert set(WITH_PROMPTS) == {
+        page.stem for page in DOCS.glob("*.rst") if ">>> " in page.read_text("utf-8")
+    }
 
 
 def test_limits_of_reading_rules_are_those_of_the_package():

@@ -301,8 +301,8 @@ def _refuse(label, step, reason):
     raise ValueError(
         f"{_described(label, step)} cannot be folded into the rules: {reason}. StandardScaler, "
         "MinMaxScaler, MaxAbsScaler, RobustScaler, OneHotEncoder, column selections and "
-        "ColumnTransformers of these can. For rules in the units of that step's output, give the "
-        "ANFIS estimator alone."
+        "ColumnTransformers of these can. For rules in the units of that step's output, give what "
+        "is behind it: pipeline[-1], or regressor_ of a TransformedTargetRegressor."
     )
 
 

@@ -127,7 +127,9 @@ def draw(blocks, n_draws, rng):
 
 
 class ProductAnova:
-    """Of one output of rules whose strengths are products."""
+    """Of one output of rules whose strengths are products; ``error`` is what a share is off by."""
+
+    error = 0.0
 
     def __init__(self, model, output, blocks):
         self.n_rules, self.n_blocks = model.n_rules, len(blocks)
@@ -214,6 +216,8 @@ def _but_rounding(variance, mean):
 
 class DrawnAnova:
     """The same of any rules, by draws."""
+
+    error = 0.02
 
     def __init__(self, model, output, blocks):
         self.model, self.output, self.blocks = model, output, blocks

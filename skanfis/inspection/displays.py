@@ -124,13 +124,12 @@ def _draw_terms(axes, terms):
     if terms.counts is not None:
         heights = terms.counts / max(terms.counts.max(), 1)
         axes.stairs(heights, terms.edges, fill=True, color="0.9", zorder=0)
-    # Colours in the order of places: scattered terms come in the order of their rules.
+    # In the order of places: scattered terms come in the order of their rules.
     places = terms.after @ terms.grid / terms.after.sum(axis=1)
-    rank = np.argsort(np.argsort(places, kind="stable"))
-    shades = _pyplot().get_cmap()(np.linspace(0.0, _BRIGHTEST, len(names)))[rank]
-    for name, before, after, shade in zip(names, terms.before, terms.after, shades, strict=True):
-        axes.plot(terms.grid, before, "--", color=shade, linewidth=1.0, alpha=0.7)
-        axes.plot(terms.grid, after, color=shade, linewidth=1.8, label=name)
+    shades = _pyplot().get_cmap()(np.linspace(0.0, _BRIGHTEST, len(names)))
+    for t, shade in zip(np.argsort(places, kind="stable"), shades, strict=True):
+        axes.plot(terms.grid, terms.before[t], "--", color=shade, linewidth=1.0, alpha=0.7)
+        axes.plot(terms.grid, terms.after[t], color=shade, linewidth=1.8, label=names[t])
     axes.set(xlabel=as_label(terms.input_name), ylabel="membership", ylim=(0.0, 1.05))
     axes.set_xlim(terms.grid[0], terms.grid[-1])
     if len(names) <= _MOST_NAMED:
@@ -182,8 +181,8 @@ class ResponseSurfaceDisplay:
         cls,
         estimator: Any,
         X: ArrayLike | None = None,
-        *,
         features: Any = (0, 1),
+        *,
         held: dict[str, Any] | None = None,
         output: int | str = 0,
         grid_resolution: int = 60,

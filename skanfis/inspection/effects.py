@@ -139,7 +139,7 @@ def _notes(table, held, is_drawn):
     if is_drawn:
         notes.append(
             "The strengths of these rules are no products of functions of one input: shares are "
-            f"from {N_DRAWS:,} draws, good to about 0.02."
+            f"from {N_DRAWS:,} draws, that of an input or a pair good to about {DrawnAnova.error}."
         )
     return notes
 

@@ -14,8 +14,10 @@ from .effects import Study
 from .labels import as_label
 
 _N_POINTS, _N_ACROSS = 61, 31
-# A pair of a smaller share is not drawn.
+# A pair of a smaller share, beside what that may be off by, is not drawn.
 _LEAST = 0.005
+# Letters of labels that stand side by side under a panel, each as wide as the longest.
+_MOST_LETTERS = 24
 # Above and below the curves, as a part of what they span: below stand the data.
 _ROOM = 0.2
 
@@ -82,10 +84,11 @@ class EffectsDisplay:
         share = dict(zip([*ones, *pairs], study.sobol([*ones, *pairs]), strict=True))
         totals = study.anova.totals()
         ones = sorted(ones, key=lambda one: -totals[one[0]])[:max_shown]
-        pairs = sorted(pairs, key=lambda pair: -share[pair])[:2]
+        least = _LEAST + study.anova.error
+        pairs = sorted([v for v in pairs if share[v] > least], key=lambda pair: -share[pair])[:2]
         return cls(
             curves=[_curve(study, *one) | {"share": share[one]} for one in ones],
-            pairs=[_pair(study, *v) | {"share": share[v]} for v in pairs if share[v] > _LEAST],
+            pairs=[_pair(study, *v) | {"share": share[v]} for v in pairs],
             output_name=study.model.output_names[study.output],
         ).plot(ax=ax)
 
@@ -185,14 +188,14 @@ def _draw_curve(axes, curve):
         axes.plot(points, mean, color="black", linewidth=1.8)
     axes.set_xlim(curve["edges"][0], curve["edges"][-1])
     _name(axes.xaxis, curve["input"], points, curve["levels"])
-    title = f"alone {100.0 * curve['share']:.0f} % of variance"
+    title = f"alone {round(100.0 * curve['share'])} % of variance"
     axes.set_title(title, fontsize="small", loc="left")
 
 
 def _draw_pair(axes, pair):
     largest = np.abs(pair["effect"]).max()
     shown = axes.pcolormesh(*pair["points"], pair["effect"], vmin=-largest, vmax=largest)
-    label = f"together {100.0 * pair['share']:.0f} % of variance"
+    label = f"together {round(100.0 * pair['share'])} % of variance"
     bar = axes.figure.colorbar(shown, ax=axes, location="top")
     bar.set_label(label, fontsize="small", loc="left")
     sides = zip(pair["inputs"], pair["points"], pair["levels"], strict=True)
@@ -204,3 +207,6 @@ def _name(side, name, points, levels):
     side.set_label_text(as_label(name))
     if levels is not None:
         side.set_ticks(points, [as_label(level) for level in levels])
+        if len(levels) * max(map(len, levels)) > _MOST_LETTERS:
+            turned = 90.0 if side.axis_name == "x" else 0.0
+            side.set_tick_params(rotation=turned, labelsize="x-small")

@@ -21,6 +21,8 @@ from .text import counted, number
 GREATEST_ALONE = 0.5
 # What the text as printed may err, over the model's error.
 GREATEST_ERROR = 1.05
+# Errors of no more are rounding's, as of predictions that are the target.
+_ROUNDING = np.sqrt(np.finfo(float).eps)
 # A slope has a sign where it is this many of its deviations from zero; in rules of this part of the
 # weight.
 _DEVIATIONS, _LEAST_WEIGHT = 2.0, 0.05
@@ -108,7 +110,7 @@ class Readability:
     def summary(self) -> Any:
         """The worst of each figure, over outputs."""
         found = self.measures
-        is_known = (found.errors > 0.0).all()
+        is_known = (found.errors > _ROUNDING).all()
         ratio = found.printed_errors / found.errors if is_known else np.array([np.nan])
         figures = {"strongest_alone": found.alone.max(), "text_over_model": ratio.max()}
         return pd.Series(figures, name="readability")

@@ -70,7 +70,9 @@ def readability_in_training(estimator, model):
     found = getattr(last, "readability_", None)
     if found is None:
         return None
-    if np.array_equal(model.coefficients, found.model.coefficients):
+    # Columns that were moved and not scaled have the same numbers, rounded as they were.
+    own, fitted = (np.sort(one.coefficients, axis=1) for one in (model, found.model))
+    if np.array_equal(own, fitted):
         return replace(found, model=model)
     # Behind a scaler: numbers are rounded in other units now, and what they err is not known.
     unknown = np.full(model.n_outputs, np.nan)

@@ -57,10 +57,10 @@ class Sentences:
         slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
         scale, noise = _resolution(model, slopes)
         two_valued = _two_valued(model)
-        digits = max(_DIGITS_OF_PLACE, precision)
+        digits, centers = max(_DIGITS_OF_PLACE, precision), rule_centers(model)
         places, common_place = (
             np.where(two_valued, np.round(np.clip(at, 0.0, 1.0)), rounded(at, model.spread, digits))
-            for at in (rule_centers(model), model.reference)
+            for at in (centers, model.reference)
         )
         away = places - model.reference
         values = model.coefficients[:, 0] + np.einsum("rj,rjo->ro", away, slopes)
@@ -69,6 +69,10 @@ class Sentences:
         first = is_common.argmax(axis=0), np.arange(model.n_inputs)
         common = np.where(np.any(is_common, axis=0, keepdims=True).T, slopes[first], 0.0)
         part = np.where(is_common[:, :, None], common, 0.0)
+        if precision < MOST_DIGITS:
+            # A case that all rows of a rule are, or none is, changes nothing there.
+            is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
+            slopes[is_fixed[:, :, None] & (common == 0.0)] = 0.0
         of_common = np.einsum("rj,rjo->ro", places - common_place, part)
         # Beside a common slope that of nothing is to be said as well.
         is_own = ~is_common[:, :, None] & ((slopes != 0.0) | (common != 0.0))
@@ -160,14 +164,14 @@ def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
     These are the sides of cuts; a name that somebody has given stays. Where every training row is
-    on one side, to so many digits, the width is left out, and the cut is crisp.
+    on one side, to so many digits but not to all, the width is left out, and the cut is crisp.
     """
     antecedent, box = model.antecedent, (model.minimum, model.maximum)
     default = default_term_names(antecedent, *box)
     of_digits = default_term_names(antecedent, *box, digits)
     names, says_where = list(model.term_names), np.zeros(len(default), dtype=bool)
     groups, start, seen = [], 0, _seen(model)
-    sure = np.log(10.0 ** max(digits, PRECISION) - 1.0)
+    sure = np.log(10.0 ** max(digits, PRECISION) - 1.0) if digits < MOST_DIGITS else np.inf
     for group in antecedent.groups:
         theta = _rounded_theta(group, digits)
         for k, t in enumerate(range(start, start + group.n_terms)):

@@ -23,8 +23,10 @@ from .rules import (
 )
 from .sentences import MOST_DIGITS, PRECISION, Sentences, rounded
 
-# Letters of a line; digits of a range.
+# Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 3
+# What shares that sum to one may lack of it.
+_ROUNDING = 1e-9
 # How to compute a prediction; the parts in braces where there is such a thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
@@ -112,16 +114,16 @@ def export_text(
     premises, words = premise_texts(model, said.levels), ["THEN", *[" AND"] * model.n_outputs]
     for r in chosen:
         heading = ", ".join([f"Rule {r}", *_on_rows(model, found, r)])
-        parts.append(f"{heading}:\n  IF {premises[r]}")
+        lines = [f"IF {premises[r]}"]
         for k, (word, name) in enumerate(zip(words, model.output_names, strict=False)):
-            line = f"{word} {name} is {_conclusion(said, r, k)}"
-            then = fill(line, _WIDTH, initial_indent="  ", subsequent_indent="       ")
-            parts[-1] += f"\n{then}"
+            lines.append(f"{word} {name} is {_conclusion(said, r, k)}")
+        lines = [fill(one, _WIDTH, initial_indent="  ", subsequent_indent=7 * " ") for one in lines]
+        parts.append("\n".join([f"{heading}:", *lines]))
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
     if show_terms:
         parts.append(_legend(said, precision))
-    parts.append("\n".join(_last_lines(said, found, precision)))
+    parts.append("\n".join(fill(one, _WIDTH) for one in _last_lines(said, found, precision)))
     return "\n\n".join(parts)
 
 
@@ -262,11 +264,20 @@ def _legend(said, precision):
     model, lines = said.model, ["Inputs, as they were trained:"]
     target = model.target
     named = list(compress(model.memberships(), ~said.says_where))
-    for name, low, high in zip(model.input_names, model.minimum, model.maximum, strict=True):
-        lines.append(f"  {name}: {_range(low, high, _DIGITS_OF_RANGE)}")
+    categories: dict[str, list[int]] = {}
+    for j, name in enumerate(model.input_names):
         terms = [term for term in named if term["input"] == name]
+        if said.two_valued[j] and name in said.levels and not terms:
+            categories.setdefault(said.levels[name][0], []).append(j)
+            continue
+        range_of = _range(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
+        lines.append(f"  {name}: {range_of}")
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term)}" for term in terms]
+    for name, own in categories.items():
+        levels = [said.levels[model.input_names[j]][1] for j in own]
+        levels += ["other"] if model.reference[own].sum() < 1.0 - _ROUNDING else []
+        lines.append(fill(f"  {name}: {', '.join(levels)}", _WIDTH, subsequent_indent=6 * " "))
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     lines.append(fill(f"Outside these ranges {words}: {model.policy}.", _WIDTH))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):

@@ -1,19 +1,20 @@
 """Pictures of a tree: its cuts and what stands at the leaves, and the plane that they cut."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Self, cast
 
 import numpy as np
 
 from .._validation import check_choice
 from ..antecedent import TreeAntecedent
-from ..export import fold
+from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .displays import _axes, _position, _section
 from .labels import as_label, title_of
 from .rules import condition, parts_led, writable
 from .sentences import Sentences
-from .text import percent, plain
+from .text import counted, percent, plain
 
 # Inches: of a letter, of a leaf, around the tree.
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
@@ -38,6 +39,8 @@ class TreeDisplay:
     output : int, default=0
         Whose values stand at the leaves.
     kind : {"tree", "plane"}, default="tree"
+    levels : dict, default={}
+        Column and level, ("fibre", "PM"), by the name of an indicator of a ``OneHotEncoder``.
 
     Examples
     --------
@@ -53,6 +56,7 @@ class TreeDisplay:
     model: TSKModel
     output: int = 0
     kind: str = "tree"
+    levels: Mapping[str, tuple[str, str]] = field(default_factory=dict)
 
     @classmethod
     def from_estimator(
@@ -77,18 +81,19 @@ class TreeDisplay:
             If the rules are no tree, or the plane is asked of one that cuts more or fewer inputs.
         """
         check_choice("kind", kind, ("tree", "plane"))
-        model = writable(fold(estimator))
+        folded, reader = fold_with_reader(estimator)
+        model = writable(folded)
         if not isinstance(model.antecedent, TreeAntecedent):
             raise ValueError(
-                f"The {model.n_rules} rules are no tree: there are no cuts to draw. Fit with "
-                "partition='tree'."
+                f"The model has {counted(model.n_rules, 'rule')} and is no tree: there are no cuts "
+                "to draw. partition='tree' makes one where it finds two rules or more."
             )
         inputs = np.unique(model.antecedent.term_inputs)
         if kind == "plane" and inputs.size != 2:
             names = ", ".join(repr(model.input_names[j]) for j in inputs)
             raise ValueError(f"kind='plane' is of two inputs; this tree cuts {names}.")
         place = _position(output, model.output_names, "output")
-        return cls(model=model, output=place, kind=kind).plot(ax=ax)
+        return cls(model=model, output=place, kind=kind, levels=reader.levels).plot(ax=ax)
 
     @property
     def _said(self):
@@ -116,9 +121,10 @@ class TreeDisplay:
     def _draw_tree(self, ax):
         model, tree = self.model, cast(TreeAntecedent, self.model.antecedent)
         (order, ends), n_rules = tree.walk, model.n_rules
-        names = [as_label(model.input_names[j]) for j in tree.term_inputs]
+        names = [model.input_names[j] for j in tree.term_inputs]
         # Above and below each node.
-        words = list(map(condition, names, self._said.model.term_names))
+        terms = zip(names, self._said.model.term_names, strict=True)
+        words = [as_label(condition(name, term, self.levels)) for name, term in terms]
         words = np.reshape(words, (2, -1)).T[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
@@ -148,7 +154,7 @@ class TreeDisplay:
         ax.set_ylim(-0.6, n_rules - 0.2)
         ax.set_axis_off()
         name = as_label(model.output_names[self.output])
-        ax.set_title(f"{name}: typical value (strongest on)", fontsize="small", loc="left")
+        ax.set_title(f"{name}: typical value (part of the rows)", fontsize="small", loc="left")
 
     def _draw_plane(self, ax):
         model, both = self.model, np.unique(self.model.antecedent.term_inputs)

@@ -227,8 +227,20 @@ def test_what_does_not_fold_is_named(step, message):
 def test_a_bent_target_is_refused(settings):
     X, y = data()
     target = TransformedTargetRegressor(regressor(n_mfs=2), **settings, check_inverse=False)
-    with pytest.raises(ValueError, match=r"'transformer of the target' .*cannot be folded"):
+    with pytest.raises(ValueError, match=r"of the target' .*cannot be folded.* or regressor_ of a"):
         fold(target.fit(X, y + 10.0))
+    # What the message advises is the model of the transformed target.
+    said = fold(target.regressor_).predict(X)
+    back = target.transformer_.inverse_transform(said)[:, 0]
+    assert_allclose(back, target.predict(X), rtol=1e-12)
+
+
+def test_what_is_behind_a_step_that_does_not_fold_does():
+    X, y = data()
+    pipe = make_pipeline(SimpleImputer(), StandardScaler(), regressor(n_mfs=2)).fit(X, y)
+    with pytest.raises(ValueError, match=r"give what is behind it: pipeline\[-1\]"):
+        fold(pipe)
+    assert_allclose(fold(pipe[1:]).predict(X)[:, 0], pipe.predict(X), rtol=1e-9)
 
 
 def test_what_has_no_rules_is_refused():

@@ -10,10 +10,12 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.preprocessing import MinMaxScaler
 
 from skanfis import ANFISRegressor
+from skanfis.cluster import SubtractiveClustering
 from skanfis.inspection import MembershipDisplay, ResponseSurfaceDisplay
 from skanfis.inspection.labels import as_label, printable, title_of
 
 from ..export.rule_bases import EVERY_PAIR, MODELS
+from ..quick import quick
 
 plt = pytest.importorskip("matplotlib.pyplot")
 A_GRID = MODELS["grid, order 1, 1 outputs"]
@@ -64,6 +66,19 @@ class TestMemberships:
         assert [text.get_text() for text in legend.get_texts()] == ["low", "medium", "high"]
         lines = display.axes_[0].get_lines()
         assert [line.get_linestyle() for line in lines] == ["--", "-"] * 3
+
+    def test_terms_are_named_from_left_to_right(self):
+        x = np.linspace(0.0, 10.0, 60)[:, None]
+        centers = SubtractiveClustering(radius=0.6).fit(x).cluster_centers_[:, 0]
+        assert (np.diff(centers) < 0.0).any()
+        model = quick(partition=SubtractiveClustering(radius=0.6), max_iter=0)
+        display = MembershipDisplay.from_estimator(model.fit(x, np.sin(x[:, 0])))
+        (axes,) = display.axes_
+        near = [float(one.get_text()[5:]) for one in axes.get_legend().get_texts()]
+        assert near == sorted(near)
+        curves = [line for line in axes.get_lines() if line.get_linestyle() == "-"]
+        peaks = [display.inputs[0].grid[line.get_ydata().argmax()] for line in curves]
+        assert_allclose(peaks, near, atol=0.05)
 
     def test_on_given_axes(self, fitted):
         pipe, _ = fitted
@@ -186,7 +201,7 @@ def test_every_picture_takes_every_name():
         term_names=tuple(f"{(name, other)[t % 2]}{t}" for t in range(A_GRID.antecedent.n_terms)),
     )
     drawn(MembershipDisplay.from_estimator(model))
-    drawn(ResponseSurfaceDisplay.from_estimator(model, features=[name, f"{other}2"]))
+    drawn(ResponseSurfaceDisplay.from_estimator(model, None, [name, f"{other}2"]))
 
 
 def test_a_title_names_a_few_of_the_inputs_that_are_held():

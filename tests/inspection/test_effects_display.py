@@ -1,14 +1,18 @@
 """The picture of effects against means over the product of the inputs' values."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.cluster import KMeans
 from sklearn.compose import make_column_transformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder
 
+from skanfis import ANFISRegressor
 from skanfis.inspection import EffectsDisplay, effects
 
 from ..export.rule_bases import MODELS, build, rows_of
@@ -127,3 +131,41 @@ def test_axes_may_be_given():
     assert list(EffectsDisplay.from_estimator(model, X, ax=axes).axes_) == list(axes)
     with pytest.raises(ValueError, match="5 are needed"):
         EffectsDisplay.from_estimator(model, X, ax=axes[:2])
+
+
+def test_labels_of_many_levels_stand_apart(rng):
+    levels = ["minivan", "subcompact", "pickup", "2seater", "suv", "midsize"]
+    X = pd.DataFrame({"class": rng.choice(levels, 200), "power": rng.normal(size=200)})
+    y = X["power"] * (X["class"] == "suv") + 0.1 * rng.normal(size=200)
+    encoder = OneHotEncoder(sparse_output=False)
+    encoder = make_column_transformer((encoder, ["class"]), remainder="passthrough")
+    model = make_pipeline(encoder, quick(partition="tree", max_rules=2)).fit(X, y)
+    display = drawn(EffectsDisplay.from_estimator(model, X))
+    display.figure_.canvas.draw()
+    sides = [
+        labels
+        for axes in display.axes_
+        for labels in (axes.get_xticklabels(), axes.get_yticklabels())
+        if labels[0].get_text() in levels
+    ]
+    assert len(sides) == 2  # under a panel of its own, and beside that of the pair or under it
+    for labels in sides:
+        boxes = [one.get_window_extent() for one in labels]
+        assert not any(one.overlaps(next_one) for one, next_one in pairwise(boxes))
+
+
+def test_a_pair_within_the_error_of_draws_is_not_drawn(rng):
+    # Heavy tails, and rules that differ by the first input alone: no two do anything together.
+    X = rng.standard_t(3, (300, 9))
+    model = ANFISRegressor(
+        partition=KMeans(3, random_state=0), premise_features=[0], agreement=0.0, max_iter=0
+    ).fit(X, np.abs(X[:, 0]))
+    model = model.model_
+    coefficients = model.coefficients.copy()
+    coefficients[:, 2:] = model.target.spread / model.spread[1:, None]
+    model = replace(model, coefficients=coefficients)
+    table = effects(model, X).table["sobol"]
+    assert table[table.index.str.contains(" and ")].max() > 0.005
+    display = drawn(EffectsDisplay.from_estimator(model, X))
+    assert display.pairs == []
+    assert not any("-0 %" in axes.get_title(loc="left") for axes in display.axes_)

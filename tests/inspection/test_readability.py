@@ -14,6 +14,7 @@ from skanfis.inspection import export_text, measures, readability, rules_html
 from skanfis.inspection.readability import readability_of_rows
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
+from ..quick import quick
 
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 WELL = "Nothing measured here speaks against reading the rules one by one."
@@ -115,6 +116,17 @@ def test_estimators_around_the_model_are_measured_in_their_own_units(fitted):
     assert_same(found, readability(pipe[-1], pipe[:-1].transform(X), y))
     assert found.rules["if"][0] == "kelvin is low AND rate is low"
     assert_same(readability(pipe, X), readability(pipe, X, pipe.predict(X)))
+
+
+def test_predictions_have_no_error_that_the_text_could_raise(rng):
+    X = rng.uniform(0.0, 1.0, (200, 3))
+    y = 1e3 + X @ [1.0, 2.0, 3.0] + 0.5 * rng.normal(size=200)
+    model = quick(n_mfs=[2, 1, 1]).fit(X, y)
+    assert "errs" in readability(model, X, y).line
+    found = readability(model, X)
+    assert found.measures.errors[0] > 0.0  # by rounding
+    assert found.line == f"{found.reading_cost} numbers"
+    assert not [one for one in found.findings if "text as printed" in one]
 
 
 def test_errors_name_the_row_and_the_column(monkeypatch):

@@ -9,13 +9,15 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.cluster import KMeans
 from sklearn.compose import TransformedTargetRegressor, make_column_transformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
-from skanfis.inspection import export_text, rules_html
+from skanfis.export import export_json, read_json
+from skanfis.inspection import export_text, readability, rules_html
 from skanfis.inspection.sentences import Sentences, rounded
 from skanfis.inspection.text import number
 
@@ -147,6 +149,21 @@ def test_a_width_is_left_out_where_every_row_is_on_one_side(rng, gap):
     assert "±" in export_text(unknown)
 
 
+def test_all_digits_leave_no_width_out(rng, tmp_path):
+    X = rng.uniform(size=(400, 2)) + [100.0, 0.0] * (np.arange(400) < 100)[:, None]
+    y = np.where(X[:, 0] > 50.0, 3.0, X[:, 1]) + 0.1 * rng.standard_normal(400)
+    model = ANFISRegressor(partition="tree", max_rules=2).fit(X, y).model_
+    # In the middle of the gap, so narrow that the cut is crisp on all rows to the last bit.
+    narrow = TreeAntecedent.build([0], np.array([[50.0], [0.0]]), model.antecedent.paths)
+    model = replace(model, antecedent=narrow, term_names=())
+    assert "±" not in export_text(model)
+    text, between = export_text(model, precision=17), np.full((11, 2), 0.5)
+    between[:, 0] = np.linspace(45.0, 55.0, 11)
+    assert_allclose(predicted(text, between, ("x0", "x1")), model.predict(between), atol=1e-9)
+    export_json(model, tmp_path / "tree.json")
+    assert "x0 > 50 ± 2.1972" in export_text(read_json(tmp_path / "tree.json"))
+
+
 def test_a_rule_by_hand():
     # By the text alone, and for one row that anybody can follow.
     tree = TreeAntecedent.build(
@@ -216,6 +233,48 @@ def test_a_level_of_a_category_is_called_by_its_column():
     assert re.search(r"[-+][01]\S* if fibre is SM", told)
     assert "fibre_" not in told
     assert "fibre is not PM" in rules_html(pipe)
+    # A category is an input in one line.
+    assert re.search(r"trained:\n  rate: \S+ to \S+\n  fibre: HB, PM, SM\nOut", export_text(pipe))
+    # The encoder moves columns: measured on the whole, the text errs as the fit had found.
+    measured = readability(pipe, X, y).line
+    assert "the text as printed errs" in measured
+    assert f"\n{measured}.\n" in export_text(pipe)
+
+
+def test_a_rule_says_nothing_of_cases_that_none_of_its_rows_are(rng):
+    group, on = rng.integers(0, 3, 300), rng.integers(0, 2, 300)
+    X = np.column_stack([group[:, None] == [0, 1, 2], on]).astype(float)
+    y = np.where(group == 1, 5.0 * on, 3.0 + group) + 0.5 * rng.normal(size=300)
+    # Where alpha is given no slope is in common, and a weak one draws slopes together.
+    model = ANFISRegressor(partition="tree", max_rules=2, alpha=0.01).fit(X, y).model_
+    assert (model.coefficients[:, 1:4, 0] != 0.0).all()
+    names = ["a", "b", "c", "on"]
+    text, full = (export_text(model, precision=n, feature_names=names) for n in (2, 17))
+    read = {dict(asked)["b"]: said["y"][2] for _, asked, said in read_text(text, names).rules}
+    assert list(read["1"]) == ["on"]
+    assert "b" not in read["0"]
+    assert {"a", "c"} < read["0"].keys()
+    said = Sentences.of(model).printed.predict(X)
+    assert_allclose(predicted(text, X, names), said, atol=1e-9)
+    assert np.abs(said - model.predict(X)).max() < 0.1
+    # To the last digit the model is told of rows as well that are two cases at once.
+    both = np.array([[1.0, 1.0, 0.0, 1.0], [0.0, 1.0, 1.0, 0.0]])
+    assert_allclose(predicted(full, both, names), model.predict(both), atol=1e-9)
+
+
+def test_a_category_is_listed_by_its_levels(rng):
+    X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 300), "on": rng.choice(["y", "n"], 300)})
+    X["rate"] = rng.normal(size=300)
+    y = (X["sort"] == "b") + (X["on"] == "y") * X["rate"] + 0.1 * rng.normal(size=300)
+    encoder = OneHotEncoder(drop="if_binary", sparse_output=False)
+    encoder = make_column_transformer((encoder, ["sort", "on"]), remainder="passthrough")
+    pipe = make_pipeline(encoder, ANFISRegressor(n_mfs=[1, 2, 1, 1, 1])).fit(X, y)
+    lines = export_text(pipe).partition("trained:\n")[2].partition("\nOut")[0].splitlines()
+    # An indicator with terms of its own stays by itself; without it not every row has a level.
+    assert lines[0] == "  sort_b: 0 to 1"
+    assert [line.partition(":")[0] for line in lines[1:3]] == ["    low", "    high"]
+    assert lines[3].startswith("  rate: ")
+    assert lines[4:] == ["  sort: a, c, other", "  on: y, other"]
 
 
 @ALL
@@ -223,6 +282,20 @@ def test_every_rule_is_told_once_the_weightiest_first(model):
     labels = [label for label, _, _ in read_text(export_text(model), NAMES).rules]
     assert sorted(labels) == list(range(model.n_rules))
     assert labels == sorted(labels, key=lambda r: (-model.rule_weights[r], r))
+
+
+def test_long_sentences_are_wrapped_and_read_as_ever(rng):
+    X = rng.normal(size=(200, 9))
+    y = 2.0 * np.abs(X[:, 0]) + 0.1 * rng.standard_normal(200)
+    names = [f"column number {j}" for j in range(9)]
+    model = ANFISRegressor(partition=KMeans(4, random_state=0), agreement=0.0).fit(X, y)
+    text = export_text(model, feature_names=names)
+    premise, findings = text.partition("  IF ")[2], text.partition("Rules go different ways")[2]
+    assert "\n" in premise.partition("\n  THEN")[0]
+    assert "\n" in findings.partition(".\n")[0]
+    assert max(map(len, text.splitlines())) <= 96
+    said = Sentences.of(model.model_).printed.predict(X)
+    assert_allclose(predicted(text, X, names), said, atol=1e-9)
 
 
 def test_rules_that_matter_and_a_line_for_the_rest():

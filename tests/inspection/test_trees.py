@@ -1,10 +1,15 @@
 """Pictures of a tree whose shape, values and shares are known."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from sklearn.compose import make_column_transformer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import OneHotEncoder
 
 from skanfis.inspection import TreeDisplay, export_text, rules_html
 
@@ -59,6 +64,21 @@ def test_branches_are_as_thick_as_the_rows_that_take_them():
     assert_allclose(widths[0], 0.6 + 6.0 * LEADS[:3].sum())
 
 
+def test_cuts_are_called_as_in_the_text(rng):
+    X = pd.DataFrame({"price in $": rng.normal(size=400), "shelf": rng.choice(["a", "b"], 400)})
+    y = np.where(X["shelf"] == "b", 3.0, np.tanh(9.0 * X["price in $"])) + rng.normal(size=400) / 9
+    encoder = make_column_transformer(
+        (OneHotEncoder(drop="if_binary", sparse_output=False), ["shelf"]), remainder="passthrough"
+    )
+    pipe = make_pipeline(encoder, quick(partition="tree", max_rules=3, order=0)).fit(X, y)
+    told = re.findall(r"^  IF (.*)$", export_text(pipe), flags=re.MULTILINE)
+    asked = {part for premise in told for part in premise.split(" AND ")}
+    assert {"shelf is b", "shelf is not b"} < asked
+    display = TreeDisplay.from_estimator(pipe)
+    shown = {text.replace(r"\$", "$") for text in texts(display)}
+    assert shown == asked | set(display.leaves)
+
+
 def plane(rng, n_rows=300):
     X = rng.uniform(-1.0, 1.0, (n_rows, 3))
     y = np.where(X[:, 0] > 0.2, np.where(X[:, 2] > -0.3, 2.0, 1.0), -1.0)
@@ -81,8 +101,10 @@ def test_plane_has_the_cuts_and_the_values(rng):
 
 def test_what_cannot_be_drawn_is_refused(rng):
     X, y = plane(rng)
-    with pytest.raises(ValueError, match="The 4 rules are no tree: there are no cuts to draw"):
+    with pytest.raises(ValueError, match="The model has 4 rules and is no tree: there are no"):
         TreeDisplay.from_estimator(quick(n_mfs=[2, 1, 2]).fit(X, y))
+    with pytest.raises(ValueError, match=r"has 1 rule and is no tree: .* finds two rules or more"):
+        TreeDisplay.from_estimator(quick(partition="tree").fit(X, X[:, 0]))
     names = "'time', 'chip temperature', 'rate'"
     with pytest.raises(ValueError, match=f"is of two inputs; this tree cuts {names}"):
         TreeDisplay.from_estimator(A_TREE, kind="plane")
