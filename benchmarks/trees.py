@@ -30,7 +30,7 @@ BARS = {
 }
 _STEP = 0.02
 KINDS = ("auto", "grid", "scattered", "tree")
-_N_ROWS, _N_TEST, _SEEDS = 800, 2000, 5
+_N_ROWS, _N_TEST, _SEEDS = 800, 2000, 10
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from .._validation import feature_indices
+
 
 @dataclass(frozen=True)
 class OutputLimits:
@@ -163,11 +165,8 @@ class Constraints:
 def _signs(given, input_names, n_outputs):
     n_inputs = len(input_names)
     if isinstance(given, Mapping):
-        for name in set(given) - set(input_names):
-            raise ValueError(
-                f"monotonic_cst names {name!r}, which is no column of X; its columns are "
-                f"{', '.join(map(repr, input_names))}."
-            )
+        if given:
+            feature_indices([str(name) for name in given], input_names, "monotonic_cst")
         given = [given.get(name, 0) for name in input_names]
     signs = np.zeros(n_inputs) if given is None else _numbers(given, "monotonic_cst")
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):

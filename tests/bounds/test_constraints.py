@@ -245,7 +245,8 @@ def test_there_is_always_a_line(rng):
     [
         ({"monotonic_cst": [1]}, r"monotonic_cst has shape \(1,\), but X has 2 columns"),
         ({"monotonic_cst": [2, 0]}, r"must hold -1 \(falling\), 0 \(free\) and 1"),
-        ({"monotonic_cst": {"rate": 1}}, "monotonic_cst names 'rate', which is no column of X"),
+        ({"monotonic_cst": {"rate": 1}}, "names 'rate', which is no column of X.* without names"),
+        ({"monotonic_cst": {0: 1}}, "monotonic_cst names '0', which is no column of X"),
         ({"constraints": [3.0]}, "constraints holds 3.0: it must be OutputLimits and FixedPoints"),
         ({"constraints": [OutputLimits(1.0, 0.0)]}, r"limits the output to \[1, 0\]"),
         ({"constraints": [OutputLimits(lower="a")]}, "lower in constraints='a' must hold numbers"),
