@@ -96,6 +96,18 @@ class Trials:
         counts = [candidate.counts[j] + 2 for j in self.plan.premise_inputs]
         return term_scores(self.tuned(candidate), self.plan.premise_inputs, counts, self.spacing)
 
+    def _asking(self, candidate):
+        """Inputs for terms of scattered rules: those that ask by more than chance, at first one.
+
+        None of two values: near which of them a rule stands, no reader can say by a bell.
+        """
+        scores = self._scores(candidate)
+        has_many = [self.spacing.n_values(j) > 2 for j in self.plan.premise_inputs]
+        asked = has_many & (scores > _SIGNIFICANT)
+        if not (candidate.inputs or asked.any()):
+            asked = has_many & (scores == scores.max(initial=0, where=has_many))
+        return self.plan.premise_inputs[asked].tolist()
+
     def rows_for(self, candidate):
         """As many as its parameters need, by powers of two: most candidates see the same."""
         needed = max(_ROWS_EACH * self.n_parameters(candidate), FEWEST_ROWS)
@@ -106,12 +118,8 @@ class Trials:
     def larger(self, kind, candidate) -> Candidate | None:
         """The next of a kind; None where there are not the rows."""
         if kind == "scattered":
-            scores = self._scores(candidate)
-            asked = scores > _SIGNIFICANT
-            if not (candidate.inputs or asked.any()):
-                asked = scores == scores.max(initial=0)
-            inputs = self.plan.premise_inputs[asked].tolist()
-            grown = [candidate.with_more_clusters(inputs)] if inputs or candidate.inputs else []
+            asking = self._asking(candidate)
+            grown = [candidate.with_more_clusters(asking)] if asking or candidate.inputs else []
         elif kind == "tree":
             splits = best_splits(self.tuned(candidate), self.plan.premise_inputs, _TRIED)
             grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
@@ -156,8 +164,9 @@ class Trials:
                 trained = self.tuned(replace(candidate, has_sparse_slopes=False))
                 found = with_sparse_slopes(trained, self.plan.free)
             else:
-                # Grids and trees go on from what a smaller one has learnt, clusters begin anew.
-                turns = MOST_TURNS if candidate.n_clusters else FEW_TURNS
+                # Terms of a grid serve many rules: trained on, they tell runs that lie apart from
+                # one another, and are wild between them.
+                turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 begun = self._begun[candidate]
                 found = self._train(begun.problem, turns, evaluation=begun.evaluation)
             self._found[candidate] = found

@@ -130,6 +130,15 @@ class TestSequences:
         assert {int(j) for group in groups for j in group.inputs} == {0, 1}
         assert trials.larger("scattered", two) == Candidate((1, 1, 1, 1), 3, (0, 1))
 
+    def test_columns_of_two_values_have_no_scattered_terms(self, rng):
+        X = rng.uniform(-1.0, 1.0, (400, 3))
+        X[:, 1] = X[:, 1] > 0.0
+        # What the line leaves of a product asks for terms on both of its factors.
+        trials = trials_of(X, X[:, 0] * X[:, 1] + 0.1 * rng.normal(size=400))
+        assert trials.larger("scattered", trials.one_rule).inputs == (0,)
+        codes = trials_of(1.0 * (X > 0.0), np.prod(X > 0.0, axis=1) + 0.1 * rng.normal(size=400))
+        assert codes.larger("scattered", codes.one_rule) is None
+
     def test_a_weak_input_is_asked_for_once_the_strong_one_is_told(self, rng):
         X = rng.uniform(-1.0, 1.0, (600, 4))
         y = 30.0 * np.abs(X[:, 0]) + np.sin(3.0 * X[:, 2]) + 0.1 * rng.normal(size=600)
