@@ -3,17 +3,19 @@
 All kinds begin with one rule, a line. A grid grows by one term at a time, beside those that have
 learnt already (``trials`` knows on which input); an input that asks for no terms gets none. Of a
 tree, one leaf at a time is split (``splits``). Scattered rules stand on the clusters of k-means,
-half as many again each time, with terms on the inputs that smaller ones have asked for.
+half as many again each time, with terms on the inputs that smaller ones have asked for: all anew,
+or those that are added, where the residual of the others is.
 """
 
 from dataclasses import dataclass, replace
 from math import prod
+from typing import Any
 
 import numpy as np
 from sklearn.cluster import KMeans
 
 from ..antecedent import TreeAntecedent
-from .clusters import clustered_antecedent
+from .clusters import clustered_antecedent, grown_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
 from .sample import DIGITS, counting_weight
 from .splits import Split
@@ -30,6 +32,7 @@ class Candidate:
     counts: tuple[int, ...]
     n_clusters: int = 0  # of scattered rules
     inputs: tuple[int, ...] = ()  # on which these have terms
+    is_grown: bool = False  # whether they go on from fewer
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
     has_sparse_slopes: bool = False  # where the evidence asks for no more
 
@@ -74,21 +77,25 @@ class Candidate:
     def with_more_clusters(self, inputs):
         """Half as many scattered rules again, two at least, with terms on these inputs too."""
         number = max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters)))
-        return replace(self, n_clusters=number, inputs=tuple(sorted({*self.inputs, *inputs})))
+        inputs = tuple(sorted({*self.inputs, *inputs}))
+        return replace(self, n_clusters=number, inputs=inputs, is_grown=False)
 
 
-def rule_base(candidate, rows, families, spacing, seed, smaller=None):
+def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = None):
     """The antecedent that a candidate begins with.
 
-    Clusters are sought in the ``rows``; grids and trees keep what a ``smaller`` one has learnt.
+    Clusters are sought in the ``rows``; what is no set of clusters anew keeps what a ``smaller``
+    one has learnt.
     """
+    known: Any = None if smaller is None else smaller.evaluation.antecedent
     if candidate.splits:
         *before, last = candidate.splits
-        tree = smaller if before else TreeAntecedent.build([], [[], []], [[]])
+        tree = known if before else TreeAntecedent.build([], [[], []], [[]])
         return tree.split(last.leaf, last.input, last.cut, last.log_width)
     if not candidate.n_clusters:
-        return grid_antecedent(families, candidate.counts, spacing, known=smaller)
-    clusterer = KMeans(candidate.n_clusters, n_init=1, random_state=seed)
+        return grid_antecedent(families, candidate.counts, spacing, known=known)
+    n_clusters = candidate.n_clusters - (known.n_rules if candidate.is_grown else 0)
+    clusterer = KMeans(n_clusters, n_init=1, random_state=seed)
 
     def label(table, weight):
         # It begins at some of the rows: the order of columns is to have no part in which, and
@@ -98,7 +105,10 @@ def rule_base(candidate, rows, families, spacing, seed, smaller=None):
         labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
         return labels[np.argsort(order)]
 
-    return clustered_antecedent(families, rows, label, np.array(candidate.inputs))
+    inputs = np.array(candidate.inputs)
+    if candidate.is_grown:
+        return grown_antecedent(families, smaller, label, inputs)
+    return clustered_antecedent(families, rows, label, inputs)
 
 
 def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):

@@ -2,14 +2,15 @@ r"""Scattered rules from clusters: one rule where the data gather.
 
 Clusters are sought in standardised inputs and target together. A rule's terms stand at the mean of
 its cluster; their widths are the cluster's standard deviations times sqrt(d), for the distance from
-the centre grows as sqrt(d) in d inputs and rules would otherwise hardly overlap.
+the centre grows as sqrt(d) in d inputs and rules would otherwise hardly overlap. Rules are added to
+those that have learnt where these leave most.
 """
 
 import numpy as np
 
 from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
 from ..learning.data import StandardisedData
-from .sample import representative_rows
+from .sample import counting_weight, representative_rows
 
 # Widths in standard deviations of the input: a cluster on one spot still gets a term of some width.
 _SMALLEST_WIDTH = 0.1
@@ -35,24 +36,48 @@ def clustered_antecedent(families, rows: StandardisedData, label, premise_inputs
         )
     if found.size == 1 or inputs.size == 0:
         return GridAntecedent((), counts=())
-    centers, widths = np.empty((2, found.size, inputs.size))
-    for r, cluster in enumerate(found):
-        own = labels == cluster
-        z, mass = table[own][:, inputs], weight[own]
-        centers[r] = np.average(z, axis=0, weights=mass)
-        spread = np.sqrt(np.average((z - centers[r]) ** 2, axis=0, weights=mass))
-        widths[r] = np.maximum(spread, _SMALLEST_WIDTH) * np.sqrt(inputs.size)
+    masses = weight * (labels == found[:, None])
+    return _scattered(families, _terms_at(families, inputs, table, masses))
+
+
+def grown_antecedent(families, tuned, label, premise_inputs):
+    """What a smaller rule base has learnt, and a rule for every cluster of what it has not.
+
+    Clusters are sought on the ``premise_inputs``, rows being weighted by their squared residuals.
+    On inputs that its rules have no terms on yet, these stand where the rules fire.
+    """
+    rows, smaller = tuned.problem.rows, tuned.evaluation.antecedent
+    weight = counting_weight(rows)
+    square = weight * (np.sum(tuned.residual**2, axis=1) + np.finfo(float).eps)
+    labels = label(rows.X[:, premise_inputs], square)
+    masses = square * (labels == np.unique(labels)[:, None])
+    added = _terms_at(families, premise_inputs, rows.X, masses)
+    strengths, _ = smaller.strengths_and_shares(np.ascontiguousarray(rows.X.T))
+    learnt = _terms_at(families, premise_inputs, rows.X, weight * strengths)
+    for group in smaller.groups:
+        learnt |= {j: group.theta[:, group.inputs == j] for j in np.unique(group.inputs)}
+    terms = {j: np.concatenate([learnt[j], added[j]], axis=1) for j in premise_inputs}
+    return _scattered(families, terms)
+
+
+def _terms_at(families, inputs, table, masses):
+    """Of each input the parameters of a term for every row of ``masses`` (n_rules, n_rows)."""
+    found, total = {}, masses.sum(axis=1)
+    for j in inputs:
+        centers = masses @ table[:, j] / total
+        squares = (table[:, j] - centers[:, None]) ** 2
+        spread = np.sqrt(np.sum(masses * squares, axis=1) / total)
+        widths = np.maximum(spread, _SMALLEST_WIDTH) * np.sqrt(len(inputs))
+        found[j] = families[j].from_center_and_width(centers, widths)
+    return found
+
+
+def _scattered(families, terms):
+    """Rules that have one term on each input, of parameters (n_parameters, n_rules) by input."""
+    inputs, thetas = np.array(list(terms)), list(terms.values())
+    n_rules = thetas[0].shape[1]
     if len({families[j] for j in inputs}) == 1:
-        family = families[inputs[0]]
-        theta = family.from_center_and_width(centers, widths)
-        return ScatteredAntecedent.build(family, inputs, theta)
-    groups = tuple(
-        TermGroup(
-            families[j],
-            np.full(found.size, j),
-            families[j].from_center_and_width(centers[:, k], widths[:, k]),
-        )
-        for k, j in enumerate(inputs)
-    )
-    first = found.size * np.arange(inputs.size)
-    return RuleTableAntecedent(groups, np.arange(found.size)[:, None] + first)
+        return ScatteredAntecedent.build(families[inputs[0]], inputs, np.stack(thetas, axis=2))
+    groups = tuple(TermGroup(families[j], np.full(n_rules, j), theta) for j, theta in terms.items())
+    first = n_rules * np.arange(inputs.size)
+    return RuleTableAntecedent(groups, np.arange(n_rules)[:, None] + first)

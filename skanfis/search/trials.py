@@ -118,8 +118,9 @@ class Trials:
     def larger(self, kind, candidate) -> Candidate | None:
         """The next of a kind; None where there are not the rows."""
         if kind == "scattered":
-            asking = self._asking(candidate)
-            grown = [candidate.with_more_clusters(asking)] if asking or candidate.inputs else []
+            anew = candidate.with_more_clusters(self._asking(candidate))
+            grown = [anew, replace(anew, is_grown=True)] if candidate.n_clusters else [anew]
+            grown = grown if anew.inputs else []
         elif kind == "tree":
             splits = best_splits(self.tuned(candidate), self.plan.premise_inputs, _TRIED)
             grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
@@ -127,17 +128,16 @@ class Trials:
             asking = np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]
             grown = [candidate.with_more_terms(j) for j in self.plan.premise_inputs[asking]]
         smaller = self.tuned(candidate)
-        promising = [
-            (one, self._train(self._problem(one, smaller), turns=0))
+        begun = {
+            one: self._train(self._problem(one, smaller), turns=0)
             for one in grown
             if self._is_small(one)
-        ]
-        if not promising:
-            return None
+        }
+        self._begun |= begun
+        # Clusters anew have learnt nothing yet: beside rules that go on they are judged trained.
+        seen = self.tuned if kind == "scattered" else begun.__getitem__
         # Of columns that are alike, rounding is not to choose: six digits.
-        best, begun = min(promising, key=lambda pair: float(f"{self.expected(pair[1]):.6g}"))
-        self._begun[best] = begun
-        return best
+        return min(begun, key=lambda one: float(f"{self.expected(seen(one)):.6g}"), default=None)
 
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
@@ -187,10 +187,8 @@ class Trials:
     def _problem(self, candidate, smaller=None):
         """What a candidate begins with: rules and weights of a smaller one, if there is one."""
         plan, rows = self.plan, self.rows_for(candidate)
-        known, penalty = None, plan.first
-        if smaller is not None:
-            known, penalty = smaller.evaluation.antecedent, smaller.penalty
-        antecedent = rule_base(candidate, rows, plan.families, self.spacing, plan.seed, known)
+        penalty = plan.first if smaller is None else smaller.penalty
+        antecedent = rule_base(candidate, rows, plan.families, self.spacing, plan.seed, smaller)
         slopes = plan.consequent_inputs
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
 

@@ -10,7 +10,7 @@ from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE
 from skanfis.membership import Gaussian
-from skanfis.search.candidates import Candidate
+from skanfis.search.candidates import Candidate, rule_base
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
 from skanfis.search.trials import _ROWS_EACH, FEWEST_ROWS, Plan, Trials
@@ -128,16 +128,40 @@ class TestSequences:
         assert two == Candidate((1, 1, 1, 1), 2, (0, 1))
         groups = trials.tuned(two).problem.antecedent.groups
         assert {int(j) for group in groups for j in group.inputs} == {0, 1}
-        assert trials.larger("scattered", two) == Candidate((1, 1, 1, 1), 3, (0, 1))
+        assert trials.larger("scattered", two).inputs == (0, 1)
 
-    def test_columns_of_two_values_have_no_scattered_terms(self, rng):
-        X = rng.uniform(-1.0, 1.0, (400, 3))
-        X[:, 1] = X[:, 1] > 0.0
-        # What the line leaves of a product asks for terms on both of its factors.
-        trials = trials_of(X, X[:, 0] * X[:, 1] + 0.1 * rng.normal(size=400))
-        assert trials.larger("scattered", trials.one_rule).inputs == (0,)
-        codes = trials_of(1.0 * (X > 0.0), np.prod(X > 0.0, axis=1) + 0.1 * rng.normal(size=400))
-        assert codes.larger("scattered", codes.one_rule) is None
+    def test_rules_are_added_where_those_that_have_learnt_leave_most(self, rng):
+        """One rule more: its cluster is all rows, by their squared residuals."""
+        X, y = surface(rng, 400, 3)
+        trials = trials_of(X, y)
+        two = trials.tuned(trials.larger("scattered", trials.one_rule))
+        learnt = two.evaluation.antecedent
+        three = Candidate((1, 1, 1), 3, (0, 1, 2), is_grown=True)
+        found = rule_base(three, None, [Gaussian] * 3, trials.spacing, 0, two)
+        centers, log_widths = found.groups[0].theta.reshape(2, 3, 3)
+        Z, square = two.problem.rows.X, two.residual[:, 0] ** 2
+        expected = square @ Z / square.sum()
+        spread = np.sqrt(square @ (Z - expected) ** 2 / square.sum())
+        assert_allclose(centers[2], expected)
+        assert_allclose(np.exp(log_widths[2]), np.sqrt(3.0) * spread)
+        # The others keep their terms, and get one where they fire on the input that they lack.
+        kept = found.groups[0].theta.reshape(2, 3, 3)[:, :2, :2]
+        assert_array_equal(kept.reshape(2, -1), learnt.groups[0].theta)
+        strengths = learnt.strengths(Z.T)
+        assert_allclose(centers[:2, 2], strengths @ Z[:, 2] / strengths.sum(axis=1))
+
+    def test_clusters_anew_or_more_of_them_whichever_leaves_less_is_taken(self):
+        rng = np.random.default_rng(1)
+        X = rng.uniform(-1.0, 1.0, (400, 2))
+        peaks = sum(np.exp(-20.0 * ((X - at) ** 2).sum(axis=1)) for at in (-0.5, 0.5))
+        trials, ways = trials_of(X, peaks + 0.05 * rng.normal(size=400)), []
+        one = trials.larger("scattered", trials.one_rule)
+        for _ in range(2):
+            one = trials.larger("scattered", one)
+            other = trials.tuned(replace(one, is_grown=not one.is_grown))
+            assert trials.expected(trials.tuned(one)) < trials.expected(other)
+            ways.append(one.is_grown)
+        assert ways == [False, True]
 
     def test_a_weak_input_is_asked_for_once_the_strong_one_is_told(self, rng):
         X = rng.uniform(-1.0, 1.0, (600, 4))
