@@ -44,11 +44,6 @@ class Departures:
         self.components, self.component = _components(*grid, antecedent.n_rules, tuple(slopes))
 
     @cached_property
-    def together(self):
-        """D'D, of all components alike; made without D it is quicker, and rounded less."""
-        return np.diag(self._scale**2) - self._along @ self._along.T
-
-    @cached_property
     def matrix(self):
         """D, a departure in each row, (n_columns, n_columns)."""
         found = np.diag(self._scale) - self._orthonormal @ self._along.T

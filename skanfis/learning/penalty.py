@@ -113,8 +113,8 @@ class CommonLine:
         # The slopes of b = triangle^-1 along' u.
         is_varying = np.array([j is not None for j in slopes], dtype=bool)
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
-        self.slopes, self.to_slopes = [j for j in slopes if j is not None], to_slopes[is_varying]
-        self._to_none = to_slopes[~is_varying]
+        self.slopes = [j for j in slopes if j is not None]
+        self._to_slopes, self._to_none = to_slopes[is_varying], to_slopes[~is_varying]
         self._part = np.concatenate(
             [np.arange(len(self.slopes)), len(self.slopes) + self.departures.component]
         )
@@ -132,17 +132,13 @@ class CommonLine:
     @cached_property
     def _rows(self):
         """Slopes and departures out of u, (n_slopes + n_columns, n_columns)."""
-        return np.concatenate([self.to_slopes, self.departures.matrix])
+        return np.concatenate([self._to_slopes, self.departures.matrix])
 
     def pull(self, penalty: Penalty):
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
         weights = self.weights(penalty)[len(WEIGHTS) :]
-        if penalty.pulls:
-            rooted = np.sqrt(weights)[self._part, None] * self._rows
-            matrix = rooted.T @ rooted
-        else:
-            rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
-            matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
+        rooted = np.sqrt(weights)[self._part, None] * self._rows
+        matrix = rooted.T @ rooted
         if self._to_none.size:
             # What is constant has no slope to learn, but one that is held.
             matrix += penalty.slope * self._to_none.T @ self._to_none
