@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent
-from skanfis.learning import MESSAGES, SOLVERS, SolverResult
+from skanfis.learning import SOLVERS
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
@@ -45,14 +45,6 @@ def predict(result, Z, order=1):
     return phi @ result.evaluation.coefficients
 
 
-def dense_error(rows, result, order=1):
-    """Mean squared error of the standardised target, by the dense design."""
-    Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
-    target = (rows.y - rows.targets.offset) / rows.targets.scale
-    squares = np.sum((target - predict(result, Z, order)) ** 2, axis=1)
-    return np.average(squares, weights=rows.sample_weight)
-
-
 @every_solver
 @pytest.mark.parametrize("kind", KINDS)
 def test_at_the_truth_there_is_nothing_to_gain(name, kind):
@@ -65,21 +57,6 @@ def test_at_the_truth_there_is_nothing_to_gain(name, kind):
     expected = oracles.dense_design(premise.antecedent, truth, Z, 1) @ beta
     found = rows.targets.offset + rows.targets.scale * predict(result, Z)
     assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
-
-
-@pytest.mark.theory
-@every_solver
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(("n_outputs", "agreement"), [(1, 0.2), (2, 0.0)])
-def test_result_is_what_it_says(name, kind, n_outputs, agreement):
-    rows, premise = noisy(kind, n_outputs=n_outputs)
-    result = solve(name, rows, premise, agreement=agreement)
-    assert isinstance(result, SolverResult)
-    assert result.message == MESSAGES[result.status]
-    assert result.loss_curve.shape == (result.n_iter + 1,)
-    assert_allclose(result.evaluation.mean_squared_error, dense_error(rows, result), rtol=1e-9)
-    assert_allclose(result.evaluation.masses.sum(), 1.0)
-    assert result.evaluation.coefficients.shape[1] == n_outputs
 
 
 @pytest.mark.theory
@@ -181,13 +158,3 @@ def test_what_watches_can_end_the_training(name):
     result = solve(name, rows, premise, on_iteration=lambda n_iter, _: n_iter == 3)
     assert (result.status, result.n_iter) == ("stopped", 3)
     assert result.converged
-
-
-def test_least_squares_moves_no_premise(rng):
-    rows, premise = noisy()
-    for start in (np.zeros(premise.size), 0.1 * rng.normal(size=premise.size)):
-        result = solve("lse", rows, premise, start=start)
-        assert result.n_iter == 1
-        assert result.loss_curve[0] == result.loss_curve[1] == result.evaluation.mean_squared_error
-        found = result.evaluation.antecedent.parameters
-        assert_array_equal(found, premise.parameters(start))

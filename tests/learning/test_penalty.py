@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 from sklearn.linear_model import LinearRegression, Ridge
 
-from skanfis.antecedent import ScatteredAntecedent
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Bell, Gaussian
@@ -65,54 +64,6 @@ class TestWeightOfAgreement:
 
 
 class TestCommonLine:
-    def parts(self, model):
-        """Each rule's value at its center and rise over its extent; and the line's, by lstsq."""
-        dense = oracles.DenseProblem(model.rows, model.antecedent, model.order, Penalty())
-        line, values = [], []
-        for center, extent, beta in zip(dense.centers, dense.extent, model.beta, strict=True):
-            matrix = np.diag([1.0, *extent])
-            matrix[0, 1:] = center
-            line.append(matrix)
-            values.append(matrix @ beta)
-        line, values = np.concatenate(line), np.concatenate(values)
-        common, *_ = np.linalg.lstsq(line, values, rcond=None)
-        return values - line @ common, common
-
-    @ON_ALL
-    @ORDERS
-    def test_height_is_free(self, kind, order):
-        # And nothing else is: along every other direction something is paid.
-        model = Model(kind, order)
-        evaluation, problem = model.evaluate(ALL_AT_ONCE), model.problem(ALL_AT_ONCE)
-        matrix = problem.penalty_matrix(evaluation.normal.disagreement)
-        height = problem.common_line.height
-        assert_allclose(height @ height, 1.0, rtol=1e-12)
-        assert_allclose(matrix @ height, 0.0, atol=1e-12)
-        rise = problem.local.to_global(height[:, None]).reshape(model.beta.shape)
-        assert_allclose(rise[:, 0], model.antecedent.n_rules**-0.5, rtol=1e-12)
-        assert_allclose(rise[:, 1:], 0.0, atol=1e-15)
-        eigenvalues = np.linalg.eigvalsh(matrix)
-        assert abs(eigenvalues[0]) < 1e-12
-        assert eigenvalues[1] > 1e-6
-
-    def model_with_a_dead_rule(self, penalty):
-        g = np.random.default_rng(0)
-        theta = Gaussian.from_center_and_width(g.normal(size=(4, 2)), np.ones((4, 2)))
-        theta[0, 1] = 50.0
-        model = Model("scattered", 1)
-        model.antecedent = ScatteredAntecedent.build(Gaussian, np.arange(2), theta)
-        model.beta = model.evaluate(penalty).coefficients.reshape(4, 3, 1)
-        return model
-
-    @pytest.mark.parametrize("alpha", [1e-4, 1e-1])
-    def test_rule_without_rows_lies_on_it(self, alpha):
-        # Nothing else pulls on the rule: its departure is zero.
-        model = self.model_with_a_dead_rule(Penalty(agreement=0.1, alpha=alpha, slope=0.0))
-        departures, common = self.parts(model)
-        assert_allclose(departures.reshape(4, 3)[1], 0.0, atol=1e-9)
-        assert_allclose(model.beta[1], common, atol=1e-8)
-        assert np.abs(model.beta[0] - common).max() > 1e-3
-
     def test_pull_is_without_end_the_ridge_of_one_line(self):
         model = Model("grid", 1)
         solved = model.evaluate(Penalty(alpha=1e7, slope=0.3)).coefficients.reshape(6, 3)
