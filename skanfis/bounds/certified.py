@@ -68,7 +68,8 @@ class Bounds:
         """The larger gap of either side, as part of ``highest - lowest``, (n_outputs,)."""
         gap = np.maximum(self.upper - self.highest, self.lowest - self.lower)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(gap > 0.0, gap / (self.highest - self.lowest), 0.0)
+            # Where all is the same, the lowest is above the highest by rounding.
+            return np.where(gap > 0.0, gap / np.maximum(self.highest - self.lowest, 0.0), 0.0)
 
     def __repr__(self):
         parts = [
