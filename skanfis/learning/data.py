@@ -16,8 +16,8 @@ from ..blocks import BLOCK_ROWS, row_blocks
 # whatever the number of workers.
 _BLOCKS_PER_CHUNK = 16
 
-# What a column may hold, and over what it must vary: squares, and slopes of one column by another,
-# neither overflow nor vanish.
+# The largest number of a column; and one over the least that it varies by. Squares, and slopes of
+# one column by another, neither overflow nor vanish.
 _LARGEST = 1e100
 
 # Any fixed number would do.
@@ -86,7 +86,7 @@ def column_statistics(values, sample_weight=None):
         first += _sum(block - origin, sample_weight, part)
     mean = origin + (first / total)[:, None]
     constant = minimum == maximum
-    # Deviations count in parts of the range, which rounds them alike in all units.
+    # In parts of the range: else squares of what varies by next to nothing would vanish, unseen.
     span = np.where(constant, 1.0, maximum - minimum)
     for part in row_blocks(values.shape[0], BLOCK_ROWS):
         deviations = (_columns(values, part) - mean) / span[:, None]

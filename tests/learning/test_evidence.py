@@ -65,7 +65,7 @@ def with_pulls(penalty, line, g):
         pulls = np.exp(logs - logs.mean()) if len(names) > 1 else []
         return dict(zip(names, pulls, strict=False))
 
-    components, slopes = around_one(line.departures.components), around_one(line.slopes)
+    components, slopes = around_one(line.components), around_one(line.slopes)
     return replace(penalty, pulls=components, slope_pulls=slopes)
 
 
