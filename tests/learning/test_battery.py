@@ -59,23 +59,6 @@ def test_at_the_truth_there_is_nothing_to_gain(name, kind):
     assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
 
 
-@pytest.mark.theory
-@every_iterative_solver
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("agreement", [0.05, 1.0])
-def test_cost_falls_where_rules_must_agree(name, kind, agreement):
-    rows, premise = noisy(kind)
-    settings = {"step_size": 1e-3} if name in RESTLESS else {}
-    result = solve(name, rows, premise, alpha=1e-3, agreement=agreement, **settings)
-    penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-3)
-    dense = oracles.DenseProblem(rows, premise.antecedent, 1, penalty)
-    start = dense.cost(premise.antecedent.parameters)
-    evaluation = result.evaluation
-    end = dense.cost_at(evaluation.antecedent.parameters, evaluation.coefficients)
-    assert_allclose(evaluation.cost, end, rtol=1e-9)
-    assert end < start
-
-
 @every_solver
 def test_loss_curve_begins_at_the_start(name, rng):
     rows, premise = noisy()
