@@ -198,11 +198,10 @@ class TestNaturalPremise:
 
 
 class TestEnd:
-    def problem(self, **settings):
-        rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1, **settings)
-        return SeparableProblem(
-            rows, premise.antecedent, 1, Penalty(alpha=1e-8, slope=1e-8)
-        ), premise
+    def problem(self):
+        rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
+        penalty = Penalty(alpha=1e-8, slope=1e-8)
+        return SeparableProblem(rows, premise.antecedent, 1, penalty), premise
 
     def test_error_goal_ends_it(self):
         problem, premise = self.problem()

@@ -52,7 +52,7 @@ class TestJointGradient:
 
 
 def test_step_is_along_the_gradient_by_natural_premises_and_consequents():
-    rows, premise, *_ = planted("bells", 0, displaced=0.5, noise=0.1)
+    rows, premise, *_ = planted("bells", 0, displaced=0.5, noise=0.1, n_outputs=2)
     antecedent, penalty = premise.antecedent, Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
     problem = SeparableProblem(rows, antecedent, 1, penalty)
     dense = oracles.DenseProblem(rows, antecedent, 1, penalty)

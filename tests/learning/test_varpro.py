@@ -193,9 +193,8 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
     return StandardisedData.of(X, y), premise, truth, beta
 
 
-def solve(rows, premise, alpha=1e-8, agreement=0.0, **settings):
-    penalty = Penalty(agreement=agreement, alpha=alpha, slope=alpha)
-    problem = SeparableProblem(rows, premise.antecedent, 1, penalty)
+def solve(rows, premise, alpha=1e-8, **settings):
+    problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=alpha, slope=alpha))
     return problem, varpro(problem, premise, **({"max_iter": 200, "tol": 1e-6} | settings))
 
 
@@ -229,20 +228,6 @@ class TestOnRuleBases:
         bounds = optimize.Bounds(tight.lower, tight.upper)
         other = optimize.minimize(cost, np.zeros(tight.size), jac=True, bounds=bounds)
         assert result.evaluation.cost <= other.fun * (1.0 + 1e-6)
-
-
-class Recording:
-    """A premise that notes every displacement it is asked about."""
-
-    def __init__(self, premise, at):
-        self.premise, self.at = premise, at
-
-    def __getattr__(self, name):
-        return getattr(self.premise, name)
-
-    def parameters(self, x):
-        self.at.append(x.copy())
-        return self.premise.parameters(x)
 
 
 class TestStatus:
