@@ -36,13 +36,11 @@ def test_weights_that_are_all_alike_are_none(weight):
 @pytest.mark.parametrize(
     ("x_scale", "y_scale", "message"),
     [
-        (1e-308, 1.0, r"Column 'x0' of X varies by 5\.\d+e-308 only.* smaller unit"),
+        (1e-101, 1.0, r"Column 'x0' of X varies by 5\.\d+e-101 only.* smaller unit"),
         (5e-324, 1.0, "Column 'x0' of X varies by .*e-323 only"),
-        (8e305, 1.0, r"Column 'x0' of X holds numbers up to .*e\+307; .* larger unit"),
+        (1e99, 1.0, r"Column 'x0' of X holds numbers up to .*e\+101; .* larger unit"),
         (1.0, 1e307, r"Column 'y' of y holds numbers up to .*e\+308"),
         (1.0, 1e-308, "Column 'y' of y varies by .*e-309 only"),
-        (1e-200, 1e200, r"'y' of y reaches .*, varies by .*e\+199, and column 'x0' .* no slope"),
-        (1e200, 1e-200, "'y' of y reaches .* no slope of one by the other"),
     ],
 )
 @pytest.mark.parametrize("settings", [{}, {"n_mfs": 2}, {"n_mfs": 2, "solver": "hybrid"}])
@@ -50,12 +48,6 @@ def test_what_floats_do_not_hold_is_refused(x_scale, y_scale, message, settings)
     X, y = table()
     with pytest.raises(ValueError, match=message):
         ANFISRegressor(**settings).fit(X * x_scale, y * y_scale)
-
-
-def test_a_constant_target_far_from_zero_is_refused_where_its_slopes_overflow():
-    X, y = table()
-    with pytest.raises(ValueError, match=r"'y' of y reaches 3e\+99, varies by .* no slope"):
-        ANFISRegressor(n_mfs=2).fit(X * 1e-251, np.full(len(y), 3e99))
 
 
 def test_text_of_a_constant_target():
@@ -66,7 +58,7 @@ def test_text_of_a_constant_target():
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
-    ("x_scale", "y_scale"), [(1e-290, 1e-290), (1e290, 1e290), (1e140, 1e-140)]
+    ("x_scale", "y_scale"), [(1e-97, 1e-97), (1e97, 1e97), (1e-97, 1e97), (1e97, 1e-97)]
 )
 def test_what_floats_hold_is_learnt(x_scale, y_scale):
     X, y = table()

@@ -17,8 +17,7 @@ from .search import largest
 from .terms import is_known
 
 # Rows that are looked at first: all corners, of so few inputs, and some between.
-_CORNERS = 6
-_POINTS = 512
+_CORNERS, _POINTS = 8, 1024
 # Of slopes, the strip beyond the edge in which they are zero, as part of the range.
 _BEYOND = 1e-3
 
@@ -69,7 +68,8 @@ class Bounds:
         """The larger gap of either side, as part of ``highest - lowest``, (n_outputs,)."""
         gap = np.maximum(self.upper - self.highest, self.lowest - self.lower)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(gap > 0.0, gap / (self.highest - self.lowest), 0.0)
+            # Where all is the same, the lowest is above the highest by rounding.
+            return np.where(gap > 0.0, gap / np.maximum(self.highest - self.lowest, 0.0), 0.0)
 
     def __repr__(self):
         parts = [
@@ -243,7 +243,7 @@ def cuts_of(model):
 
 def _enclosed(model, box, low, high, sides_of, tol, max_boxes, names):
     """Bounds; ``sides_of`` gives the scale of ``tol``, and by side what bounds it, and values."""
-    X, found = spread_points(low, high, _POINTS, _CORNERS), []
+    X, found = spread_points(low, high), []
     for k in range(model.n_outputs):
         scale, sides = sides_of(k, X)
         for evaluate, values in sides:
@@ -359,9 +359,9 @@ def input_index(name, model: TSKModel, parameter):
     )
 
 
-def spread_points(low, high, n_points, most_inputs):
-    """Rows of a box: ``n_points`` all over it, and of so few inputs all its corners."""
-    unit = qmc.Halton(low.size, scramble=False).random(n_points)
-    if low.size <= most_inputs:
+def spread_points(low, high):
+    """Rows all over a box, and of few inputs all its corners."""
+    unit = qmc.Halton(low.size, scramble=False).random(_POINTS)
+    if low.size <= _CORNERS:
         unit = np.vstack([np.indices((2,) * low.size).reshape(low.size, -1).T, unit])
     return np.clip(low + unit * (high - low), low, high)

@@ -35,9 +35,9 @@ _DEAR, _FAR = 1.02**2, 1.1**2
 # Halvings of the way; boxes of each proof, and of all on the way to the nearest (fewer where there
 # are more terms than so many).
 _HALVINGS, _MOST_BOXES, _ALL_BOXES, _TERMS = 6, 3000, 10_000, 20
-# Points that are added at once, the worst of a sample; all corners of so few inputs are in it. In
-# standard deviations of the target, and of the input, what is kept at them.
-_POINTS_A_ROUND, _SAMPLE, _CORNERS, _MARGIN = 20, 1024, 8, 0.01
+# Points that are added at once, the worst of many; and what is kept at them, in standard deviations
+# of the target, and of the input.
+_POINTS_A_ROUND, _MARGIN = 20, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +265,7 @@ class _ConstrainedFit:
         model, normal = self.model, ordered.free.normal
         columns = self._columns(ordered.free.antecedent)
         equal, equal_to = self._fixed(columns)
-        sample = spread_points(model.minimum, model.maximum, _SAMPLE, _CORNERS)
+        sample = spread_points(model.minimum, model.maximum)
         local = normal.coefficients.copy()
         nothing = np.empty((0, self.problem.n_columns)), np.empty(0)
 

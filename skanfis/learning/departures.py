@@ -15,7 +15,7 @@ the values at the centres, (), or the slopes by an input, (j,). With a pull alph
 pay u' D' diag(alpha) D u, D = H N, H the contrasts.
 """
 
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from itertools import product
 
 import numpy as np
@@ -27,38 +27,22 @@ from ..antecedent import Antecedent
 _MOST_INPUTS = 2
 
 
-class Departures:
-    """The departures N u of consequents in local coordinates u, N = S - Q A'.
+def departures(matrix, antecedent: Antecedent, slopes):
+    """D, a departure in each row; all components; and which of these each row belongs to, by place.
 
-    ``scale`` is the diagonal of S, ``orthonormal`` and ``along`` (n_columns, n_basis) are Q and A;
-    ``slopes`` are the inputs that the functions of the basis but the first are slopes by, None
-    where one is constant, and there is nothing to learn.
+    ``matrix`` (n_columns, n_columns) is N; ``slopes`` are the inputs that the functions of the
+    basis but the first are slopes by, None where one is constant, and there is nothing to learn.
+    A component is the inputs that it concerns, () for the rest.
     """
-
-    def __init__(self, scale, orthonormal, along, antecedent: Antecedent, slopes):
-        self._scale, self._orthonormal, self._along = scale, orthonormal, along
-        self._counts = antecedent.grid_counts
-        grid = (antecedent.grid_counts, antecedent.share_inputs)
-        # The inputs that each component concerns, () for the rest; and by its place in this list,
-        # the component that each row of D belongs to.
-        self.components, self.component = _components(*grid, antecedent.n_rules, tuple(slopes))
-
-    @cached_property
-    def together(self):
-        """D'D, of all components alike; made without D it is quicker, and rounded less."""
-        return np.diag(self._scale**2) - self._along @ self._along.T
-
-    @cached_property
-    def matrix(self):
-        """D, a departure in each row, (n_columns, n_columns)."""
-        found = np.diag(self._scale) - self._orthonormal @ self._along.T
-        if self._counts is None:
-            return found
-        contrasts = np.eye(1)
-        for m in self._counts:
-            contrasts = np.kron(contrasts, linalg.helmert(m, full=True))
-        by_rule = found.reshape(contrasts.shape[0], -1)
-        return np.ascontiguousarray((contrasts @ by_rule).reshape(found.shape))
+    counts, axes = antecedent.grid_counts, antecedent.share_inputs
+    components, component = _components(counts, axes, antecedent.n_rules, tuple(slopes))
+    if counts is None:
+        return matrix, components, component
+    contrasts = np.eye(1)
+    for m in counts:
+        contrasts = np.kron(contrasts, linalg.helmert(m, full=True))
+    by_rule = contrasts @ matrix.reshape(contrasts.shape[0], -1)
+    return np.ascontiguousarray(by_rule.reshape(matrix.shape)), components, component
 
 
 @lru_cache(maxsize=64)

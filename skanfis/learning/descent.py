@@ -108,7 +108,8 @@ class _Point:
     x: np.ndarray
     evaluation: Evaluation
     cost: float
-    gradient: tuple = ()  # where the pass that gives the cost gives it too
+    by_parameters: np.ndarray  # the slope of the evaluation's cost by those of the antecedent
+    by_coefficients: np.ndarray  # and by those of the consequents, if these take steps
 
 
 class _Descent(Solver):
@@ -117,12 +118,10 @@ class _Descent(Solver):
     There is no other end than ``max_iter``, ``error_goal`` and a projected gradient of zero;
     without the last the error may rise and fall for ever. The result is the epoch of least cost.
 
-    ``_at`` gives the point at some displacements, after a step of the coefficients or at their
-    solution; ``_gradient`` that by the antecedent's parameters and by coefficients that take steps.
+    ``_evaluated`` gives the evaluation at some parameters, and the two slopes of a ``_Point``.
     """
 
-    _at: ClassVar[Any]
-    _gradient: ClassVar[Any]
+    _evaluated: ClassVar[Any]
     _parameter_constraints: ClassVar[dict] = VariableProjection._parameter_constraints | {
         "step_size": [Interval(Real, 0, None, closed="neither")],
         "error_goal": [Interval(Real, 0, None, closed="left"), None],
@@ -160,16 +159,15 @@ class _Descent(Solver):
             if n_iter == max_iter:
                 status = "epochs" if self.error_goal is None else "max_iter"
                 break
-            by_premises, by_coefficients = self._gradient(problem, point)
-            slope, steepest = natural.slope(point.x, by_premises, stiffness)
-            steepest = max(steepest, np.abs(by_coefficients).max(initial=0.0))
+            slope, steepest = natural.slope(point.x, point.by_parameters, stiffness)
+            steepest = max(steepest, np.abs(point.by_coefficients).max(initial=0.0))
             if steepest <= GRADIENT_FACTOR * self.tol * point.cost:
                 status = "gradient"
                 break
-            whole = np.concatenate([slope, by_coefficients])
+            whole = np.concatenate([slope, point.by_coefficients])
             step = -length.size / np.linalg.norm(whole) * whole
             coefficients = point.evaluation.coefficients.copy()
-            coefficients.ravel()[: by_coefficients.size] += step[point.x.size :]
+            coefficients.ravel()[: point.by_coefficients.size] += step[point.x.size :]
             x = natural.move(point.x, step[: point.x.size])
             point, n_iter = self._at(problem, premise, stiffness, x, coefficients), n_iter + 1
             length.follow(point.cost)
@@ -179,6 +177,10 @@ class _Descent(Solver):
                 status = "stopped"
                 break
         return SolverResult(best.evaluation, np.array(loss_curve), n_iter, status)
+
+    def _at(self, problem, premise, stiffness, x, coefficients):
+        evaluation, *slopes = self._evaluated(problem, premise.parameters(x), coefficients)
+        return _Point(x, evaluation, evaluation.cost + 0.5 * stiffness * (x @ x), *slopes)
 
 
 class Hybrid(_Descent):
@@ -215,15 +217,9 @@ class Hybrid(_Descent):
     """
 
     @staticmethod
-    def _at(problem, premise, stiffness, x, coefficients):
-        evaluation = problem.evaluate(premise.parameters(x), coefficients)
-        return _Point(x, evaluation, evaluation.cost + 0.5 * stiffness * (x @ x))
-
-    @staticmethod
-    def _gradient(problem, point):
-        evaluation = point.evaluation
-        at = evaluation.antecedent.parameters, evaluation.coefficients
-        return problem.joint(*at)[1], np.empty(0)
+    def _evaluated(problem, parameters, coefficients):
+        evaluation = problem.evaluate(parameters, coefficients)
+        return evaluation, problem.joint(parameters, evaluation.coefficients)[1], np.empty(0)
 
 
 class GradientDescent(_Descent):
@@ -256,11 +252,6 @@ class GradientDescent(_Descent):
     """
 
     @staticmethod
-    def _at(problem, premise, stiffness, x, coefficients):
-        evaluation, *gradient = problem.joint(premise.parameters(x), coefficients)
-        return _Point(x, evaluation, evaluation.cost + 0.5 * stiffness * (x @ x), tuple(gradient))
-
-    @staticmethod
-    def _gradient(problem, point):
-        by_premises, by_coefficients = point.gradient
-        return by_premises, by_coefficients.ravel()
+    def _evaluated(problem, parameters, coefficients):
+        evaluation, by_parameters, by_coefficients = problem.joint(parameters, coefficients)
+        return evaluation, by_parameters, by_coefficients.ravel()

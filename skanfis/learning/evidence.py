@@ -271,8 +271,7 @@ def _limited(penalty, line, weights, moves, others, least):
     if moves[slopes].any():
         after["slope"], after["slope_pulls"] = mean_and_parts(found[slopes], line.slopes)
     if moves[components].any():
-        names = line.departures.components
-        after["alpha"], after["pulls"] = mean_and_parts(found[components], names)
+        after["alpha"], after["pulls"] = mean_and_parts(found[components], line.components)
     return replace(penalty, **after)
 
 

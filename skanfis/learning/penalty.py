@@ -19,14 +19,13 @@ pulls on the line's height.
 """
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 from scipy import linalg
 
 from ..antecedent import Antecedent
 from ..consequent import LocalBasis, NormalFactor
-from .departures import Departures
+from .departures import departures
 
 # What comes first in a row of weights; after these, those on all slopes and on all components.
 WEIGHTS = ("agreement", "stiffness")
@@ -109,16 +108,18 @@ class CommonLine:
         scale[:, 1:] = extent / local.spread
         scale = scale.ravel()
         along = orthonormal * scale[:, None]
-        self.departures = Departures(scale, orthonormal, along, antecedent, slopes)
+        # Of u, what the line leaves.
+        from_line = np.diag(scale) - orthonormal @ along.T
+        by_part, self.components, component = departures(from_line, antecedent, slopes)
         # The slopes of b = triangle^-1 along' u.
         is_varying = np.array([j is not None for j in slopes], dtype=bool)
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
-        self.slopes, self.to_slopes = [j for j in slopes if j is not None], to_slopes[is_varying]
+        self.slopes = [j for j in slopes if j is not None]
         self._to_none = to_slopes[~is_varying]
-        self._part = np.concatenate(
-            [np.arange(len(self.slopes)), len(self.slopes) + self.departures.component]
-        )
-        parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.departures.components)
+        # Slopes and departures out of u, (n_slopes + n_columns, n_columns), and the part of each.
+        self._rows = np.concatenate([to_slopes[is_varying], by_part])
+        self._part = np.concatenate([np.arange(len(self.slopes)), len(self.slopes) + component])
+        parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.components)
         self.kinds = np.array([*WEIGHTS, *parts])
         self.n_rules, self._n_basis = n_rules, n_basis
         # Slopes per unit of z out of local ones, in units of a typical extent; where each stands.
@@ -129,20 +130,11 @@ class CommonLine:
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = n_rules**-0.5
 
-    @cached_property
-    def _rows(self):
-        """Slopes and departures out of u, (n_slopes + n_columns, n_columns)."""
-        return np.concatenate([self.to_slopes, self.departures.matrix])
-
     def pull(self, penalty: Penalty):
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
         weights = self.weights(penalty)[len(WEIGHTS) :]
-        if penalty.pulls:
-            rooted = np.sqrt(weights)[self._part, None] * self._rows
-            matrix = rooted.T @ rooted
-        else:
-            rooted = np.sqrt(weights[: len(self.slopes), None]) * self.to_slopes
-            matrix = penalty.alpha * self.departures.together + rooted.T @ rooted
+        rooted = np.sqrt(weights)[self._part, None] * self._rows
+        matrix = rooted.T @ rooted
         if self._to_none.size:
             # What is constant has no slope to learn, but one that is held.
             matrix += penalty.slope * self._to_none.T @ self._to_none
@@ -185,7 +177,7 @@ class CommonLine:
         """All weights in a row, of these ``kinds``: of ``WEIGHTS``, every slope and component."""
         rho, alpha = penalty.slope, penalty.alpha
         slopes = [rho * penalty.slope_pulls.get(j, 1.0) for j in self.slopes]
-        components = [alpha * penalty.pulls.get(one, 1.0) for one in self.departures.components]
+        components = [alpha * penalty.pulls.get(one, 1.0) for one in self.components]
         return np.array([penalty.agreement, penalty.stiffness, *slopes, *components], dtype=float)
 
     def squares(self, coefficients):
@@ -198,4 +190,4 @@ class CommonLine:
         return self._by_part(factor.squares(self._rows))
 
     def _by_part(self, values):
-        return np.bincount(self._part, values, len(self.slopes) + len(self.departures.components))
+        return np.bincount(self._part, values, len(self.slopes) + len(self.components))

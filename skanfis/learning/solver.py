@@ -14,9 +14,6 @@ from sklearn.base import BaseEstimator
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
 
-# Called with the number of the iteration and the evaluation there; what is true ends the run.
-Watch = Callable[[int, Evaluation], bool]
-
 MESSAGES = {
     "gradient": "The projected gradient is below tol: the premises are stationary.",
     "cost": "The relative decrease of the cost, expected and found, is below tol.",
@@ -120,7 +117,7 @@ class Solver(BaseEstimator, ABC):
         max_iter: int,
         stiffness: float = 0.0,
         start: np.ndarray | None = None,
-        on_iteration: Watch | None = None,
+        on_iteration: Callable[[int, Evaluation], bool] | None = None,
     ) -> SolverResult:
         """Minimise the cost of ``problem`` over the premises.
 

@@ -173,17 +173,7 @@ class VariableProjection(Solver):
         self.tol = tol
         self.stiffness = stiffness
 
-    def solve(
-        self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None
-    ) -> SolverResult:
-        return varpro(
-            problem,
-            premise,
-            max_iter=max_iter,
-            tol=self.tol,
-            stiffness=stiffness,
-            start=start,
-            on_iteration=on_iteration,
-            # What a sample of the rows has settled is settled at once.
-            patience=2 if problem.on_sample is None else 1,
-        )
+    def solve(self, problem, premise, **settings) -> SolverResult:
+        # What a sample of the rows has settled is settled at once.
+        patience = 2 if problem.on_sample is None else 1
+        return varpro(problem, premise, tol=self.tol, patience=patience, **settings)

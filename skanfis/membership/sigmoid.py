@@ -49,20 +49,12 @@ class SigmoidDifference(Membership):
 
     @staticmethod
     def log_value_and_gradient(x, theta):
-        center, log_width, log_flank = theta[:, :, None]
-        inverse_flank = np.exp(-log_flank)
-        u = (x - center) * inverse_flank
-        v = np.exp(log_width - log_flank)
-        log_rise, log_fall, gain = _log_sigmoid(v + u), _log_sigmoid(v - u), -np.expm1(-2.0 * v)
-        # d log s(u) / du = 1 - s(u)
-        by_rise, by_fall = -np.expm1(log_rise), -np.expm1(log_fall)
-        by_u = by_rise - by_fall
-        by_v = by_rise + by_fall + 2.0 * (1.0 - gain) / gain
-        gradient = np.empty((3, *u.shape))
-        np.multiply(by_u, -inverse_flank, out=gradient[0])
-        np.multiply(by_v, v, out=gradient[1])
-        np.subtract(-u * by_u, gradient[1], out=gradient[2])
-        return np.log(gain) + log_rise + log_fall, gradient
+        # The product with equal flanks, but for a factor.
+        log_mu, by = SigmoidProduct.log_value_and_gradient(x, theta[[0, 1, 2, 2]])
+        v = np.exp(theta[1] - theta[2])[:, None]
+        gain = -np.expm1(-2.0 * v)
+        by_log_v = 2.0 * v * (1.0 - gain) / gain
+        return log_mu + np.log(gain), np.stack([by[0], by[1] + by_log_v, by[2] + by[3] - by_log_v])
 
     @staticmethod
     def start(center, spacing, overlap):

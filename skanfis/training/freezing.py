@@ -114,7 +114,7 @@ def as_given(estimator, data, model) -> Fitted:
         input_names=data.input_names,
         output_names=data.output_names,
     )
-    rows = StandardisedData.of(data.X, data.y, data.sample_weight)
+    rows = data.rows()
     # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
     answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
     residual = (data.y - answering.predict(data.X)) / rows.targets.scale

@@ -50,13 +50,6 @@ def test_strengths_are_products_along_the_paths(n_rules, rng):
     assert_allclose(found.strengths(Z), by_paths(found, Z), rtol=1e-9, atol=1e-14)
 
 
-@SIZES
-@pytest.mark.parametrize("scale", [1.0, 1e4])
-def test_strengths_sum_to_one_with_nothing_to_normalise(n_rules, scale, rng):
-    strengths = tree(n_rules).strengths(scale * rng.normal(size=(3, 2000)))
-    assert_allclose(strengths.sum(axis=0), 1.0, rtol=0, atol=2e-15)
-
-
 def test_a_split_leaves_the_other_leaves_as_they_are(rng):
     Z, whole = rng.normal(size=(3, 100)), tree(5)
     split = whole.split(2, 1, 0.4, np.log(0.3))

@@ -30,6 +30,7 @@ def test_one_rule_is_bounded_by_its_corners():
     assert_allclose(found.upper, middle + half, rtol=1e-8)
     slope = gradient_bounds(ONE_RULE, "rate", box)
     assert_allclose([slope.lower, slope.upper], [slopes[2], slopes[2]], rtol=1e-9)
+    assert (slope.tightness >= 0.0).all()
     assert_allclose(monotonicity(ONE_RULE, 2, box), np.sign(slopes[2]))
     assert repr(found).startswith("Bounds(y0 in [")
 

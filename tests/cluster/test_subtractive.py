@@ -78,15 +78,9 @@ class TestOracle:
             found = SubtractiveClustering(**setting).fit(X, sample_weight=w)
             assert_array_equal(found.cluster_centers_, X[centers])
             assert_allclose(found.potentials_, peaks, rtol=1e-9)
-
-    def test_two_points_in_closed_form(self):
-        # One range apart: P = 1 + exp(-4 / 0.5²), and the second loses its part exp(-4 / 0.625²).
-        found = SubtractiveClustering().fit([[3.0], [7.0]])
-        first = 1.0 + np.exp(-16.0)
-        assert_array_equal(found.cluster_centers_, [[3.0], [7.0]])
-        expected = [first, first * (1.0 - np.exp(-10.24))]
-        assert_allclose(found.potentials_, expected, rtol=1e-14)
-        assert_allclose(found.widths_, [2.0 / np.sqrt(8.0)], rtol=1e-14)
+            # exp(-4 |x|^2 / radius^2) is a Gaussian of this deviation.
+            width = setting.get("radius", 0.5) * np.ptp(X, axis=0) / np.sqrt(8.0)
+            assert_allclose(found.widths_, width, rtol=1e-14)
 
 
 class TestInvariance:

@@ -33,7 +33,7 @@ def test_cost_and_solution_with_a_pull_for_every_part_are_those_of_the_dense_pro
     rows = oracles.bumpy_rows(g, 80, 3, 2, True)
     plain = Penalty(agreement=0.01, alpha=0.02, slope=0.1)
     problem = SeparableProblem(rows, antecedent, order, plain, consequent_inputs=used)
-    components = problem.common_line.departures.components
+    components = problem.common_line.components
     pulls = {one: 10.0 ** g.uniform(-2.0, 2.0) for one in components}
     slope_pulls = {j: 10.0 ** g.uniform(-2.0, 2.0) for j in inputs}
     penalty = replace(plain, pulls=pulls, slope_pulls=slope_pulls)

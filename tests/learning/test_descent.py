@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.datasets import make_jang_three_input, make_mackey_glass
+from skanfis.datasets import make_jang_three_input
 from skanfis.learning import Hybrid
 from skanfis.learning.data import Scale, StandardisedData
 from skanfis.learning.descent import NaturalPremise
@@ -132,34 +132,6 @@ def test_three_input_problem_is_trained_as_by_the_transcription(step_size, raw):
     assert_allclose(found, premises, rtol=1e-7, atol=1e-7)
 
 
-class TestPublishedFigures:
-    """In the data's units, as in the paper; published figures are the bars.
-
-    The sinc surface is not here: its error after 250 epochs is anything from 0.005 to 0.044 by the
-    size of the first step, by the transcription above too.
-    """
-
-    def test_three_input_problem(self):
-        # The first step is 0.1. With 0.01 the errors are 0.068 and 1.20 %.
-        X, y = make_jang_three_input()
-        result = hybrid(*two_bells(in_raw_units(X, y)), max_iter=200, tol=0.0, step_size=0.1)
-        assert percentage_error(result, X, y) <= 0.043
-        assert percentage_error(result, *make_jang_three_input("check")) <= 1.066
-
-    def test_mackey_glass(self):
-        # 0.0015 on the checking rows is not met: 0.0027, and 0.0026 by varpro.
-        X, y = make_mackey_glass()
-        result = hybrid(*two_bells(in_raw_units(X, y)), max_iter=150, tol=0.0)
-        assert np.sqrt(result.evaluation.mean_squared_error) <= 0.0016
-
-
-def percentage_error(result, X, y):
-    evaluation = result.evaluation
-    parameters = evaluation.antecedent.parameters
-    phi = oracles.dense_design(evaluation.antecedent, parameters, X.T, 1)
-    return 100.0 * np.mean(np.abs(y - (phi @ evaluation.coefficients)[:, 0]) / np.abs(y))
-
-
 KINDS = ["one input", "two families", "scattered", *MEMBERSHIPS]
 
 
@@ -226,11 +198,10 @@ class TestNaturalPremise:
 
 
 class TestEnd:
-    def problem(self, **settings):
-        rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1, **settings)
-        return SeparableProblem(
-            rows, premise.antecedent, 1, Penalty(alpha=1e-8, slope=1e-8)
-        ), premise
+    def problem(self):
+        rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
+        penalty = Penalty(alpha=1e-8, slope=1e-8)
+        return SeparableProblem(rows, premise.antecedent, 1, penalty), premise
 
     def test_error_goal_ends_it(self):
         problem, premise = self.problem()

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import integrate, optimize, stats
 
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
+from skanfis.antecedent import GridAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import PRIOR_DISPLACEMENT, extrapolated, laplace, reestimated
 from skanfis.learning.objective import SeparableProblem
@@ -65,7 +65,7 @@ def with_pulls(penalty, line, g):
         pulls = np.exp(logs - logs.mean()) if len(names) > 1 else []
         return dict(zip(names, pulls, strict=False))
 
-    components, slopes = around_one(line.departures.components), around_one(line.slopes)
+    components, slopes = around_one(line.components), around_one(line.slopes)
     return replace(penalty, pulls=components, slope_pulls=slopes)
 
 
@@ -168,23 +168,6 @@ class TestAtGivenPremises:
             expected += prior_of_pulls(penalty)
             assert_allclose(in_full(found), expected, atol=1e-6)
             assert_allclose(found.noise_variance, variance, rtol=1e-5)
-
-
-class TestLimits:
-    def alike(self, n_rules):
-        theta = Gaussian.from_center_and_width(np.zeros((n_rules, 1)), np.ones((n_rules, 1)))
-        return ScatteredAntecedent.build(Gaussian, np.arange(1), theta)
-
-    @pytest.mark.parametrize("order", [0, 1])
-    @pytest.mark.parametrize("n_rules", [2, 5])
-    def test_rules_that_are_the_same_are_one_rule(self, order, n_rules):
-        # Their differences change no prediction: neither learnt nor paid for, at any weights.
-        rows = oracles.bumpy_rows(np.random.default_rng(0), 40, 1, 2)
-        for penalty in PENALTIES[:2]:
-            one = posterior(rows, ONE_RULE, order, penalty)
-            many = posterior(rows, self.alike(n_rules), order, penalty)
-            assert_allclose(many.minus_twice_log, one.minus_twice_log, atol=1e-7)
-            assert_allclose(n_effective(many), n_effective(one), rtol=1e-8)
 
 
 def at_fixed_premises(seed):

@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 from sklearn.linear_model import LinearRegression, Ridge
 
-from skanfis.antecedent import ScatteredAntecedent
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Bell, Gaussian
@@ -17,13 +16,10 @@ BUILD = {
     "scattered": lambda g: oracles.random_scattered(g, Gaussian, 4, [0, 1]),
     "table": lambda g: oracles.random_table(g, inputs=2),
 }
-ON_ALL = pytest.mark.parametrize("kind", BUILD)
-ALL_AT_ONCE = Penalty(agreement=0.3, alpha=0.02, slope=0.1)
-ORDERS = pytest.mark.parametrize("order", [0, 1])
 
 
 class Model:
-    """Rows, rules and any consequents; the strengths of the rules on every row, by hand."""
+    """Rows and rules; the strengths of the rules on every row, by hand."""
 
     def __init__(self, kind, order, n_outputs=1):
         g = np.random.default_rng(3)
@@ -34,87 +30,34 @@ class Model:
         self.share = self.rows.sample_weight / self.rows.sample_weight.sum()
         self.basis = np.vstack([np.ones((1, 200)), self.Z]) if order else np.ones((1, 200))
         self.w = oracles.strengths(self.antecedent, self.antecedent.parameters, self.Z)
-        shape = (self.antecedent.n_rules, self.basis.shape[0], n_outputs)
-        self.beta = g.normal(size=shape)
 
-    def problem(self, penalty):
-        return SeparableProblem(self.rows, self.antecedent, self.order, penalty)
-
-    def evaluate(self, penalty):
-        return self.problem(penalty).evaluate(self.antecedent.parameters)
+    def solved(self, penalty):
+        """Consequents on [1, z], (n_rules, n_basis, n_outputs)."""
+        problem = SeparableProblem(self.rows, self.antecedent, self.order, penalty)
+        found = problem.evaluate(self.antecedent.parameters).coefficients
+        return found.reshape(len(self.w), len(self.basis), -1)
 
 
-@ON_ALL
-@ORDERS
+@pytest.mark.parametrize("kind", BUILD)
+@pytest.mark.parametrize("order", [0, 1])
 class TestWeightOfAgreement:
     def test_at_one_every_rule_is_a_regression_of_its_own(self, kind, order):
         model = Model(kind, order, 2)
-        solved = model.evaluate(Penalty(agreement=1.0)).coefficients.reshape(model.beta.shape)
-        for r, w in enumerate(model.w):
+        for rule, w in zip(model.solved(Penalty(agreement=1.0)), model.w, strict=True):
             own = LinearRegression(fit_intercept=False)
             own.fit(model.basis.T, model.y, sample_weight=w * model.share)
-            assert_allclose(solved[r], own.coef_.T, rtol=1e-6, atol=1e-8)
+            assert_allclose(rule, own.coef_.T, rtol=1e-6, atol=1e-8)
 
     def test_without_end_all_rules_are_one_line(self, kind, order):
         model = Model(kind, order, 2)
-        solved = model.evaluate(Penalty(agreement=1e7)).coefficients.reshape(model.beta.shape)
         line = LinearRegression(fit_intercept=False)
         line.fit(model.basis.T, model.y, sample_weight=model.share)
-        for rule in solved:
+        for rule in model.solved(Penalty(agreement=1e7)):
             assert_allclose(rule, line.coef_.T, atol=1e-5)
 
 
-class TestCommonLine:
-    def parts(self, model):
-        """Each rule's value at its center and rise over its extent; and the line's, by lstsq."""
-        dense = oracles.DenseProblem(model.rows, model.antecedent, model.order, Penalty())
-        line, values = [], []
-        for center, extent, beta in zip(dense.centers, dense.extent, model.beta, strict=True):
-            matrix = np.diag([1.0, *extent])
-            matrix[0, 1:] = center
-            line.append(matrix)
-            values.append(matrix @ beta)
-        line, values = np.concatenate(line), np.concatenate(values)
-        common, *_ = np.linalg.lstsq(line, values, rcond=None)
-        return values - line @ common, common
-
-    @ON_ALL
-    @ORDERS
-    def test_height_is_free(self, kind, order):
-        # And nothing else is: along every other direction something is paid.
-        model = Model(kind, order)
-        evaluation, problem = model.evaluate(ALL_AT_ONCE), model.problem(ALL_AT_ONCE)
-        matrix = problem.penalty_matrix(evaluation.normal.disagreement)
-        height = problem.common_line.height
-        assert_allclose(height @ height, 1.0, rtol=1e-12)
-        assert_allclose(matrix @ height, 0.0, atol=1e-12)
-        rise = problem.local.to_global(height[:, None]).reshape(model.beta.shape)
-        assert_allclose(rise[:, 0], model.antecedent.n_rules**-0.5, rtol=1e-12)
-        assert_allclose(rise[:, 1:], 0.0, atol=1e-15)
-        eigenvalues = np.linalg.eigvalsh(matrix)
-        assert abs(eigenvalues[0]) < 1e-12
-        assert eigenvalues[1] > 1e-6
-
-    def model_with_a_dead_rule(self, penalty):
-        g = np.random.default_rng(0)
-        theta = Gaussian.from_center_and_width(g.normal(size=(4, 2)), np.ones((4, 2)))
-        theta[0, 1] = 50.0
-        model = Model("scattered", 1)
-        model.antecedent = ScatteredAntecedent.build(Gaussian, np.arange(2), theta)
-        model.beta = model.evaluate(penalty).coefficients.reshape(4, 3, 1)
-        return model
-
-    @pytest.mark.parametrize("alpha", [1e-4, 1e-1])
-    def test_rule_without_rows_lies_on_it(self, alpha):
-        # Nothing else pulls on the rule: its departure is zero.
-        model = self.model_with_a_dead_rule(Penalty(agreement=0.1, alpha=alpha, slope=0.0))
-        departures, common = self.parts(model)
-        assert_allclose(departures.reshape(4, 3)[1], 0.0, atol=1e-9)
-        assert_allclose(model.beta[1], common, atol=1e-8)
-        assert np.abs(model.beta[0] - common).max() > 1e-3
-
-    def test_pull_is_without_end_the_ridge_of_one_line(self):
-        model = Model("grid", 1)
-        solved = model.evaluate(Penalty(alpha=1e7, slope=0.3)).coefficients.reshape(6, 3)
-        ridge = Ridge(alpha=0.3, tol=1e-12).fit(model.Z.T, model.y[:, 0], model.share)
-        assert_allclose(solved, np.tile([ridge.intercept_, *ridge.coef_], (6, 1)), atol=1e-5)
+def test_pull_to_the_common_line_is_without_end_the_ridge_of_one_line():
+    model = Model("grid", 1)
+    ridge = Ridge(alpha=0.3, tol=1e-12).fit(model.Z.T, model.y[:, 0], model.share)
+    for rule in model.solved(Penalty(alpha=1e7, slope=0.3)):
+        assert_allclose(rule[:, 0], [ridge.intercept_, *ridge.coef_], atol=1e-5)

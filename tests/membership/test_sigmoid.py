@@ -2,20 +2,10 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
 
 from skanfis.membership import SigmoidDifference, SigmoidProduct
 
 X = np.linspace(-8.0, 8.0, 33)[None]
-
-
-@pytest.mark.parametrize("ratio", [0.01, 0.3, 1.0, 4.0, 100.0])
-def test_with_equal_flanks_difference_and_product_differ_by_a_factor(ratio):
-    flank = 0.7
-    lengths = np.log([[ratio * flank], [flank], [flank]])
-    product = SigmoidProduct.log_value(X, np.vstack([[[0.5]], lengths]))
-    difference = SigmoidDifference.log_value(X, np.vstack([[[0.5]], lengths[:2]]))
-    assert_allclose(difference - product, np.log(-np.expm1(-2.0 * ratio)), rtol=1e-10, atol=1e-14)
 
 
 @pytest.mark.parametrize("family", [SigmoidDifference, SigmoidProduct])

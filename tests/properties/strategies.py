@@ -15,7 +15,7 @@ __all__ = ["Table", "frozen_models", "settings_of_fit", "tables"]
 Table = namedtuple("Table", "X y sample_weight")
 
 _seeds = st.integers(0, 2**32 - 1)
-_sizes = st.sampled_from([1.0, 1.0, 1e-3, 1e6, 1e-100, 1e100, 1e-250, 1e250])
+_sizes = st.sampled_from([1.0, 1.0, 1e-3, 1e6, 1e-50, 1e50, 1e-90, 1e90])
 
 
 def _column(rng, kind, n_rows):
