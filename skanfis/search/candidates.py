@@ -7,12 +7,14 @@ half as many again each time, with terms on the inputs that smaller ones have as
 or those that are added, where the residual of the others is.
 """
 
+import warnings
 from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
 
 import numpy as np
 from sklearn.cluster import KMeans
+from sklearn.exceptions import ConvergenceWarning
 
 from ..antecedent import TreeAntecedent
 from .clusters import clustered_antecedent, grown_antecedent
@@ -102,7 +104,10 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
         # rounding none in what is near to two centres.
         table = np.round(table, DIGITS)
         order = np.lexsort(np.sort(table, axis=1).T)
-        labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
+        with warnings.catch_warnings():
+            # That there are fewer clusters shows.
+            warnings.simplefilter("ignore", ConvergenceWarning)
+            labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
         return labels[np.argsort(order)]
 
     inputs = np.array(candidate.inputs)

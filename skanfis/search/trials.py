@@ -102,7 +102,8 @@ class Trials:
         None of two values: near which of them a rule stands, no reader can say by a bell.
         """
         scores = self._scores(candidate)
-        has_many = [self.spacing.n_values(j) > 2 for j in self.plan.premise_inputs]
+        n_values = [self.spacing.n_values(j) for j in self.plan.premise_inputs]
+        has_many = np.array(n_values) > 2
         asked = has_many & (scores > _SIGNIFICANT)
         if not (candidate.inputs or asked.any()):
             asked = has_many & (scores == scores.max(initial=0, where=has_many))
@@ -128,10 +129,12 @@ class Trials:
             asking = np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]
             grown = [candidate.with_more_terms(j) for j in self.plan.premise_inputs[asking]]
         smaller = self.tuned(candidate)
+        problems = {one: self._problem(one, smaller) for one in grown if self._is_small(one)}
+        # Of rows that are alike but for a few, there are fewer clusters than were asked for.
         begun = {
-            one: self._train(self._problem(one, smaller), turns=0)
-            for one in grown
-            if self._is_small(one)
+            one: self._train(problem, turns=0)
+            for one, problem in problems.items()
+            if problem.antecedent.n_rules == one.n_rules
         }
         self._begun |= begun
         # Clusters anew have learnt nothing yet: beside rules that go on they are judged trained.

@@ -230,7 +230,7 @@ def test_a_level_of_a_category_is_called_by_its_column():
     told = export_text(pipe).partition("Inputs")[0]
     assert "\n  IF fibre is PM\n" in told
     assert "\n  IF fibre is not PM\n" in told
-    assert re.search(r"[-+][01]\S* if fibre is SM", told)
+    assert re.search(r"(\+1\S* if fibre is SM|-1\S* if fibre is HB)", told)
     assert "fibre_" not in told
     assert "fibre is not PM" in rules_html(pipe)
     # A category is an input in one line.
