@@ -111,6 +111,8 @@ class CommonLine:
         # Of u, what the line leaves.
         from_line = np.diag(scale) - orthonormal @ along.T
         by_part, self.components, component = departures(from_line, antecedent, slopes)
+        # D'D, of all components alike; made without D it is rounded less.
+        self._together = np.diag(scale**2) - along @ along.T
         # The slopes of b = triangle^-1 along' u.
         is_varying = np.array([j is not None for j in slopes], dtype=bool)
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
@@ -134,7 +136,11 @@ class CommonLine:
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
         weights = self.weights(penalty)[len(WEIGHTS) :]
         rooted = np.sqrt(weights)[self._part, None] * self._rows
-        matrix = rooted.T @ rooted
+        if penalty.pulls:
+            matrix = rooted.T @ rooted
+        else:
+            slopes = rooted[: len(self.slopes)]
+            matrix = penalty.alpha * self._together + slopes.T @ slopes
         if self._to_none.size:
             # What is constant has no slope to learn, but one that is held.
             matrix += penalty.slope * self._to_none.T @ self._to_none
