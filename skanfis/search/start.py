@@ -56,11 +56,12 @@ class Start:
 def started(tuned: Tuned, plan: Plan, left: float, candidates, is_free=False) -> Start:
     """A start from a training, with the agreement that the tolerance leaves room for.
 
-    ``left`` is the factor by which the squared error may still rise.
+    ``left`` is the factor by which the squared error may still rise. Its root is used up: on new
+    rows agreement costs more than the rows that are trained on let see.
     """
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
     premise = Premise.of(problem.antecedent, *problem.rows.inputs.box, is_free)
-    agreeing = with_most_agreement(tuned, premise, plan.free, left)
+    agreeing = with_most_agreement(tuned, premise, plan.free, np.sqrt(left))
     is_raised = agreeing is not tuned
     return Start(
         problem.antecedent,
