@@ -1,7 +1,7 @@
 r"""Short trainings of candidates on one set of rows: all that a search learns from, or a part.
 
 The weights of every candidate's penalty are found by the evidence (``tuning``). Its error on rows
-left out one by one follows from the training on all of them; that ranks the next steps of a grid,
+left out one by one follows from the training on all of them; that ranks the next steps of one kind,
 and no more: it has seen the rows by which the step was chosen. What is expected of new rows is the
 error on rows that had no part in anything (``judging``).
 
