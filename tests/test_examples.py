@@ -60,6 +60,6 @@ def test_the_picture_is_saved(ran):
     names, folder = ran
     assert [path.name for path in folder.iterdir()] == ["gyro.png"]
     axes = [axes for sub in names["figure"].subfigs for axes in sub.axes]
-    assert [a.get_xlabel() for a in axes[:3]] == ["time [s]", "temperature [°C]", "output [°/s]"]
-    told = {text.get_text() for text in axes[3].texts}
+    assert [a.get_xlabel() for a in axes[:2]] == ["temperature [°C]", "output [°/s]"]
+    told = {text.get_text() for text in axes[2].texts}
     assert told == {f"{3600 * value:,.0f} °/h" for value in names["rms"].values()}
