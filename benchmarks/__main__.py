@@ -23,6 +23,7 @@ ON_REQUEST = (
     "large_data",
     "long_logs",
 )
+ROWS = 10_000_000
 RESULTS = Path(__file__).with_name("RESULTS.md")
 
 
@@ -42,7 +43,7 @@ def parse():
     )
     parser.add_argument("--details", action="store_true", help="certain: also one by one")
     parser.add_argument(
-        "--rows", type=int, default=10_000_000, metavar="N", help="long_logs: rows of a log"
+        "--rows", type=int, default=ROWS, metavar="N", help="long_logs: rows of a log"
     )
     many = parser.add_argument_group("structure, trees, and what else has many cases")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
@@ -77,8 +78,10 @@ def command(options):
     words = ["python", "-m", "benchmarks", *options.names]
     words += ["--campaign", "PATH"] if options.campaign else []
     words += ["--details"] if options.details else []
+    words += [f"--rows={options.rows}"] if options.rows != ROWS else []
     words += [f"--every={options.every}"] if options.every > 1 else []
     words += [f"--only={options.only}"] if options.only else []
+    words += ["--quick"] if options.quick else []
     if options.estimator_params:
         words.append(f"--estimator-params={json.dumps(options.estimator_params)}")
     return join(words)

@@ -93,7 +93,7 @@ def measure(case, options):
         "best": best,
         "over mean": ours / error(data.y.mean(), data),
         "beyond": n_beyond(prediction, data),
-        "furthest": float(excess[inside].max(initial=-np.inf)) if inside.any() else 0.0,
+        "furthest": float(excess[inside].max()) if inside.any() else 0.0,
         "seconds": seconds,
         **readability(model, data.X, data.y),
         "rivals_wall": rivals_wall,

@@ -26,6 +26,7 @@ from .cases import folds
 from .gyro import make_surface
 from .real_sets import SETS, RealSet, load_frame
 from .report import Measure, Results, Row, Table
+from .structure import borehole, friedman
 
 __all__ = ["run"]
 
@@ -68,11 +69,6 @@ _REAL = (
 )
 
 
-def _friedman(u):
-    curved = 10.0 * np.sin(np.pi * u[:, 0] * u[:, 1]) + 20.0 * (u[:, 2] - 0.5) ** 2
-    return curved + 10.0 * u[:, 3] + 5.0 * u[:, 4]
-
-
 def _enzyme(u):
     return u[:, 0] / (0.2 + u[:, 0]) * np.exp(-u[:, 1]) + 0.2 * np.sin(3.0 * u[:, 2])
 
@@ -83,16 +79,6 @@ def _scale_factor(u):
     return rate * (1.0 + 0.1 * temperature) + bias + 0.1 * np.sin(6.0 * rate)
 
 
-def _borehole(u):
-    """Flow of water through a borehole (Harper and Gupta 1983)."""
-    low = np.array([0.05, 100.0, 63070.0, 990.0, 63.1, 700.0, 1120.0, 9855.0])
-    high = np.array([0.15, 50000.0, 115600.0, 1110.0, 116.0, 820.0, 1680.0, 12045.0])
-    well, radius, upper, head, lower, below, length, conductivity = (low + (high - low) * u).T
-    ratio = np.log(radius / well)
-    leak = 2.0 * length * upper / (ratio * well**2 * conductivity)
-    return 2.0 * np.pi * upper * (head - below) / (ratio * (1.0 + leak + upper / lower))
-
-
 def _eight_inputs(u):
     x = 4.0 * u - 2.0
     step = (1.0 + 0.5 * np.tanh(x[:, 2])) / (1.0 + np.exp(-4.0 * x[:, 1]))
@@ -101,10 +87,10 @@ def _eight_inputs(u):
 
 # The function, signs of its inputs on [0, 1], rows, and noise in deviations.
 _PLANTED = {
-    "Friedman 1": (_friedman, [0, 0, 0, 1, 1, 0, 0, 0, 0, 0], 200, 0.2),
+    "Friedman 1": (friedman, [0, 0, 0, 1, 1, 0, 0, 0, 0, 0], 200, 0.2),
     "enzyme": (_enzyme, [1, -1, 0], 200, 0.3),
     "scale factor": (_scale_factor, [1, 0], 200, 0.2),
-    "borehole": (_borehole, [1, 0, 0, 1, 0, -1, -1, 0], 300, 0.1),
+    "borehole": (borehole, [1, 0, 0, 1, 0, -1, -1, 0], 300, 0.1),
     "eight inputs": (_eight_inputs, [1, 1, 0, 0, -1, 0, 0, 0], 1000, 0.3),
 }
 

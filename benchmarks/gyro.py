@@ -1,15 +1,17 @@
 """A surface like a fibre-optic gyro's error, whose truth is known without noise."""
 
+from functools import partial
+
 import numpy as np
 from sklearn.ensemble import HistGradientBoostingRegressor
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, WhiteKernel
-from sklearn.linear_model import LinearRegression
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 
+from .compensation import polynomial
 from .report import Measure, Results, Row, Table
 from .timing import best_of
 
@@ -62,10 +64,6 @@ def gaussian_process(n_inputs=3):
     return make_pipeline(StandardScaler(), GaussianProcessRegressor(kernel, normalize_y=True))
 
 
-def cubic():
-    return make_pipeline(StandardScaler(), PolynomialFeatures(3), LinearRegression())
-
-
 def measure(make_estimator, seeds, rounds=1):
     """Per seed: error inside the box, error over all rows, processor time of the fit."""
     figures = []
@@ -104,7 +102,7 @@ def others(figures):
     """The same seeds with other regressors."""
     estimators = {
         "Gaussian process, RBF + noise": gaussian_process,
-        "cubic polynomial": cubic,
+        "cubic polynomial": partial(polynomial, 3),
         "HistGradientBoosting": HistGradientBoostingRegressor,
     }
     lines = [["ANFISRegressor()", *summary(figures)]]

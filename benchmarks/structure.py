@@ -60,15 +60,14 @@ def product(Z):
     return np.prod(1.0 + 0.5 * Z, axis=1)
 
 
-def borehole(Z):
-    """Flow of water through a borehole (Morris, Mitchell and Ylvisaker 1993)."""
+def borehole(u):
+    """Flow of water through a borehole (Harper and Gupta 1983)."""
     low = np.array([0.05, 100.0, 63070.0, 990.0, 63.1, 700.0, 1120.0, 9855.0])
     high = np.array([0.15, 50000.0, 115600.0, 1110.0, 116.0, 820.0, 1680.0, 12045.0])
-    rw, r, Tu, Hu, Tl, Hl, L, Kw = (low + (high - low) * (Z + 1.0) / 2.0).T
-    log = np.log(r / rw)
-    return (
-        2.0 * np.pi * Tu * (Hu - Hl) / (log * (1.0 + 2.0 * L * Tu / (log * rw**2 * Kw)) + Tu / Tl)
-    )
+    well, radius, upper, head, lower, below, length, conductivity = (low + (high - low) * u).T
+    ratio = np.log(radius / well)
+    leak = 2.0 * length * upper / (ratio * well**2 * conductivity)
+    return 2.0 * np.pi * upper * (head - below) / (ratio * (1.0 + leak + upper / lower))
 
 
 def network(seed, n_inputs):
@@ -78,9 +77,8 @@ def network(seed, n_inputs):
     return lambda Z: np.tanh(Z @ inner + shift) @ outer
 
 
-def friedman(Z):
-    """Friedman's function (1991) of the first five of fifty inputs."""
-    U = 0.5 * (Z + 1.0)
+def friedman(U):
+    """Friedman's function (1991) of the first five inputs, which are between 0 and 1."""
     peaks = 10.0 * np.sin(np.pi * U[:, 0] * U[:, 1]) + 20.0 * (U[:, 2] - 0.5) ** 2
     return peaks + 10.0 * U[:, 3] + 5.0 * U[:, 4]
 
@@ -93,10 +91,10 @@ FUNCTIONS = {
     "robot arm": (robot_arm, 8),
     "linkage": (linkage, 6),
     "product": (product, 7),
-    "borehole": (borehole, 8),
+    "borehole": (lambda Z: borehole(0.5 * (Z + 1.0)), 8),
     "network of 6": (network(1, 6), 6),
     "network of 10": (network(2, 10), 10),
-    "Friedman": (friedman, 50),
+    "Friedman": (lambda Z: friedman(0.5 * (Z + 1.0)), 50),
     "wave": (wave, 4),
     "nothing, 10": (lambda Z: 0.0 * Z[:, 0], 10),
     "nothing, 50": (lambda Z: 0.0 * Z[:, 0], 50),

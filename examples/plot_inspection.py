@@ -45,8 +45,8 @@ print(f"error {error.std():.3f} °/s, with the model {(error - model.predict(X))
 # Rules as text
 # -------------
 #
-# The weightiest first. Each says what it is about where its own rows lie, and by how much that
-# changes with an input, counting from there.
+# First those that are the strongest on most rows. Each says what it is about where its own rows
+# lie, and by how much that changes with an input, counting from there.
 
 print(export_text(model, max_shown=4, output_names=["error"]))
 

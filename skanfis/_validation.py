@@ -75,7 +75,7 @@ def _check_kind(table, what):
         )
     for name, dtype in zip(names, dtypes, strict=True):
         # Of polars, of NumPy and pandas, a period of pandas.
-        is_temporal = getattr(dtype, "is_temporal", bool)()
+        is_temporal = getattr(dtype, "is_temporal", lambda: False)()
         if is_temporal or getattr(dtype, "kind", "") in ("m", "M") or hasattr(dtype, "freq"):
             column = "" if name is None else f" in column {name!r}"
             raise ValueError(
@@ -94,7 +94,7 @@ def _name_what_is_no_number(table, what, error):
     where = "" if name is None else f" in column {name!r}"
     more = ", ".join(repr(other) for other, *_ in found[1:])
     also = f" So do the columns {more}." if more else ""
-    advice = "A target must be a number."
+    advice = f"A {'target' if what == 'y' else 'weight'} must be a number."
     if what == "X":
         advice = (
             "Drop the column, or encode categories as numbers in a Pipeline before "
@@ -145,7 +145,7 @@ def group_numbers(groups, n_rows=None):
         raise ValueError(
             f"groups has {len(groups)} entries for {n_rows} rows of X: give every row its label."
         )
-    missing = [i for i, group in enumerate(groups) if group is None or group != group]
+    missing = [i for i, group in enumerate(groups) if is_missing(group)]
     if missing:
         raise ValueError(
             f"groups has no value for {len(missing)} of {len(groups)} rows, first at row "
@@ -159,6 +159,14 @@ def group_numbers(groups, n_rows=None):
             f"groups holds {' and '.join(kinds)}, which cannot be put in order: give numbers "
             "alone or text alone."
         ) from error
+
+
+def is_missing(label):
+    """Whether a label is None, NaN, NaT or pandas.NA."""
+    try:
+        return label is None or bool(label != label)
+    except TypeError:  # pandas.NA is neither equal to itself nor not
+        return True
 
 
 def check_finite(values, what, names):
@@ -267,7 +275,7 @@ def bearable_weights(sample_weight):
 
 
 def warn_user(message, category):
-    """Warn at the line that called the method which found something."""
+    """Warn at the line two calls up: that which called what calls this."""
     warnings.warn(message, category, stacklevel=3)
 
 

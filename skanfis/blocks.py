@@ -9,10 +9,10 @@ BLOCK_ROWS = 4096
 # goes through a pipeline's steps. Half a megabyte a column.
 LARGE_BLOCK_ROWS = 65_536
 # Of all that is worked out at once from a block: a part of the third-level cache, whatever the
-# model's size. Of 2^18 to 2^24, this was fastest or near it. ``model`` has a size of its own.
+# model's size. Of 2^18 to 2^24, this was fastest or near it.
 BLOCK_BYTES = 2**22
 # With fewer, the calls would cost more than the cache saves.
-_FEWEST_ROWS = 64
+FEWEST_ROWS = 64
 
 
 def row_blocks(n_rows, length) -> list[slice]:
@@ -27,4 +27,4 @@ def add_each(one, other):
 
 def fitting_rows(n_values) -> int:
     """Rows of a block of which so many floats a row exist at one time."""
-    return int(np.clip(BLOCK_BYTES // (8 * n_values), _FEWEST_ROWS, BLOCK_ROWS))
+    return int(np.clip(BLOCK_BYTES // (8 * n_values), FEWEST_ROWS, BLOCK_ROWS))

@@ -107,8 +107,8 @@ class LocalBasis:
         return 1 + self.center.shape[1]
 
     def transform_rows(self, matrix):
-        """T' M for a matrix (or vectors) with one row per column of Phi; in place."""
-        blocks = matrix.reshape(-1, self.n_basis, matrix.shape[1])
+        """T' M for a matrix, with one row per column of Phi, or its blocks by rule; in place."""
+        blocks = matrix.reshape(-1, self.n_basis, matrix.shape[-1])
         blocks[:, 1:] -= self.center[:, :, None] * blocks[:, :1]
         blocks[:, 1:] /= self.spread[:, :, None]
         return matrix
@@ -121,8 +121,7 @@ class LocalBasis:
     def transform_blocks(self, blocks):
         """T_r' B_r T_r of every rule's own block, (n_rules, n_basis, n_basis); in place."""
         for half in (blocks, blocks.transpose(0, 2, 1)):
-            half[:, 1:] -= self.center[:, :, None] * half[:, :1]
-            half[:, 1:] /= self.spread[:, :, None]
+            self.transform_rows(half)
         return blocks
 
     def to_local(self, coefficients):

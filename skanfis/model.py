@@ -23,6 +23,7 @@ from typing import Self
 import numpy as np
 
 from .antecedent import Antecedent, RuleTableAntecedent, by_group
+from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names
 from .policies import (
@@ -40,9 +41,6 @@ __all__ = ["EQUALLY_STRONG", "TSKModel"]
 
 # Strengths that differ by rounding errors only are equal.
 EQUALLY_STRONG = 1.0 - 1e-9
-
-# Bytes that the intermediate results of one block of rows may take.
-_BLOCK_BYTES = 2**22
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,8 +68,8 @@ class TSKModel:
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
     max_extrapolation : float
-        L of "linear", zero or positive. Where it is infinite, outputs are not held either, but by
-        limits that were asked for.
+        L of "linear", zero or positive. Where it is infinite, outputs are held within limits that
+        were asked for, and no others.
     support, posterior, target : RuleSupport, Posterior, TargetRange or None
         What coverage, deviations and the limits of outputs are made of, as far as there are data.
     term_names, output_names : tuple of str
@@ -247,9 +245,15 @@ class TSKModel:
 
         Rows out of the box are taken at its nearest point, and outputs before they are held.
         """
+        return self._slopes(X, self._linearised)
 
+    def tangent_slopes(self, X) -> np.ndarray:
+        """Slopes that "linear" follows from the nearest point of the box, as :meth:`gradient`."""
+        return self._slopes(X, self._tangent)
+
+    def _slopes(self, X, linearised):
         def of_block(Z):
-            return self._linearised(self._clip(Z))[1].reshape(-1, Z.shape[1])
+            return linearised(self._clip(Z))[1].reshape(-1, Z.shape[1])
 
         n_values = self.n_inputs * self.n_outputs
         by_row = self._by_block(X, of_block, n_values, self._n_slopes)
@@ -286,8 +290,9 @@ class TSKModel:
                 "standard deviation. Use fewer rules, or ConformalRegressor(..., scaled=False)."
             )
         return (
-            "The model knows of no posterior: it was taken as it was given, not fitted. Fit it to "
-            "data (solver='lse' fits the consequents and leaves the premises alone)."
+            "The model has no posterior, as one that was read from a .fis file, that lost rules or "
+            "that has seen a single row. Fit it to data (solver='lse' fits the consequents and "
+            "leaves the premises alone)."
         )
 
     def way_out(self, X) -> np.ndarray:
@@ -333,16 +338,21 @@ class TSKModel:
             return self
         return replace(self, out_of_bounds=policy, max_extrapolation=float(limit))
 
+    @property
+    def told_extrapolation(self) -> float:
+        """L for which the outermost rows speak; as it is set where there are none."""
+        told = self.rows_extrapolation
+        return self.max_extrapolation if told is None else told
+
     @cached_property
     def _supported_extrapolation(self):
-        """How far the outermost rows speak for the tangent; as it is set where there are none.
+        """How far the outermost rows and the noise speak for the tangent.
 
         A line that goes on bends beyond them by no more than it leaves of the target.
         """
-        told, target, posterior = self.rows_extrapolation, self.target, self.posterior
-        if told is None:
-            return self.max_extrapolation
-        if self.n_rules > 1 or told == MAX_EXTRAPOLATION or target is None or posterior is None:
+        told, target, posterior = self.told_extrapolation, self.target, self.posterior
+        is_told = self.rows_extrapolation not in (None, MAX_EXTRAPOLATION)
+        if self.n_rules > 1 or not is_told or target is None or posterior is None:
             return told
         of_noise = target.spread / np.maximum(posterior.noise, target.spread / FARTHEST)
         return max(float(f"{of_noise.min():.3g}"), told)
@@ -354,7 +364,7 @@ class TSKModel:
         """
         n_rows = X.shape[0]
         values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms + n_more
-        step = max(_BLOCK_BYTES // (8 * values_per_row), 64)
+        step = max(BLOCK_BYTES // (8 * values_per_row), FEWEST_ROWS)
         if 0 < n_rows <= step:
             return of_block(np.array(X.T, dtype=float, order="C")).T
         result = np.empty((n_rows, n_columns))
@@ -409,9 +419,9 @@ class TSKModel:
 
     @property
     def tangent_groups(self):
-        """Inputs whose tangents are found at one place, (n_groups, n_inputs); and what moves there.
+        """Groups of inputs whose tangents are taken at one place, as masks; and that place.
 
-        That is a point (n_groups, n_inputs), NaN where an input stays.
+        Each (n_groups, n_inputs); the place is NaN where an input keeps its own value.
         """
         if self.tangent_at is None:
             return np.ones((1, self.n_inputs), dtype=bool), np.full((1, self.n_inputs), np.nan)

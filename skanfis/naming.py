@@ -83,10 +83,14 @@ def _sides(sign, cuts, log_widths, low, high, fewest):
     More tell cuts apart that would look the same; equal ones, on different paths, have one name.
     """
     widths = np.exp(log_widths)
-    sides = list(zip(cuts, widths, is_crisp(cuts, widths, low, high), strict=True))
+    alone = is_crisp(cuts, widths, low, high)
+    # Between two values it is the middle, whatever rounding has left of that.
+    cuts = np.where(alone, 0.5 * (low + high), cuts)
+    halves = np.where(alone, 0.5 * (high - low), widths * _MOSTLY_TRUE)
+    sides = list(zip(cuts, halves, alone, strict=True))
     names: dict[tuple, str] = {}
     for digits in range(fewest, _MOST_DIGITS + 1):
-        written = {side: sign + _side(*side, low, high, digits) for side in sides}
+        written = {side: sign + _side(*side, digits) for side in sides}
         taken = Counter(written.values())
         for side, text in written.items():
             if side not in names and (taken[text] == 1 or digits == _MOST_DIGITS):
@@ -98,9 +102,8 @@ def _sides(sign, cuts, log_widths, low, high, fewest):
     return [names[side] for side in sides]
 
 
-def _side(cut, width, alone, low, high, digits):
+def _side(cut, half, alone, digits):
     """Write "6.8 ± 0.3", or the cut alone."""
-    half = 0.5 * (high - low) if alone else width * _MOSTLY_TRUE
     last = digits - 1 - int(np.floor(np.log10(half)))
     size = int(np.floor(np.log10(abs(cut)))) if cut else -last
     text = _plain(cut, min(max(size + 1 + last, 1), _MOST_DIGITS))

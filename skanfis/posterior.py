@@ -112,7 +112,7 @@ class Posterior:
         return replace(self, pinned=pinned)
 
     def of_coefficients(self, n_rules):
-        """The same of every coefficient about the reference, (n_rules, 1 + n_inputs, n_outputs)."""
+        """Deviations of the coefficients about the reference, (n_rules, n_basis, n_outputs)."""
         n_columns, n_changes = len(self.consequents), self.noise.size * self.premises.shape[1]
         halves = self._halves(np.eye(n_columns + n_changes, n_columns))
         found = [np.sqrt(np.maximum(self._product(k, h, h), 0.0)) for k, h in enumerate(halves)]
@@ -124,10 +124,7 @@ class Posterior:
         return self._deviations([self._product(k, h, h) for k, h in enumerate(halves)])
 
     def of_mean(self, model, Z, before=None):
-        """The same of the mean over the rows, without the noise of a row, (n_outputs,).
-
-        Or of its change from rows ``before``.
-        """
+        """The same of the mean over rows, or its change from rows ``before``, without noise."""
         rows = self._rows(model, Z)
         if before is not None:
             rows = rows - self._rows(model, before)

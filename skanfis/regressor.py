@@ -24,10 +24,7 @@ from ._sklearn import (
     fit_context,
 )
 from ._threads import one_blas_thread
-from ._validation import (
-    check_finite,
-    named_refusals,
-)
+from ._validation import check_finite, named_refusals
 from .bounds import FixedPoint, OutputLimits
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
 from .inspection.effects import importances
@@ -150,7 +147,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Iterations of the last run of the solver, the mean squared error of the standardised target
         from the start on, and why it stopped.
     agreement_, alpha_, slope_alpha_, stiffness_ : float
-        The weights used; ``slope_alpha_`` is that on the slopes of the rules' common line.
+        The weights used; ``slope_alpha_`` is that on the slopes of the rules' common line,
+        ``stiffness_`` that on moving the premises.
     pulls_, slope_pulls_ : list of dict, dict
         Of each component of the departures its "inputs" and its weight in ``alpha_``, "pull"; the
         weight of the slope by each input in ``slope_alpha_``. Empty where alpha is given.
@@ -281,17 +279,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return tags
 
     def set_params(self, **params: Any) -> Self:
-        """Set parameters, and settings of objects among them, such as ``solver__tol``.
-
-        Parameters
-        ----------
-        **params : dict
-            By name.
-
-        Returns
-        -------
-        self : ANFISRegressor
-        """
+        """Set parameters by name, and settings of objects among them, such as ``solver__tol``."""
         for key in params:
             name, _, setting = key.partition("__")
             given = params.get(name, getattr(self, name, None))
@@ -326,10 +314,6 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         groups : array-like of shape (n_samples,), default=None
             The run, device or level that each row belongs to. The structure is chosen by its error
             on groups left out, and ``early_stopping`` holds out whole groups.
-
-        Returns
-        -------
-        self : ANFISRegressor
 
         Raises
         ------
@@ -424,8 +408,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ------
         ValueError
             If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data;
-            or, with ``return_std=True``, if the model was taken as given and not fitted, or is too
-            large to keep the factor of a posterior (2,000 parameters).
+            or, with ``return_std=True``, if the model has no posterior, as one that was read from a
+            .fis file, or that is too large to keep its factor (2,000 parameters).
 
         Warns
         -----
@@ -545,10 +529,6 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             are multiplied by this. 1 forgets nothing; at 0.999 about the last 1,000 rows count. The
             box and the counts of coverage do not forget.
 
-        Returns
-        -------
-        self : ANFISRegressor
-
         Raises
         ------
         ValueError
@@ -601,10 +581,10 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
                 return
             latest = RowSums.of(before.base, before.consequent_inputs, *rows)
             self._sums = before.faded(forgetting**n_rows).plus(latest)
-        if is_fitted:
+        if is_fitted and not self._sums.targets.is_constant.all():
             # What this fit has found holds for further rows too, as a prior of fixed strength.
             self._first_weights = fitted_weights(self, self._sums)
-        else:
+        elif not is_fitted:
             self._solve_chunks()
             self.readability_ = readability_of_rows(self.model_, *rows)
         self.n_samples_seen_ = getattr(self, "n_samples_seen_", 0) + n_rows
@@ -704,13 +684,14 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         names : sequence of str or dict
             One per term, for every input alike or by input, ``{"temperature": ["cold", "hot"]}``,
             in the order of ``memberships_``; terms of other inputs get their default names.
-
-        Returns
-        -------
-        self : ANFISRegressor
         """
         model = self._fitted_model()
-        self.model_ = replace(model, term_names=given_term_names(model, names))
+        named = {"term_names": given_term_names(model, names)}
+        self.model_ = replace(model, **named)
+        if hasattr(self, "_sums"):
+            self._sums = replace(self._sums, base=replace(self._sums.base, **named))
+        if hasattr(self, "readability_"):
+            self.readability_ = replace(self.readability_, model=self.model_)
         return self
 
     def without_rules(self, rules: ArrayLike | None = None) -> TSKModel:
@@ -731,7 +712,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         model = self._fitted_model()
         if rules is None:
             rules = [entry["rule"] for entry in self.redundant_rules_]
-        return model_without_rules(model, np.asarray(rules, dtype=int))
+        return model_without_rules(model, rules)
 
     @property
     def n_rules_(self) -> int:

@@ -111,6 +111,23 @@ def textbook_membership(function, x, numbers):
     raise NotImplementedError(function)
 
 
+def by_formula(formula, x, numbers):
+    """What a printed formula says: "f where t = g", "f where s(u) = g", or "f"."""
+    formula, _, where = formula.replace("^", "**").partition(" where ")
+    words = {
+        "exp": np.exp,
+        "abs": np.abs,
+        "max": lambda *v: np.max(np.broadcast_arrays(*v), axis=0),
+    }
+    words |= numbers | {"x": x}
+    name, _, value = where.partition(" = ")
+    if name == "s(u)":
+        words["s"] = lambda u: eval(value, words | {"u": u})
+    elif name:
+        words[name] = eval(value, words)
+    return eval(formula, words)
+
+
 def rules_by_hand(antecedent):
     """Terms of every rule as lists, from nothing but the inputs of the terms."""
     inputs = [int(j) for group in antecedent.groups for j in group.inputs]

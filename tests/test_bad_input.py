@@ -143,6 +143,10 @@ REFUSED = {
         ["sample_weight contains infinity"],
     ),
     "other weights": ({"sample_weight": ONES[:-1]}, ["sample_weight.shape == (59,)", "(60,)"]),
+    "text as weights": (
+        {"sample_weight": LO_HI},
+        ["sample_weight holds text, first at row 0", "A weight must be a number"],
+    ),
     "2D weights": ({"sample_weight": np.ones((N_ROWS, 2))}, ["Sample weights must be 1D"]),
     "noise": ({"partition": DBSCAN(eps=1e-9)}, ["partition found no cluster", "noise"]),
     "no rules": ({"partition": ANFISRegressor()}, ["has no rules", "not been fitted", "model_"]),
@@ -203,8 +207,11 @@ def test_masked_values_are_not_taken_for_what_lies_beneath():
         ANFISRegressor(**QUICK).fit(masked, Y)
     with refused(ValueError, "X is a masked array"):
         model.predict(masked)
+    mask = np.arange(N_ROWS) == 2
     with refused(ValueError, "y is a masked array", "1 of 60 rows", "row 2"):
-        ANFISRegressor(**QUICK).fit(X, np.ma.array(Y, mask=np.arange(N_ROWS) == 2))
+        ANFISRegressor(**QUICK).fit(X, np.ma.array(Y, mask=mask))
+    with refused(ValueError, "sample_weight is a masked array", "1 of 60 rows", "row 2"):
+        ANFISRegressor(**QUICK).fit(X, Y, np.ma.array(ONES, mask=mask))
 
 
 def test_frames_of_polars():

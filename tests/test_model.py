@@ -65,7 +65,7 @@ ALL = pytest.mark.parametrize("frozen", MODELS.values(), ids=list(MODELS))
 
 @pytest.fixture(autouse=True)
 def _blocks_of_64_rows(monkeypatch):
-    monkeypatch.setattr(model, "_BLOCK_BYTES", 1)
+    monkeypatch.setattr(model, "BLOCK_BYTES", 1)
 
 
 def inside(frozen, rng, n=80):

@@ -298,7 +298,7 @@ def test_coverage_is_near_one_amid_data_and_low_in_an_empty_cell():
 )
 def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)
-    monkeypatch.setattr(blocks, "_FEWEST_ROWS", 16)
+    monkeypatch.setattr(blocks, "FEWEST_ROWS", 16)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
     with_few_candidates(monkeypatch)
     threads, read = set(), StandardisedData.read

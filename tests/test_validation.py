@@ -1,11 +1,12 @@
 """The checks alone, where the estimator's tests do not reach: blocks, overflow, switches."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn import config_context
 
 from skanfis import _validation
-from skanfis._validation import check_finite
+from skanfis._validation import check_finite, group_numbers
 
 NAMES = ["a", "b"]
 
@@ -44,3 +45,10 @@ def test_numbers_so_large_that_their_sum_overflows_are_finite(dtype):
 def test_check_is_switched_off_with_that_of_scikit_learn():
     with config_context(assume_finite=True):
         check_finite(np.array([[np.nan, 1.0]]), "X", NAMES)
+
+
+@pytest.mark.parametrize("missing", [None, np.nan, np.datetime64("NaT"), pd.NaT, pd.NA])
+def test_a_missing_group_is_named_whatever_stands_for_it(missing):
+    with pytest.raises(ValueError, match="no value for 1 of 3 rows, first at row 1"):
+        group_numbers([1, missing, 2])
+    assert group_numbers([7, 5, 7]).tolist() == [1, 0, 1]

@@ -15,6 +15,7 @@ its own membership when its input's are normalised; scattered rules: the rule's 
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
@@ -67,6 +68,10 @@ class Antecedent(ABC):
     """The IF parts of a set of rules over a sequence of terms; immutable."""
 
     groups: tuple[TermGroup, ...]
+    # Whether rules share the terms of an input, which then can be kept in order.
+    is_ordered: ClassVar[bool] = True
+    # Of a term, in standardised units; what is narrower is crisp, and does not move.
+    least_width: ClassVar[float] = 0.0
 
     @property
     def n_terms(self):
@@ -98,16 +103,6 @@ class Antecedent(ABC):
     def grid_counts(self) -> tuple[int, ...] | None:
         """Terms of each input that has some, where rules are all combinations; else None."""
         return None
-
-    @property
-    def is_ordered(self) -> bool:
-        """Whether rules share the terms of an input, which then can be kept in order."""
-        return True
-
-    @property
-    def least_width(self):
-        """Of a term, in standardised units; what is narrower is crisp, and does not move."""
-        return 0.0
 
     @property
     def tied(self):

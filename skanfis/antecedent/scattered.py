@@ -15,6 +15,7 @@ class ScatteredAntecedent(Antecedent):
     """
 
     n_premise_inputs: int = 0
+    is_ordered = False
 
     @classmethod
     def build(cls, family, inputs, theta):
@@ -26,10 +27,6 @@ class ScatteredAntecedent(Antecedent):
     @property
     def n_rules(self):
         return self.n_terms // self.n_premise_inputs
-
-    @property
-    def is_ordered(self):
-        return False
 
     @property
     def rule_terms(self):

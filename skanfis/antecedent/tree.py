@@ -32,6 +32,9 @@ CRISP = 40.0
 class TreeAntecedent(RuleTableAntecedent):
     """Leaves of a tree; ``table`` has the sides on the path of each, from the root on."""
 
+    is_ordered = False
+    least_width = LEAST_WIDTH
+
     @classmethod
     def build(cls, inputs, theta, paths):
         """Of the input of each node, theta (2, n_nodes), and for every leaf its path.
@@ -46,21 +49,13 @@ class TreeAntecedent(RuleTableAntecedent):
         return cls(tuple(TermGroup(side, inputs, theta.copy()) for side in sides), table)
 
     @property
-    def is_ordered(self):
-        return False
-
-    @property
     def n_nodes(self):
         """Number of nodes that cut."""
         return self.n_terms // 2
 
     @property
-    def least_width(self):
-        return LEAST_WIDTH
-
-    @property
     def tied(self):
-        """Parameters of both sides are one: of every entry of the vector, which displacement."""
+        """Parameters of both sides are one."""
         return np.tile(np.arange(2 * self.n_nodes), 2)
 
     @property

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from .._validation import check_count, position_of
+from ..export import fold
 from ..model import TSKModel
+from ..policies import SILENT
 from .construction import is_in_order
 from .enclosure import Enclosure, reach_of
 from .search import largest
@@ -127,7 +129,7 @@ def bounds(
 
     def sides_of(k, X):
         below, above = (Enclosure(model, k, sign) for sign in (-1.0, 1.0))
-        values = above.predict(X)
+        values = above.hold(above.say(X))
         return float(np.ptp(values)), ((below.values, -values), (above.values, values))
 
     return _enclosed(model, box, low, high, sides_of, tol, max_boxes, model.output_names)
@@ -272,10 +274,7 @@ def _enclosed(model, box, low, high, sides_of, tol, max_boxes, names):
 
 def _checked(model, box, tol, max_boxes):
     """The frozen model in the user's units, and the box."""
-    if not isinstance(model, TSKModel):
-        from ..export import fold
-
-        model = fold(model)
+    model = fold(model)
     for group in model.antecedent.groups:
         if not is_known(group.family):
             raise ValueError(
@@ -322,7 +321,7 @@ def read_box(box, model: TSKModel):
 def held_box(box, model: TSKModel, beyond=0.0):
     """Lows and highs of the part of a box in which predictions change, and a strip ``beyond``."""
     low, high = box.T.copy()
-    if model.out_of_bounds in ("nan", "raise"):
+    if model.out_of_bounds in SILENT:
         low, high = np.maximum(low, model.minimum), np.minimum(high, model.maximum)
         for name, start, stop, ends in zip(model.input_names, low, high, box, strict=True):
             if start > stop:

@@ -165,8 +165,9 @@ class Constraints:
 def _signs(given, input_names, n_outputs):
     n_inputs = len(input_names)
     if isinstance(given, Mapping):
+        given = {str(name): sign for name, sign in given.items()}
         if given:
-            feature_indices([str(name) for name in given], input_names, "monotonic_cst")
+            feature_indices(list(given), input_names, "monotonic_cst")
         given = [given.get(name, 0) for name in input_names]
     signs = np.zeros(n_inputs) if given is None else _numbers(given, "monotonic_cst")
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):

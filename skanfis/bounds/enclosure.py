@@ -11,7 +11,7 @@ from math import prod
 import numpy as np
 
 from ..model import TSKModel
-from ..policies import FARTHEST_ROW
+from ..policies import FARTHEST_ROW, SILENT
 from .terms import (
     EPS,
     ROUNDINGS,
@@ -65,18 +65,13 @@ class Enclosure:
         self.slopes[:, : coefficients.shape[1] - 1] = coefficients[:, 1:]
         self.place = {j: place for place, one in enumerate(self.factors) for j in one}
         self.reach, self.tangents = reach_of(model), model.tangent_groups
-        answers = model.out_of_bounds in ("clip", "linear")
-        answering = model if answers else model.with_out_of_bounds("clip")
+        answering = model.with_out_of_bounds("clip") if model.out_of_bounds in SILENT else model
         # What the rules say is enclosed; that outputs are held comes last, being monotone.
         self.rules = replace(answering, target=None)
         self.lowest, self.highest = np.sort(sign * model.output_limits[:, output])
 
-    def predict(self, X):
-        """Sign times the output of rows (n_rows, n_inputs)."""
-        return self.hold(self.say(X))
-
     def say(self, X):
-        """The same before it is held."""
+        """Sign times the output of rows, before it is held."""
         return self.sign * self.rules.predict(X)[:, self.output]
 
     def hold(self, values):

@@ -67,8 +67,8 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     """
     fit = _ConstrainedFit(model, problem, constraints)
     ordered = fit.in_order(evaluation)
-    local, drawn = ordered.local, 1.0 if ordered.is_line else 0.0
-    before = evaluation.mean_squared_error
+    local, before = ordered.local, evaluation.mean_squared_error
+    drawn = float(ordered.is_line)
     if fit.error(ordered, local) > _DEAR * before:
         other, way = fit.drawn(ordered)
         if fit.error(ordered, other) < fit.error(ordered, local):

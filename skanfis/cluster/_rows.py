@@ -68,10 +68,6 @@ class Clusterer(ClusterMixin, BaseEstimator):
         y : None
         sample_weight : array-like of shape (n_samples,), default=None
             Zero or positive; a whole number counts as so many copies of the row.
-
-        Returns
-        -------
-        self : object
         """
         X = check_rows(self, X, reset=True)
         self._find_centers(*distinct_rows(X, sample_weight))

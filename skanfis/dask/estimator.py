@@ -12,9 +12,10 @@ from ..bounds.constraints import Constraints
 from ..inspection.measures import measures_of, rule_sums
 from ..inspection.readability import Readability
 from ..inspection.sentences import Sentences
+from ..learning.data import column_statistics
 from ..learning.sampling import is_many
 from ..regressor import ANFISRegressor
-from .rows import ClusterData, Partitions, computed, is_collection, reduce_partitions
+from .rows import ClusterData, Partitions, computed, is_collection, joined, reduce_partitions
 
 
 class DaskANFISRegressor(ANFISRegressor):
@@ -63,14 +64,17 @@ class DaskANFISRegressor(ANFISRegressor):
         check_is_fitted(self)
         partitions = Partitions.of(X, y, sample_weight)
         self._check_columns(X)
-        # About the training mean: the squares lose no digits.
-        origin = self.readability_.measures.mean
-        of_rows = partial(_error_sums, model=self._local(has_names=False), origin=origin)
-        weight, first, second, error = reduce_partitions(partitions, of_rows, add_each)
-        spread = second - first**2 / weight
-        with np.errstate(divide="ignore", invalid="ignore"):
-            by_output = np.where(error == 0.0, 1.0, np.where(spread > 0, 1 - error / spread, 0.0))
-        return float(np.mean(by_output))
+        of_rows = partial(_target_and_error, model=self._local(has_names=False))
+        described, error = reduce_partitions(partitions, of_rows, _added)
+        if described is None or described[0] < 2:
+            return np.nan
+        _, weight, target = described
+        if not np.isfinite(error).all():
+            raise ValueError(
+                "y is not finite, or X is out of range where out_of_bounds='nan': drop these rows."
+            )
+        explained = np.where(target.is_constant, 0.0, 1.0 - error / (weight * target.scale**2))
+        return float(np.mean(np.where(error == 0.0, 1.0, explained)))
 
     def _local(self, has_names=True):
         """The model alone, as sent to the workers; of inputs without names it expects none."""
@@ -97,9 +101,16 @@ class DaskANFISRegressor(ANFISRegressor):
         """scikit-learn's checks of the columns: here, where a worker would warn of each block."""
         import pandas as pd
 
+        if X.ndim != 2:
+            raise ValueError(f"X has {X.ndim} dimensions, and a table has two: rows and columns.")
         columns = getattr(X, "columns", None)
         empty = np.empty((0, X.shape[1])) if columns is None else pd.DataFrame(columns=columns)
         validate_data(self, empty, reset=reset, skip_check_array=True)
+
+    def _check_inputs(self, X):
+        if is_collection(X):
+            raise TypeError("Of dask collections there are fit, predict, score: give X.compute().")
+        return super()._check_inputs(X)
 
     def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
         if not any(is_collection(one) for one in (X, y, sample_weight, groups)):
@@ -145,8 +156,7 @@ class DaskANFISRegressor(ANFISRegressor):
 
 
 def _rule_sums(rows, model, printed):
-    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
-    return rule_sums(model, printed, rows.targets, rows.X, rows.y, weight)
+    return rule_sums(model, printed, rows.targets, rows.X, rows.y, rows.weights)
 
 
 def _predicted(block, model, names, is_deviation):
@@ -166,11 +176,14 @@ def _predicted(block, model, names, is_deviation):
     return pd.DataFrame(values, index=block.index, columns=list(names))
 
 
-def _error_sums(rows, model, origin):
-    """Weight, target and its square about an origin, and squared error, of a partition."""
-    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
+def _target_and_error(rows, model):
+    """Count, weight and scale of the target in a partition, None of no rows; and squared error."""
     if not rows.n_rows:
-        return [0.0, *np.zeros((3, len(origin)))]
+        return None, 0.0
     predicted = model.predict(rows.X).reshape(rows.y.shape)
-    away, error = rows.y - origin, rows.y - predicted
-    return [weight.sum(), weight @ away, weight @ away**2, weight @ error**2]
+    target = column_statistics(rows.y, rows.sample_weight)
+    return (rows.n_rows, rows.total_weight, target), rows.weights @ (rows.y - predicted) ** 2
+
+
+def _added(one, other):
+    return joined(one[0], other[0]), one[1] + other[1]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from sklearn.utils import check_array
 
-from .._validation import check_finite, named_refusals, positive_weights
+from .._validation import check_finite, is_missing, named_refusals, positive_weights
 from ..blocks import add_each
 from ..bounds.constraints import Constraints
 from ..learning.data import Scale, StandardisedData, check_scales, column_statistics
@@ -186,7 +186,7 @@ def _loaded(layout, X, y, sample_weight, groups):
                 f"X has {n_rows} rows and {what} {len(one)}: their partitions must be cut at the "
                 "same rows."
             )
-    if labels is not None and any(label is None or label != label for label in labels):
+    if labels is not None and any(map(is_missing, labels)):
         raise ValueError("groups has no value for some rows: every row must belong to a group.")
     keep = None if weight is None else positive_weights(weight, n_rows, least=0)
     if keep is not None:
@@ -261,7 +261,7 @@ def _describe(rows, layout):
     return rows.n_rows, rows.total_weight, inputs, targets
 
 
-def _joined(one, other):
+def joined(one, other):
     """Describe the rows of both."""
     if one is None or other is None:
         return other if one is None else one
@@ -281,7 +281,7 @@ class ClusterData:
     def of(cls, partitions):
         """Validate and measure the partitions, in one pass."""
         describe = partial(_describe, layout=partitions.layout)
-        described = reduce_partitions(partitions, describe, _joined)
+        described = reduce_partitions(partitions, describe, joined)
         n_rows = 0 if described is None else described[0]
         if n_rows < 2:
             raise ValueError(f"Found {n_rows} rows with a positive weight; at least 2 are needed.")

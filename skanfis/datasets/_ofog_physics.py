@@ -136,7 +136,7 @@ def simulate_power_up(device, turn_on_bias, rate, thermal, normals, sampling_int
         "temperature_rate": thermal.thermometer_rate,
         "ambient": thermal.ambient,
         "rate": rate,
-        "counts": output,
+        "counts": output,  # holds the place of the column, which is filled in later
         "output": output,
         "error": output - rate,
         "noise": sum(biases[name] for name in _RANDOM_BIASES)

@@ -89,8 +89,8 @@ def export_json(
     if posterior:
         if model.posterior is None:
             raise ValueError(
-                "posterior=True, but the model knows of none: it was taken as it was given, not "
-                "fitted, or is too large to keep one."
+                "posterior=True, but the model has none, as one that was read from a .fis file or "
+                "is too large to keep one."
             )
         state = model.posterior.__getstate__()
         document["posterior"] = {key: values.tolist() for key, values in state.items()}

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from .compose import ResidualRegressor
     from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay
     from .errors import LogError
-    from .features import ThermalRate
     from .log import read_log
     from .physics import OpenLoopArcsineRegressor
     from .report import gyro_report
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
         ResidualSurfaceDisplay,
         ScaleFactorErrorDisplay,
     )
+    from .thermal_rate import ThermalRate
 
 __all__ = [
     "AllanDisplay",
@@ -42,8 +42,8 @@ __all__ = [
     "read_log",
 ]
 _HOMES = (
-    "_checks _split c_code compensator compose displays errors features log physics report "
-    "thermal_displays"
+    "_checks _split c_code compensator compose displays errors log physics report "
+    "thermal_displays thermal_rate"
 )
 
 

@@ -19,6 +19,7 @@ from ._models import fit_model, some_rows
 from ._simpler import NAMES, Simpler, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, as_written, features
+from .compose import rules_of
 from .errors import LogError
 from .metrics import rms, scale_factor
 
@@ -118,7 +119,7 @@ class Calibration:
     @property
     def rules(self):
         """The pipeline of the rules: beside the arcsine law, what adds to it."""
-        return getattr(self.model, "residual_", self.model)
+        return rules_of(self.model)
 
     @property
     def writes_model(self):
@@ -227,9 +228,8 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
         tell(f"checking by held-out {split.kind}: fold {number} of {len(split.folds)}")
         rows = some_rows(train, _MOST_FIT_ROWS, X, rng)
         folds.append((rows, test))
-        with warnings.catch_warnings():
-            # The final fit warns of the same.
-            warnings.simplefilter("ignore")
+        # The final fit warns of the same.
+        with warnings.catch_warnings(action="ignore"):
             model, _ = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
             predicted[test] = model.predict(X.iloc[test])
             inside[test] = ask(model, "in_bounds", X.iloc[test])
@@ -246,9 +246,8 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
 def _fit(X, target, groups, recipe, tell):
     """The model of all rows, its terms, and what warnings said."""
     tell(f"fitting to {len(X):,} rows")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        # Of rows that trial fits have not seen; the final one is asked of none.
+    with warnings.catch_warnings(record=True, action="always") as caught:
+        # Trial fits warn of rows that they have not seen; the final fit is asked of none.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
         estimator, terms = fit_model(X, target, groups, recipe)
     tell(f"terms {','.join(map(str, terms))}")

@@ -32,6 +32,8 @@ _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
 # Steps of 20 times the usual one are no noise; glitches are rare.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LEAST_CORRELATION = 0.9  # of output and rate
+# What an error says of it; of a file its name is put in.
+RATE_COLUMN = "column of the rate"
 
 # More than so many rows of a kind support one another.
 _MOST_GLITCHES = 3
@@ -71,8 +73,8 @@ def check_log(
     Raises
     ------
     LogError
-        If a value is missing or implausible, time does not increase within a run, a range is too
-        small, or the output does not follow the rate.
+        If a column of the inputs or a value is missing, a value is implausible, time does not
+        increase within a run, a range is too small, or the output does not follow the rate.
 
     Examples
     --------
@@ -90,6 +92,10 @@ def check_log(
     if len(log) < (_FEWEST_ROWS if len(inputs) else 1):
         rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
         raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
+    for name in inputs:
+        for part in ("time", "temperature") if name == "temperature_rate" else (name,):
+            if part not in log:
+                raise LogError(f"the log has no {part}.")
     runs = log["run"] if "run" in log else np.zeros(len(log))
     check_rows(log, units, pd.factorize(runs, use_na_sentinel=False)[0])
     n_runs = log["run"].nunique() if "run" in log and len(inputs) else 1
@@ -255,12 +261,12 @@ def _check_output_follows_rate(log, units):
             told = f"all values are {values[0]:g}, which tells no scale factor. {advice}"
             raise LogError(told, part)
     if np.array_equal(output, rate):
-        raise LogError("equals the column of the rate: one of them is the wrong one.", "output")
+        raise LogError(f"equals the {RATE_COLUMN}: one of them is the wrong one.", "output")
     correlation = np.corrcoef(output, rate)[0, 1]
     if abs(correlation) < _LEAST_CORRELATION:
         raise LogError(
-            f"does not follow the rate (correlation {correlation:.3f}); is it, or the column "
-            "of the rate, the wrong one?",
+            f"does not follow the rate (correlation {correlation:.3f}); is it, or the "
+            f"{RATE_COLUMN}, the wrong one?",
             "output",
         )
     slope = np.polyfit(rate, output, 1)[0]

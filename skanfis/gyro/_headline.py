@@ -9,12 +9,11 @@ from ..bounds import bounds, gradient_bounds
 from ..export import fold
 from ..export.c.dialect import STATUS
 from ..inspection import export_text, readability
-from ..inspection.readability import GREATEST_ERROR
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NAMES, NOTHING
 from .compensator import features
-from .compose import FrozenRules, Polynomial
-from .displays import figures
+from .compose import FrozenRules, Polynomial, rules_of
+from .displays import three_digits
 from .metrics import rms
 from .physics import past_phase
 from .targets.error_model import ErrorModel
@@ -31,17 +30,19 @@ def headline(calibration, unit):
     """A title, and a sentence that gives its reason; errors in ``unit``."""
     verdict, groups = calibration.verdict, held_out_groups(calibration)
     left = {
-        name: f"{figures(RATE_UNITS[unit] * error)} {unit}" for name, error in verdict.rms.items()
+        name: f"{three_digits(RATE_UNITS[unit] * error)} {unit}"
+        for name, error in verdict.rms.items()
     }
     if verdict.recommended == verdict.model:
         simpler = [name for name in verdict.rms if name not in (NOTHING, verdict.model)]
         best = min(simpler, key=verdict.rms.get)
         gain = verdict.gains[best]
+        factor, low, high = map(three_digits, (gain.factor, gain.low, gain.high))
         return "The fuzzy rules are worth it", (
             f"They leave {left[verdict.model]} RMS of {left[NOTHING]} on the held-out rows in "
             f"range; the best of what is simpler, {ARTICLES[best]}, leaves {left[best]} on the "
-            f"same rows. Over the {groups} that is {figures(gain.factor)} times as much in the "
-            f"geometric mean (95 % interval {figures(gain.low)} to {figures(gain.high)})."
+            f"same rows. Over the {groups} that is {factor} times as much in the geometric mean "
+            f"(95 % interval {low} to {high})."
         )
     name = verdict.recommended
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
@@ -139,9 +140,10 @@ def errors_and_verdict(calibration):
 def of_rates(compensator, log, rates):
     """Lines on the rates of a log: status, inputs out of range, errors where they are known."""
     status, blame = rates["status"], {}
-    rules = getattr(compensator.estimator, "residual_", compensator.estimator)
+    rules = rules_of(compensator.estimator)
     if isinstance(rules, FrozenRules):  # as in all that the command writes
-        X = features(log, compensator.inputs, compensator.time_constant)[status & 1 != 0]
+        is_out = (status & STATUS["OUT_OF_RANGE"]) != 0
+        X = features(log, compensator.inputs, compensator.time_constant)[is_out]
         parts = [(X.iloc[:, rules.positions], rules.model.minimum, rules.model.maximum)]
         blame["OUT_OF_RANGE"] = beyond(parts)
     yield f"flagged        {(status != 0).sum():,} rows"
@@ -171,8 +173,7 @@ def against_reading(calibration):
         left = calibration.rate[places] - calibration.model.base_.predict(X)
     # Rows that the law refuses are no business of the rules.
     known = np.isfinite(left)
-    found = readability(calibration.rules, X[known], left[known])
-    return found.findings[int(found.summary["text_over_model"] > GREATEST_ERROR) :]
+    return readability(calibration.rules, X[known], left[known]).on_rules
 
 
 class Proven(NamedTuple):
@@ -193,7 +194,7 @@ def proven_bounds(calibration):
     if isinstance(getattr(rules, "base_", None), Polynomial):
         error = ErrorModel(compensator, rules, X)
         return Proven(float(np.abs(error.ranges(*error.ends.T[:, :, None])[0]).max()))
-    rules = getattr(rules, "residual_", rules).model
+    rules = rules_of(rules).model
     found = bounds(rules, max_boxes=_MOST_BOXES)
     largest = float(np.abs([found.lower, found.upper]).max())
     if compensator.predicts == "rate" or "output" not in X:

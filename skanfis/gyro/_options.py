@@ -60,7 +60,7 @@ examples:
 exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
-  5  a target was refused; all else is written
+  5  a target was refused; all else is written    130  interrupted by Ctrl-C
 """
 
 
@@ -117,7 +117,8 @@ def make_parser():
     add("--c", "also write the model as C, by this standard, in double or float", choices=stds)
     told = f"also a simple target, where it is good enough: {_TARGETS}"
     add("--target", told, type=_target, **several)
-    add("--force", "replace files that exist", action="store_true")
+    told = "replace files that exist, and remove those of an earlier run that are not written anew"
+    add("--force", told, action="store_true")
     add("--quiet", "no progress on stderr", action="store_true")
     return parser
 
@@ -254,7 +255,9 @@ def check_limit(limit, lines):
     if math.isnan(value):
         return Check(limit, value, "not measured", line["note"])
     is_kept = limit.keeps(value)
-    is_sure = math.isnan(low) or limit.keeps(low) == limit.keeps(high) == is_kept
+    # The smallest size in the interval is at an end, or zero.
+    ends = (low, high, min(max(0.0, low), high))
+    is_sure = math.isnan(low) or all(limit.keeps(end) == is_kept for end in ends)
     remark = "" if is_sure else "its interval reaches over the limit"
     return Check(limit, value, "pass" if is_kept else "fail", remark)
 

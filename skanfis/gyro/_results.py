@@ -14,7 +14,7 @@ from ..inspection import MembershipDisplay
 from ._columns import RATE_UNITS, evenly_chosen, label_texts
 from ._options import check_limit
 from .compensator import features
-from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, figures, signs
+from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, signs, three_digits
 from .metrics import rms, rows_for_allan
 from .report import gyro_report
 from .thermal_displays import (
@@ -124,7 +124,7 @@ class Results:
 
     def shown(self, error):
         """An error [deg/s] in the unit for errors, without it; a dash where it is not known."""
-        return figures(RATE_UNITS[self.unit] * error)
+        return three_digits(RATE_UNITS[self.unit] * error)
 
     @cached_property
     def merit(self):

@@ -37,19 +37,19 @@ class Simpler:
     """A simple compensation.
 
     ``after`` is the compensated rate of every row by a model that had not seen its group;
-    ``estimator`` is fitted to all rows, and ``fold_models`` are those of the folds. They are None
-    where the log does not allow it, and ``missing`` says why.
+    ``estimator`` is fitted to all rows. Both are None where the log does not allow it, and
+    ``missing`` says why. ``fold_models`` are those of the folds, then none.
     """
 
     name: str
-    predicts: str = "error"
+    predicts: str
     after: np.ndarray | None = None
     estimator: Any = None
     missing: str = ""
     fold_models: list = field(default_factory=list)
 
 
-def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
+def simpler_compensations(X, rate, before, folds, rows, policy):
     """Simple compensations from the simplest to the least simple, on the same rows and folds.
 
     ``folds`` are pairs of rows fitted to and rows predicted, ``rows`` those of the final fit.
@@ -82,7 +82,7 @@ def simpler_compensations(X, rate, before, folds, rows, policy="linear"):
             yield Simpler(name, predicts, after, whole, fold_models=made)
 
 
-def kinds(inputs, policy="linear"):
+def kinds(inputs, policy):
     """Name, what it predicts, and what fits it to rows: to X, y, and a rule that gives zero."""
 
     def law(X, y, zero):

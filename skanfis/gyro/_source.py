@@ -11,17 +11,15 @@ import numpy as np
 import pandas as pd
 
 from ._columns import unit_in
-from ._tables import EXCEL, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
+from ._tables import EXCEL, HEAD_ROWS, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
 from .errors import LogError
 
 # What loggers write where there is no value, beside what pandas knows.
 NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 
-# Longer is no log, but would take minutes to be found to be none.
+# Refused at once: csv would take minutes over such a line.
 _LONGEST_LINE, _MOST_COLUMNS = 2**22, 10_000
 _HEAD_BYTES = 2**16
-# Lines above the header that a logger may write, and a few rows.
-_HEAD_RECORDS = 60
 _END_OF_PREAMBLE = "***End_of_Header***"
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "", " ": "blanks"}
 _NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
@@ -72,7 +70,7 @@ class _TextSource:
         if self._encoding != "utf-8-sig":
             self.notes.append(f"the text is read as {self._encoding.upper()}")
         self._find_separator()
-        head = list(islice(self._records(), _HEAD_RECORDS))
+        head = list(islice(self._records(), HEAD_ROWS))
         if not head:
             raise LogError(f"{path}: is empty.")
         self._place_header(head)
@@ -82,7 +80,7 @@ class _TextSource:
         """The first sign that is on all lines, those of a preamble aside; else a comma."""
         for sign, name in _SEPARATORS.items():
             self._separator = sign
-            lengths = [len(values) for _, values in islice(self._records(), _HEAD_RECORDS)]
+            lengths = [len(values) for _, values in islice(self._records(), HEAD_ROWS)]
             # A comma on the last line goes before blanks, of which any text has some.
             ends = lengths[len(lengths) // 3 :] if sign != "," else lengths[-1:]
             if min(ends, default=0) > 1:
@@ -213,7 +211,7 @@ def header_place(rows):
     ends = [k for k, values in enumerate(rows) if values[0].strip() == _END_OF_PREAMBLE]
     start = ends[-1] + 1 if ends else 0
     data = [k >= start and _is_data(values) for k, values in enumerate(rows)]
-    if not any(data) and len(rows) == _HEAD_RECORDS:
+    if not any(data) and len(rows) == HEAD_ROWS:
         raise LogError(f"has no row of numbers in its first {len(rows)} lines.")
     # A line of the preamble may hold numbers too, but no three such lines in a row.
     together = [

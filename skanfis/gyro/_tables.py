@@ -11,7 +11,8 @@ from .errors import LogError
 
 PARQUET, MATLAB, EXCEL = (".parquet", ".pq"), (".mat",), (".xlsx", ".xlsm")
 _HDF5 = b"\x89HDF"
-_HEAD_ROWS = 60
+# Lines above the header that a logger may write, and a few rows.
+HEAD_ROWS = 60
 
 
 class TableSource:
@@ -59,7 +60,8 @@ class ParquetSource(TableSource):
 def matlab_source(path):
     """The vectors of one length in a .mat file, of variables or of the fields of structs."""
     with open(path, "rb") as file:
-        is_hdf5 = _HDF5 in (file.read(4), file.seek(512) and file.read(4))
+        head = file.read(516)
+    is_hdf5 = _HDF5 in (head[:4], head[512:])
     with _read_as("MATLAB file", path), _tree(path, is_hdf5) as tree:
         found = dict(_vectors(tree))
     lengths = [len(values) for values in found.values() if len(values) > 1]
@@ -122,7 +124,7 @@ def excel_source(path, header_place):
     if sheet is None:
         raise LogError(f"{path}: is empty.")
     notes = [f"of {len(sheets)} sheets {name!r} is read"] if len(sheets) > 1 else []
-    head = sheet.head(_HEAD_ROWS).astype(object)
+    head = sheet.head(HEAD_ROWS).astype(object)
     try:
         place, first, header = header_place(head.where(head.notna(), "").astype(str).to_numpy())
     except LogError as error:

@@ -20,11 +20,11 @@ from ..export.c import CCode, export_c
 from ..export.c.builder import RulesPart, cost_lines, header_of, input_lines, policy_line
 from ..export.c.dialect import (
     LONGEST_NAME,
-    STATUS,
     Dialect,
     check_arguments,
     kept_lines,
     remark,
+    status_word,
     write_files,
 )
 from ..export.c.self_test import ROWS, TOLERANCE, self_test, size_of_sum
@@ -250,16 +250,17 @@ class _Composition:
         vars(self.law).update(box, n_features_in_=columns.size)
         self.law.columns_ = np.searchsorted(columns, law.columns_)
         self.reference = self.rounded(law.reference_temperature_)
-        given = {"amplitude": law.amplitude_, "sagnac": law.sagnac_factor_, "bias": law.bias_}
-        self.tables = {key: self.rounded(values) for key, values in given.items()}
+        coefficients = law.amplitude_, law.sagnac_factor_, law.bias_
+        keys = ("amplitude", "sagnac", "bias")
+        self.tables = dict(zip(keys, map(self.rounded, coefficients), strict=True))
 
     def rounded(self, values):
         values = np.asarray(values, dtype=float)
         largest = np.abs(values).max()
         if not largest <= float(np.finfo(self.dtype).max):
             raise ValueError(
-                f"Single precision cannot hold {largest:g}, a constant of the arcsine law. Scale "
-                "the output, or export in double precision."
+                f"Single precision cannot hold {largest:g}, a constant of what the rules are added "
+                "to. Scale the output, or export in double precision."
             )
         return values.astype(self.dtype)
 
@@ -400,26 +401,22 @@ def _known_answers(whole):
     # NaN past the amplitude.
     phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (phase_of(law, X), law.max_phase)
     phase, coverage = np.abs(phase), rules.coverage(X)
-    sure = ~(np.abs(phase - limit) < 1e-3)
-    if part.min_coverage is not None:
-        sure &= np.abs(coverage - part.min_coverage) > 1e-3 * part.min_coverage
+    # Where no coverage is asked for, every row has enough.
+    asked = -1.0 if part.min_coverage is None else part.min_coverage
+    sure = ~(np.abs(phase - limit) < 1e-3) & (np.abs(coverage - asked) > 1e-3 * asked)
     chosen = np.flatnonzero(sure)[:ROWS]
     X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= limit)[chosen]
     silent = beyond & (law.out_of_bounds in SILENT)
     silent |= ~rules.in_bounds(X) & (rules.model.out_of_bounds in SILENT)
-    with warnings.catch_warnings():
-        # The status tells, row by row.
-        warnings.simplefilter("ignore", OutOfBoundsWarning)
+    # The status tells, row by row.
+    with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
         answering = law if whole.is_cubic else copy(law).set_params(out_of_bounds=_answering(law))
         of_law = answering.predict(X)
     model, z = rules.model.with_out_of_bounds(_answering(rules.model)), X[:, rules.positions]
     of_rules = model.predict(z)
     silent |= ~np.isfinite(of_law.astype(whole.dtype))
     inside = ((low <= X) & (high >= X)).all(axis=1) & ~beyond
-    status = STATUS["OUT_OF_RANGE"] * ~inside
-    status |= STATUS["NO_OUTPUT"] * silent
-    if part.min_coverage is not None:
-        status |= STATUS["UNCOVERED"] * (~silent & (coverage < part.min_coverage))
+    status = status_word(~inside, silent, coverage < asked)
     y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
     tolerance = TOLERANCE[whole.dtype] * (size_of_sum(model, z, of_rules) + _steepest(whole, y))
     return X.astype(whole.dtype), y.astype(whole.dtype), status, tolerance.astype(whole.dtype)
@@ -443,7 +440,7 @@ def _answering(part):
 
 def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
     """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
-    found, units = found_by_search(compensator.estimator), units_of(compensator)
+    found, units = found_by_search(compensator.estimator), input_units(compensator)
     export: Any = export_c_physics
     if not isinstance(found, ResidualRegressor):
         export, found = export_c, FrozenRules.of(found, len(compensator.inputs)).model
@@ -468,7 +465,7 @@ def notes_on(compensator):
     return [note.replace("$lag", f"{compensator.time_constant:g}") for note in notes]
 
 
-def units_of(compensator):
+def input_units(compensator):
     """Units of the inputs of a compensator, and of the rate."""
     return _UNITS | {"output": compensator.output_unit, "rate": "deg/s"}
 

@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from datetime import datetime
+from itertools import chain
 from pathlib import Path
 
 import joblib
@@ -40,8 +41,11 @@ DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
 INCOMPLETE = 5  # a target was refused; all else is written
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
+# What a calibration may write.
 _FILES = ("compensator.json", "compensator.joblib", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
+_PDF = "report.pdf"
+_EVERY = (*_FILES, *_C_FILES, _PDF, *chain.from_iterable(FILES.values()))
 _MOST_ROWS = 100_000  # that are held
 _PICKLES = (".joblib", ".pkl", ".pickle")
 _STAGED = f".skanfis-{platform.node()}-"  # of folders that hold files until all are written
@@ -56,7 +60,7 @@ def main(arguments=None):
         check_kind(parser, options)
         options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
         if arguments is None:
-            # Which __main__.py has set aside.
+            # Ctrl-C is an exception from here on; __main__ let it end the process.
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, signal.default_int_handler)
         return (_apply if options.apply else _calibrate)(options, tell)
@@ -75,7 +79,7 @@ def main(arguments=None):
 
 def _calibrate(options, tell):
     folder, paths = _where_from_and_to(options)
-    with _staged(folder) as written:
+    with _staged(folder, _EVERY if options.force else ()) as written:
         tell(f"reading {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
         reading, recipe = _read(options, paths, tell)
         split = choose_split(reading.log, options.groups, uses_output="output" in recipe.inputs)
@@ -105,13 +109,14 @@ def _where_from_and_to(options):
     check_once("--inputs", options.inputs or ())
     targets = [text.partition(":")[0] for text in options.target]
     check_once("--target", targets)
-    folder = options.output or Path(f"{Path(options.logs[0]).stem or 'log'}-compensator")
     paths = options.logs = find_logs(options.logs)
+    folder = options.output or Path(f"{Path(paths[0]).stem or 'log'}-compensator")
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    names = [*_FILES, *(_C_FILES if options.c else ()), *(["report.pdf"] if options.pdf else [])]
+    names = [*_FILES, *(_C_FILES if options.c else ()), *([_PDF] if options.pdf else [])]
     names += [name for target in targets for name in FILES[target]]
-    _refuse_existing([folder / name for name in names], options.force, paths)
+    replaced = _EVERY if options.force else names
+    _refuse_existing([folder / name for name in replaced], options.force, paths)
     with contextlib.suppress(OSError):
         # What is no log at all is refused before libraries load.
         open_source(paths[0], head_only=True)
@@ -226,7 +231,7 @@ def _write(calibration, options, files, folder):
     if options.pdf:
         import weasyprint
 
-        weasyprint.HTML(string=page).write_pdf(folder / "report.pdf")
+        weasyprint.HTML(string=page).write_pdf(folder / _PDF)
     compensator.write_json(folder / "compensator.json")
     joblib.dump(compensator, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
@@ -368,10 +373,11 @@ def _clean(folder):
 
 
 @contextlib.contextmanager
-def _staged(folder):
+def _staged(folder, replaced=()):
     """A folder to write to; at the end its files go to ``folder`` all together.
 
-    Where that cannot be, or an error ends it, no file or folder is left behind.
+    What else has one of the names ``replaced`` is of an earlier run, and is removed then. Where
+    that cannot be, or an error ends it, no file or folder is left behind.
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
@@ -379,8 +385,11 @@ def _staged(folder):
         _clean(folder)
         with tempfile.TemporaryDirectory(prefix=f"{_STAGED}{os.getpid()}-", dir=folder) as name:
             yield Path(name)
-            for path in sorted(Path(name).iterdir()):
-                os.replace(path, folder / path.name)
+            written = sorted(path.name for path in Path(name).iterdir())
+            for each in written:
+                os.replace(Path(name) / each, folder / each)
+            for each in set(replaced) - set(written):
+                (folder / each).unlink(missing_ok=True)
     except BaseException:
         for path in made:
             with contextlib.suppress(OSError):  # another program has put something there

@@ -12,14 +12,14 @@ import pandas as pd
 
 from ..exceptions import OutOfBoundsWarning
 from ..export import export_json
-from ..export.c.dialect import STATUS
+from ..export.c.dialect import status_word
 from ..export.folding import found_by_search
 from ..export.json_reader import parse_json
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask, declared_units
 from .compose import FrozenRules, Polynomial, ResidualRegressor, cubic_powers, joined, law_and_rules
-from .features import ThermalRate
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
+from .thermal_rate import ThermalRate
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
@@ -111,19 +111,14 @@ class GyroCompensator:
         """
         X = features(log, self.inputs, self.time_constant)
         indicated = log["output"].to_numpy() / self.scale_factor
-        with warnings.catch_warnings():
-            # The status tells, row by row.
-            warnings.simplefilter("ignore", OutOfBoundsWarning)
+        # The status tells, row by row.
+        with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
             predicted = self.estimator.predict(X)
         compensated = indicated - predicted if self.predicts == "error" else predicted.copy()
         inside, coverage = (ask(self.estimator, name, X) for name in ("in_bounds", "coverage"))
         refused = ~np.isfinite(compensated)
         compensated[refused] = np.nan
-        status = (
-            STATUS["OUT_OF_RANGE"] * ~inside
-            | STATUS["UNCOVERED"] * (~refused & ~(coverage >= self.min_coverage))
-            | STATUS["NO_OUTPUT"] * refused
-        )
+        status = status_word(~inside, refused, ~(coverage >= self.min_coverage))
         return pd.DataFrame(
             {
                 "rate_indicated": indicated,

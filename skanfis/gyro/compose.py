@@ -87,10 +87,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
             The run, device or day of each row, given to the ``fit`` of the residual model; of a
             Pipeline to its last step.
 
-        Returns
-        -------
-        self : ResidualRegressor
-
         Raises
         ------
         ValueError
@@ -244,6 +240,11 @@ def law_and_rules(estimator):
     if rules.model.n_outputs != 1:
         raise ValueError(f"residual has {rules.model.n_outputs} outputs; the rate is one.")
     return law, rules
+
+
+def rules_of(estimator):
+    """The rules of a fitted estimator: beside a law what adds to it, else the whole."""
+    return getattr(estimator, "residual_", estimator)
 
 
 def joined(law, rules):

@@ -168,7 +168,7 @@ class ErrorDisplay(GyroDisplay):
             panel.fill_between(places, *np.repeat(ends, 2, axis=1), **style)
             style = {"color": color, "markersize": 2.5, "alpha": 0.6, "mew": 0}
             panel.plot(points.iloc[:, 0], points.iloc[:, 1 + place], ".", **style)
-            size, peak = map(figures, whole.iloc[place, 1:])
+            size, peak = map(three_digits, whole.iloc[place, 1:])
             title = f"{side}: RMS {size}, peak {peak} {self._unit}"
             dress(panel, ylabel=f"error [{self._unit}]", title=title)
         axes[-1].set_xlabel(signs(points.columns[0]))
@@ -213,7 +213,7 @@ class GroupResidualDisplay(GyroDisplay):
         panel.set_yticks(lines, [as_label(group) for group in shown["group"]])
         panel.set_ylim(-0.7, len(shown) - 0.3)
         extent = f"worst {len(shown)} of {len(groups)}" if len(shown) < len(groups) else len(shown)
-        middle, worst = figures(groups.iloc[:, 2].median()), figures(shown.iloc[:, 2].max())
+        middle, worst = map(three_digits, (groups.iloc[:, 2].median(), shown.iloc[:, 2].max()))
         title = f"{extent} groups: after, {middle} in the median, {worst} in the worst"
         dress(panel, f"RMS error [{self._unit}]", "held-out group", title, legend="")
 
@@ -223,6 +223,7 @@ class AllanDisplay(GyroDisplay):
 
     The legend has N and B where the curve has them, the title a caution against smoothing.
     ``from_predictions`` takes ``sampling_interval`` [s] and ``run``, labels of the runs or None.
+    No row may be NaN: a run with a gap is left out whole.
 
     Examples
     --------
@@ -238,6 +239,8 @@ class AllanDisplay(GyroDisplay):
     def _computed(cls, rows, unit, sampling_interval):
         parts = []
         for side in SIDES:
+            if rows[side].isna().any():
+                raise ValueError(f"{side} is NaN in some rows; leave out these runs.")
             # This takes deg/s and gives deg/h: 3600 times the unit of what it is given.
             curve = allan_deviation(rows[side], sampling_interval, run=rows.get("run"))
             columns = {
@@ -270,9 +273,9 @@ class AllanDisplay(GyroDisplay):
             (walk, _), (instability, _), *_ = allan_figures(time, deviation / factor).values()
         except ValueError:
             return ""  # too few points, or no noise at all
-        text = "" if np.isnan(walk) else f", N = {figures(walk)} °/√h"
+        text = "" if np.isnan(walk) else f", N = {three_digits(walk)} °/√h"
         if np.isfinite(instability):
-            text += f", B = {figures(factor * instability)} {signs(self._unit)}"
+            text += f", B = {three_digits(factor * instability)} {signs(self._unit)}"
         return text
 
 
@@ -301,11 +304,12 @@ def signs(text):
     return text
 
 
-def figures(value):
+def three_digits(value):
     """A number with three digits that count, without an exponent where it can be; NaN is a dash."""
     if value == 0 or not np.isfinite(value):
         return "–" if np.isnan(value) else f"{value:g}"
-    decimals = max(2 - int(np.floor(np.log10(abs(value)))), 0)
+    # The exponent once it is rounded: 9.996 is 10.0.
+    decimals = max(2 - int(f"{value:.2e}".partition("e")[2]), 0)
     return f"{value:,.{decimals}f}" if decimals < 8 else f"{value:.2e}"
 
 

@@ -26,8 +26,9 @@ from ._headline import (
     written_text,
 )
 from ._simpler import NAMES, NOTHING
-from .c_code import LAW_GOES_ON, notes_on, units_of
-from .displays import figures, signs
+from .c_code import LAW_GOES_ON, input_units, notes_on
+from .compose import rules_of
+from .displays import signs, three_digits
 from .metrics import rms
 
 # On the first page, with a picture; the others follow.
@@ -81,13 +82,17 @@ def report_page(results, title):
     sections = [_check, _merit, _pictures, _sure, _written, _use, _log]
     kept = calibration.verdict.recommended != NOTHING
     kept = kept and all(check.result == "pass" for check in results.checks)
+    verdict, *reasons = headline(calibration, results.unit)
+    if results.checks:
+        reasons.append(f"Specification: {specification(results.checks)}.")
+    reasons.append(f"The files, and the figures below, are of {written_text(calibration)}.")
     return _template().render(
         title=f"Gyro compensation: {title}",
         subtitle=f"{what}: the gyro's {target} from "
         f"{', '.join(map(_words, calibration.compensator.inputs))}.",
-        verdict=headline(calibration, results.unit)[0],
+        verdict=verdict,
         verdict_kind="good" if kept else "bad",
-        reasons=map(signs, _reasons(results)),
+        reasons=map(signs, reasons),
         cautions=cautions,
         first=[_summary(results), _identity(results)],
         sections=[make(results) for make in sections],
@@ -131,14 +136,6 @@ def _without_hidden_signs(value):
     return "\n".join(map(printable, str(value).split("\n")))
 
 
-def _reasons(results):
-    """Why the verdict is as it is, and whether the specification is kept."""
-    yield headline(results.calibration, results.unit)[1]
-    if results.checks:
-        yield f"Specification: {specification(results.checks)}."
-    yield f"The files, and the figures below, are of {written_text(results.calibration)}."
-
-
 def specification(checks):
     """How many limits are kept, and which are not."""
     told = Counter(check.result for check in checks)
@@ -156,7 +153,7 @@ def _summary(results):
     for name in (name for name in _FIRST if name in table.index):
         unit, before, after = table.loc[name, ["unit", "before", "after"]]
         if pd.notna(after):
-            lines.append((_words(name), figures(before), figures(after), signs(unit)))
+            lines.append((_words(name), three_digits(before), three_digits(after), signs(unit)))
     blocks = [
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
@@ -213,10 +210,12 @@ def _check(results):
     for name, error in verdict.rms.items():
         gain, better, interval = verdict.gains.get(name), "–", ""
         if gain is not None:
-            better, interval = f"{figures(gain.factor)} ×", _interval(gain.low, gain.high)
+            better, interval = f"{three_digits(gain.factor)} ×", _interval(gain.low, gain.high)
         use = "recommended" if name == verdict.recommended else ""
         factor = verdict.rms[NOTHING] / error if error else np.inf
-        lines.append((name, results.shown(error), f"{figures(factor)} ×", better, interval, use))
+        lines.append(
+            (name, results.shown(error), f"{three_digits(factor)} ×", better, interval, use)
+        )
     error = f"RMS error [{results.symbol}]"
     head = ["compensation", error, "reduction", "this model better by", "95 % interval", "result"]
     missing = [simple for simple in calibration.simpler if simple.missing]
@@ -230,7 +229,7 @@ def _merit(results):
         cells = []
         for side in ("before", "after"):
             value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
-            cells += [figures(value), _interval(low, high)]
+            cells += [three_digits(value), _interval(low, high)]
         name, unit = line["figure"], signs(line["unit"])
         lines.append((_words(name), *cells, unit, _TERMS.get(name, "none")))
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit", "IEEE term"]
@@ -240,7 +239,7 @@ def _merit(results):
         blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
     if results.checks:
         checks = [
-            (_words(limit.figure), signs(limit.text), figures(value), signs(limit.unit), *told)
+            (_words(limit.figure), signs(limit.text), three_digits(value), signs(limit.unit), *told)
             for limit, value, *told in results.checks
         ]
         caption = "After compensation, on the held-out rows in range"
@@ -261,7 +260,7 @@ def _pictures(results):
 def _use(results):
     calibration = results.calibration
     compensator = calibration.compensator
-    model = getattr(compensator.estimator, "residual_", compensator.estimator).model
+    model = rules_of(compensator.estimator).model
     policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     if compensator.predicts == "rate" and model.out_of_bounds not in SILENT:
         policy = f"beside the law {policy}" if model.coefficients.any() else LAW_GOES_ON
@@ -344,11 +343,12 @@ def _box(calibration, caption=""):
 
 
 def _table(head, lines, caption=""):
-    return Block("table", pd.DataFrame(list(lines), columns=list(head)), caption)
+    return Block("table", pd.DataFrame(list(lines), columns=head), caption)
 
 
-def _interval(low, high, shown=figures):
-    return f"[{shown(low)}, {shown(high)}]" if np.isfinite([low, high]).all() else ""
+def _interval(low, high):
+    is_known = np.isfinite([low, high]).all()
+    return f"[{three_digits(low)}, {three_digits(high)}]" if is_known else ""
 
 
 def _words(name):
@@ -356,4 +356,4 @@ def _words(name):
 
 
 def _unit_of(calibration, name):
-    return signs(units_of(calibration.compensator).get(name, "deg/s"))
+    return signs(input_units(calibration.compensator).get(name, "deg/s"))

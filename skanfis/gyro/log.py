@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._checks import LABELS, check_rows, check_values
+from ..export.fis.reader import distinct
+from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, checked_request, settle
 from ._source import NO_VALUE, Clock, as_numbers, dated, open_source
@@ -99,8 +100,8 @@ class Reading:
     """A log that has been read, with what was found out on the way, in sentences (``notes``).
 
     Of the ``n_rows`` rows that there were ``log`` holds every k-th of each run where they are too
-    many. ``files`` and ``rows`` tell the file of each row, and its position there. ``assumed`` has
-    sentences on units, by part, that neither names nor options tell.
+    many. Row k of ``log`` is row ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences on
+    units, by part, that neither names nor options tell.
     """
 
     log: pd.DataFrame
@@ -226,7 +227,9 @@ class LogFile:
         if not is_whole.all():
             self._note_gaps(missing)
             log = log[is_whole[log.index]]
-        log = log.drop(columns="device").assign(run=self._number_runs(log))
+        by_run = log.groupby(list(LABELS), sort=False, observed=True)
+        self.runs = by_run.size().index.to_frame(index=False)
+        log = log.drop(columns="device").assign(run=by_run.ngroup().to_numpy(np.int32))
         if self._is_command:
             try:
                 check_rows(log, self.layout.units, log["run"].to_numpy())
@@ -238,12 +241,6 @@ class LogFile:
     def _unlabelled(rows):
         """One label for all rows, in little memory."""
         return pd.Categorical.from_codes(np.zeros(len(rows), dtype=np.int8), [""])
-
-    def _number_runs(self, log):
-        """Number of each row's run, whose labels are kept."""
-        by_run = log.groupby(list(LABELS), sort=False, observed=True)
-        self.runs = by_run.size().index.to_frame(index=False)
-        return by_run.ngroup().to_numpy(np.int32)
 
     def _converted(self):
         """All rows, in the units of a log."""
@@ -366,7 +363,7 @@ class LogFile:
         name = self.layout.name(error.column)
         part = "" if name == error.column else f" ({error.column})"
         rate = f"column {self.layout.name('rate')!r} of the rate"
-        reason = error.reason.replace("column of the rate", rate)
+        reason = error.reason.replace(RATE_COLUMN, rate)
         return LogError(f"{where}, column {name!r}{part}: {reason}")
 
 
@@ -394,7 +391,8 @@ def _names_of_runs(runs, paths):
         names = [" / ".join(filter(None, row)) for row in zip(*map(keys.get, parts), strict=True)]
         if set(parts) <= set(owners) and len(set(names)) == len(names):
             break
-    return names
+    # Labels that hold a slash may read alike even with all that there is.
+    return distinct(names)
 
 
 def find_logs(arguments):

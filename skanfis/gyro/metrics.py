@@ -85,6 +85,7 @@ def figures_of_merit(full_scale=1.0):
     def relative_spread(slopes):
         return _PPM * spread(slopes) / abs(np.mean(slopes))
 
+    from_run_to_run = partial(_Figure, fewest_runs=2)
     return [
         _Figure("residual_rms", "deg/s", rms, residual),
         _Figure("residual_peak", "deg/s", _peak, residual),
@@ -96,15 +97,19 @@ def figures_of_merit(full_scale=1.0):
         _Figure("scale_factor_nonlinearity", full, largest, rates),
         _Figure("scale_factor_nonlinearity_rms", full, root, rates),
         _Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
-        _Figure("scale_factor_repeatability", "ppm", scale_factor, rates, "", relative_spread, 2),
+        from_run_to_run(
+            "scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread
+        ),
         _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
         _Figure("bias", "deg/h", bias, error),
-        _Figure("bias_repeatability", "deg/h", bias, error, "", spread, 2),
-        _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), ramp),
-        _Figure("bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), heat),
+        from_run_to_run("bias_repeatability", "deg/h", bias, error, combine=spread),
+        _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), also=ramp),
+        _Figure(
+            "bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), also=heat
+        ),
         _Figure("hysteresis", "deg/h", hysteresis, ("error", heat, ramp)),
-        _Figure("bias_stability_10s", "deg/h", short, timed, "", pooled),
-        _Figure("bias_stability_100s", "deg/h", long, timed, "", pooled),
+        _Figure("bias_stability_10s", "deg/h", short, timed, combine=pooled),
+        _Figure("bias_stability_100s", "deg/h", long, timed, combine=pooled),
     ]
 
 

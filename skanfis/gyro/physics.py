@@ -135,10 +135,6 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         y : array-like of shape (n_samples,)
             True rate.
 
-        Returns
-        -------
-        self : OpenLoopArcsineRegressor
-
         Raises
         ------
         ValueError

@@ -6,7 +6,16 @@ import numpy as np
 import pandas as pd
 
 from ._columns import ask, check_column, evenly_chosen
-from .displays import SIDES, TWO_ROWS, GyroDisplay, bins_of, dress, figures, mark_decades, signs
+from .displays import (
+    SIDES,
+    TWO_ROWS,
+    GyroDisplay,
+    bins_of,
+    dress,
+    mark_decades,
+    signs,
+    three_digits,
+)
 from .metrics import HYSTERESIS_BINS, ROWS_PER_MEAN
 
 # Odd, so that a bin has the rest in its middle; near rest, a bias over the rate would fill it.
@@ -82,7 +91,7 @@ class ScaleFactorErrorDisplay(GyroDisplay):
                 # The line is broken at rest.
                 for half, label in ((rate < 0, f"{np.mean(ends):z.0f} °C"), (rate > 0, None)):
                     panel.plot(rate[half], ppm[half], ".-", color=color, label=label, lw=1.2, ms=4)
-            title = f"{side}: largest {figures(scale_factor[column].abs().max())} ppm"
+            title = f"{side}: largest {three_digits(scale_factor[column].abs().max())} ppm"
             legend = "around" if panel is axes[0] else None
             dress(panel, ylabel="scale-factor error [ppm]", title=title, legend=legend)
         axes[-1].set_xlabel(signs("true rate [deg/s]"))
@@ -131,7 +140,7 @@ class HysteresisDisplay(GyroDisplay):
             for values, (name, (form, color)) in zip(branches, _BRANCHES.items(), strict=True):
                 panel.plot(temperature, values, form, color=color, label=name, ms=4)
             gaps = pd.Series(np.abs(branches[0] - branches[1]))
-            found = f"largest gap {figures(gaps.max())} {self._unit}"
+            found = f"largest gap {three_digits(gaps.max())} {self._unit}"
             title = f"{side}: {found if gaps.notna().any() else 'branches never meet'}"
             legend = "" if panel is axes[0] else None
             dress(panel, ylabel=f"bias [{self._unit}]", title=title, legend=legend)
@@ -192,7 +201,7 @@ class ResidualSurfaceDisplay(GyroDisplay):
         mesh = _draw_cells(axes[1], cells, counts.where(counts > 0), cmap="viridis", norm=norm)
         bar = self.figure_.colorbar(mesh, ax=axes[1], label="rows in the cell")
         mark_decades(bar.ax.yaxis, norm.vmin, norm.vmax)
-        title = f"residual: largest {figures(residual.abs().max())} {self._unit}"
+        title = f"residual: largest {three_digits(residual.abs().max())} {self._unit}"
         dress(axes[0], "temperature [degC]", "true rate [deg/s]", title)
         empty = np.mean(counts == 0)
         dress(axes[1], "temperature [degC]", title=f"data: {empty:.0%} of the cells empty")

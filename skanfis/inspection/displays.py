@@ -48,10 +48,10 @@ class MembershipDisplay:
 
     Parameters
     ----------
-    inputs : list of InputTerms
-        For each input "input_name", "term_names", a "grid" of values, the memberships "before" and
-        "after" training, (n_terms, n_points), "edges" and "counts" of the histogram, or None. Of
-        the cuts of a tree there are the sides above.
+    inputs : list of objects with attributes
+        ``input_name``, ``term_names``, a ``grid`` of values, the memberships ``before`` and
+        ``after`` training, (n_terms, n_points), ``edges`` and ``counts`` of the histogram, or None.
+        Of the cuts of a tree there are the sides above.
 
     Examples
     --------
@@ -309,6 +309,8 @@ def _section(model, both, n_points, held=None):
         raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")
     for feature, value in held.items():
         j = _position(feature, model.input_names)
+        if j in both:
+            raise ValueError(f"held[{feature!r}]: that input is drawn.")
         low, high = model.minimum[j], model.maximum[j]
         if not isinstance(value, Real) or not low <= value <= high:
             raise ValueError(

@@ -109,7 +109,9 @@ def effects(
     if len(ones) > 2:
         is_all = set(wanted) >= set(study.pairs())
         rest = "three or more" if is_all else "other pairs, three or more"
-        table.loc[rest] = float(anova.variance > 0.0) - table.sum()
+        left = float(anova.variance > 0.0) - table.sum()
+        # Not by its label, which an input may have.
+        table = pd.concat([table, left.to_frame(rest).T])
     held = study.held
     return Effects(table, held, _notes(table, held, isinstance(anova, DrawnAnova)))
 

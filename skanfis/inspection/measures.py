@@ -28,8 +28,7 @@ class Measures:
     """What was found on rows; errors are in standard deviations of the target."""
 
     weight: float  # of all rows
-    mean: np.ndarray  # of the target, (n_outputs,)
-    deviation: np.ndarray  # its standard deviation; one of a constant
+    deviation: np.ndarray  # standard deviation of the target; one of a constant, (n_outputs,)
     rule_weights: np.ndarray  # part of the rows' weight on which each rule fires, (n_rules,)
     rule_rows: np.ndarray  # weight of the rows on which it is the strongest, (n_rules,)
     rule_alone: np.ndarray  # RMS of f_r - yhat on these or NaN, (n_rules, n_outputs)
@@ -99,7 +98,6 @@ def measures_of(target, sums):
     with np.errstate(divide="ignore", invalid="ignore"):
         return Measures(
             weight=weight,
-            mean=target.offset,
             deviation=_scale(target),
             rule_weights=mass / weight,
             rule_rows=lead,

@@ -56,9 +56,11 @@ class Readability:
     summary : Series
         The worst "strongest_alone", and "text_over_model", the RMSE of the text as printed over
         the model's; NaN where the model has no error to compare with.
-    findings, line : list of str, str
+    findings, on_rules : list of str
         What speaks against reading the rules one by one, in sentences, empty if nothing does; and
-        how many numbers there are to read, and what the text as printed errs.
+        those of them that stay, however many digits are printed.
+    line : str
+        How many numbers there are to read, and what the text as printed errs.
 
     Examples
     --------
@@ -118,20 +120,26 @@ class Readability:
     @property
     def findings(self) -> list[str]:
         """What speaks against reading the rules one by one, in sentences; empty if nothing does."""
-        sentences, ratio = [], self.summary["text_over_model"]
-        if ratio > GREATEST_ERROR:
-            sentences.append(
-                f"The text as printed errs {number(ratio, 3)} times as much as the model: print "
-                "more digits (precision)."
-            )
-        sentences += _on_signs(self._said) + self._on_few_rows()
+        ratio = self.summary["text_over_model"]
+        if not ratio > GREATEST_ERROR:
+            return self.on_rules
+        of_digits = (
+            f"The text as printed errs {number(ratio, 3)} times as much as the model: print more "
+            "digits (precision)."
+        )
+        return [of_digits, *self.on_rules]
+
+    @property
+    def on_rules(self) -> list[str]:
+        """The findings that stay, however many digits are printed."""
+        sentences = _on_signs(self._said) + self._on_few_rows()
         for output, error in zip(self.model.output_names, self.measures.alone, strict=True):
             of_output = f" of {output!r}" if self.model.n_outputs > 1 else ""
             if error > GREATEST_ALONE:
                 sentences.append(
-                    f"No rule{of_output} can be read without the others: the strongest alone "
-                    f"misses the model by {number(error, 3)} standard deviations of the target "
-                    f"(limit {GREATEST_ALONE})."
+                    f"No rule{of_output} can be read without the others: used alone, the strongest "
+                    f"is {number(error, 3)} standard deviations of the target off the model (more "
+                    f"than {GREATEST_ALONE})."
                 )
         return sentences
 

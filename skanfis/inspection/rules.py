@@ -45,12 +45,13 @@ def condition(name, term, levels=()):
     return f"{name} is {term}"
 
 
-def weightiest(model, max_shown):
-    """The rules to show, the weightiest first."""
+def shown_rules(model, max_shown):
+    """The rules to show: first those that are the strongest on most rows."""
     if max_shown is not None:
         check_count("max_shown", max_shown, 1)
     # Rounded, so that rules alike but for rounding errors stay in the order of their numbers.
-    return np.argsort(-np.round(model.rule_weights, 9), kind="stable")[:max_shown].tolist()
+    keys = [-np.round(key, 9) for key in (model.rule_weights, parts_led(model))]
+    return np.lexsort(keys)[:max_shown].tolist()
 
 
 def has_training_data(model):
@@ -140,19 +141,21 @@ def rules_table(estimator: Any) -> Any:
     """
     model = writable(fold(estimator))
     asked, said = conditions(model), Sentences.of(model, MOST_DIGITS)
-    columns: dict = {
-        ("if", model.input_names[j]): [rule.get(j) for rule in asked]
+    # Pairs: an input may be called "value" too.
+    columns: list = [
+        (("if", model.input_names[j]), [rule.get(j) for rule in asked])
         for j in sorted({j for rule in asked for j in rule})
-    }
-    columns["data", "weight"] = model.rule_weights
-    columns["data", "rows"] = model.rule_rows
-    for j, name in enumerate(model.input_names):
-        columns["at", name] = said.places[:, j]
+    ]
+    columns += [(("data", "weight"), model.rule_weights), (("data", "rows"), model.rule_rows)]
+    columns += zip([("at", name) for name in model.input_names], said.places.T, strict=True)
     for k, output in enumerate(model.output_names):
-        columns[f"then {output}", "value"] = said.values[:, k]
-        for j, name in enumerate(model.input_names):
-            columns[f"then {output}", name] = said.slopes[:, j, k]
-    return pd.DataFrame(columns, index=pd.RangeIndex(model.n_rules, name="rule"))
+        names = [(f"then {output}", name) for name in ("value", *model.input_names)]
+        numbers = np.column_stack([said.values[:, k], said.slopes[:, :, k]]).T
+        columns += zip(names, numbers, strict=True)
+    keys, values = zip(*columns, strict=True)
+    index = pd.RangeIndex(model.n_rules, name="rule")
+    table = pd.DataFrame(dict(enumerate(values)), index=index)
+    return table.set_axis(pd.MultiIndex.from_tuples(keys), axis=1)
 
 
 def explain(estimator: Any, X: ArrayLike) -> Any:
@@ -203,15 +206,15 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     if model.out_of_bounds == "nan":
         values[~inside] = np.nan
     n_rows, (n_rules, n_inputs) = len(rows), (model.n_rules, model.n_inputs)
-    way, gradient = np.zeros((n_rows, n_inputs)), np.zeros((n_rows, n_inputs, model.n_outputs))
+    way, slopes = np.zeros((n_rows, n_inputs)), np.zeros((n_rows, n_inputs, model.n_outputs))
     if model.out_of_bounds == "linear" and not inside.all():
-        way, gradient = model.way_out(rows), model.gradient(nearest)
-    beyond = way[:, :, None] * gradient
+        way, slopes = model.way_out(rows), model.tangent_slopes(nearest)
+    beyond = way[:, :, None] * slopes
     said = np.einsum("nr,nro->no", strengths, values) + beyond.sum(axis=1)
     held = np.nan_to_num(np.clip(said, *model.output_limits) - said)
     # By row, all that may have a line there: the rules, the way beyond each input, what is held.
     strength = np.hstack([strengths, np.full((n_rows, n_inputs + 1), np.nan)])
-    value = np.hstack([values, gradient, np.full((n_rows, 1, model.n_outputs), np.nan)])
+    value = np.hstack([values, slopes, np.full((n_rows, 1, model.n_outputs), np.nan)])
     contribution = np.hstack([strengths[:, :, None] * values, beyond, held[:, None]])
     has_line = np.ones(contribution.shape, dtype=bool)
     has_line[:, n_rules:-1] = way[:, :, None] != 0.0

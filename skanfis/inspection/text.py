@@ -19,7 +19,7 @@ from .rules import (
     premise_texts,
     readability_in_training,
     rename,
-    weightiest,
+    shown_rules,
 )
 from .sentences import MOST_DIGITS, PRECISION, Sentences, rounded
 
@@ -30,13 +30,17 @@ _ROUNDING = 1e-9
 # How to compute a prediction; the parts in braces where there is such a thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
-    "AND multiplies. {cuts}A rule says its value{line}, plus its own slopes. What it errs is its "
-    "RMSE alone, on the rows on which it is the strongest."
+    "AND multiplies. {terms}A rule says its value{line}, plus its own slopes. What a rule errs "
+    "by is its RMSE, used alone, on the rows on which it is the strongest."
 )
-_CUTS = "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h. "
+_CUTS = (
+    "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; x < c ± h is what "
+    "that lacks of 1. "
+)
+_TERM = "A {} term is {} true. "
 _LINE = ", less the common line's part in it, plus the common line"
 _IN_PLACE = (
-    "A part of every value is from this line; a slope that a rule states stands in its place."
+    "Every value has a part of this line in it; a rule's own slope stands in place of the line's."
 )
 
 
@@ -63,7 +67,7 @@ def export_text(
         from 1 to 17: with noise of 3.2, values to 0.1. Slopes that make no such digit over a
         standard deviation of their input are left out.
     max_shown : int, default=None
-        Most rules to write, the weightiest first; None for all.
+        Most rules to write, first those that are the strongest on most rows; None for all.
     show_terms : bool, default=True
         Whether to write the terms' parameters, the ranges, the policy outside them, and the noise.
     feature_names, output_names : sequence of str, default=None
@@ -91,7 +95,7 @@ def export_text(
     >>> drift = 0.1 * hours[:, 0] + 5.0 * np.exp(-hours[:, 0])
     >>> model = ANFISRegressor(n_mfs=2, solver="lse", agreement=0.1).fit(hours, drift)
     >>> print(export_text(model, feature_names=["hours"], show_terms=False))
-    2 rules, 1 input.
+    2 rules, 1 input, 41 rows.
     <BLANKLINE>
     Rule 0, strongest on 51 % of the rows, errs by 0.86 there:
       IF hours is low
@@ -105,8 +109,8 @@ def export_text(
     Rules go different ways, beyond chance: by hours up in rule 1 and down in rule 0.
     """
     said, found = _said(estimator, precision, feature_names, output_names)
-    model, chosen = said.model, weightiest(said.model, max_shown)
-    parts = [f"{counted(model.n_rules, 'rule')}, {counted(model.n_inputs, 'input')}."]
+    model, chosen = said.model, shown_rules(said.model, max_shown)
+    parts = [f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."]
     common = _common_lines(said)
     parts += [fill(f"Common to the rules, {line}.", _WIDTH) for line in common]
     if common:
@@ -128,7 +132,7 @@ def export_text(
 
 
 def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
-    """Write the rules as HTML, the weightiest first.
+    """Write the rules as HTML, first those that are the strongest on most rows.
 
     Parameters
     ----------
@@ -157,7 +161,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     11
     """
     said, found = _said(estimator)
-    model, chosen = said.model, weightiest(said.model, max_shown)
+    model, chosen = said.model, shown_rules(said.model, max_shown)
     premises = premise_texts(model, said.levels)
     cells: dict = {}
     if has_training_data(model):
@@ -171,7 +175,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     with pd.option_context("display.max_colwidth", None):
         table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
-    counts = f"<b>{counted(model.n_rules, 'rule')}</b> on {counted(model.n_inputs, 'input')}"
+    counts = f"<b>{counted(model.n_rules, 'rule')}</b>, {_inputs_and_rows(model)}"
     parts = [f"<div>{counts}</div>", table]
     lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
     if len(chosen) < model.n_rules:
@@ -192,6 +196,12 @@ def _said(estimator, precision=PRECISION, feature_names=None, output_names=None)
     model = rename(folded, feature_names, output_names)
     said = Sentences.of(model, precision, reader.levels)
     return said, readability_in_training(estimator, model)
+
+
+def _inputs_and_rows(model):
+    """Say "3 inputs, 506 rows"; rows that were trained on, if they are known."""
+    inputs, n_rows = counted(model.n_inputs, "input"), round(model.rule_rows.sum())
+    return f"{inputs}, {counted(f'{n_rows:,}', 'row')}" if has_training_data(model) else inputs
 
 
 def _common_lines(said):
@@ -292,8 +302,11 @@ def _legend(said, precision):
             pairs = zip(model.output_names, values, strict=True)
             told = ", ".join(f"{name} {number(value, precision)}" for name, value in pairs)
             lines.append(f"Standard deviation of the {what}: {told}.")
-    cuts = _CUTS if any("±" in name for name in model.term_names) else ""
-    how = _HOW.format(cuts=cuts, line=_LINE if said.common.any() else "")
+    functions = {term["function"] for term in named}
+    terms = [_CUTS] if any("±" in name for name in model.term_names) else []
+    formulas = {group.family.name: group.family.formula for group in model.antecedent.groups}
+    terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
+    how = _HOW.format(terms="".join(terms), line=_LINE if said.common.any() else "")
     return "\n".join([*lines, "", fill(how, _WIDTH)])
 
 

@@ -163,9 +163,8 @@ def held_out_scores(estimator, data, rows, least):
             "out_of_bounds='raise' refuses rows held out beyond the range of the others. Use "
             "'clip' or 'linear', or a fitted FrozenEstimator(model) with method='split'."
         )
-    with warnings.catch_warnings():
-        # That a row held out lies beyond the others is what is to be measured.
-        warnings.simplefilter("ignore", OutOfBoundsWarning)
+    # That a row held out lies beyond the others is what is to be measured.
+    with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
         centers, deviations = predicted(estimator, safe_indexing(data.X, rows), least)
     return np.abs(data.targets[rows].reshape(centers.shape) - centers) / deviations
 

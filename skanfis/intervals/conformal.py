@@ -140,10 +140,6 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Run, device or day of each row: whole groups are held out, and intervals are for rows of
             a new group. Passed to the regressor's ``fit`` if that takes groups.
 
-        Returns
-        -------
-        self : ConformalRegressor
-
         Raises
         ------
         ValueError
@@ -274,8 +270,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             if not is_number and (name == "coverage" or level not in (None, "auto")):
                 raise ValueError(f"{name}={level!r} must be a number between 0 and 1.")
         by_group = self._groups is not None and confidence is not None
-        if by_group and confidence != "auto":
-            name, level = "confidence", confidence
+        is_asked = by_group and confidence != "auto"
+        name, level = ("confidence", confidence) if is_asked else ("coverage", coverage)
         total = self.n_units_ / (self.n_units_ + 1.0)
         if total < level - _scores.ROUNDING:
             needed = int(np.ceil(level / (1.0 - level) - _scores.ROUNDING))

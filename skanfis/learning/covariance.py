@@ -107,15 +107,15 @@ def _premises(problem, premise, evaluation):
     x = premise.displacement(evaluation.antecedent.parameters)
     raw = problem.curvature(evaluation)
     identity = np.eye(premise.size)
-    every = np.eye(raw.gauss_newton.shape[0])
-    transposed, hessian = premise.pull_back(x, every, raw.gauss_newton)
+    jacobian = premise.jacobian(x)
+    hessian = jacobian.T @ raw.gauss_newton @ jacobian
     stiffness = problem.penalty.stiffness
     try:
         inverse = NormalFactor(hessian + stiffness * identity).half_solve(identity)
     except FloatingPointError:
         inverse = _positive_part(hessian, stiffness)
     n_determined = len(inverse) - stiffness * float(np.sum(inverse**2))
-    premises = inverse @ transposed
+    premises = inverse @ jacobian.T
     cross = np.stack([premises @ half.T for half in raw.cross])
     return premises, cross, n_determined
 

@@ -18,7 +18,7 @@ _BLOCKS_PER_CHUNK = 16
 
 # The largest number of a column; and one over the least that it varies by. Squares, and slopes of
 # one column by another, neither overflow nor vanish.
-_LARGEST = 1e100
+LARGEST_NUMBER = 1e100
 
 # Any fixed number would do.
 _FINGERPRINT_SEED = 20090101
@@ -116,15 +116,16 @@ def check_scales(inputs, targets, input_names, output_names):
         for size, spread, constant, name in zip(
             sizes, scale.scale, scale.is_constant, names, strict=True
         ):
-            if size > _LARGEST:
+            if size > LARGEST_NUMBER:
                 raise ValueError(
                     f"Column {name!r} of {what} holds numbers up to {size:.3g}; beyond "
-                    f"{_LARGEST:.0e} sums overflow. Give it in a larger unit."
+                    f"{LARGEST_NUMBER:.0e} sums overflow. Give it in a larger unit."
                 )
-            if not constant and spread < 1.0 / _LARGEST:
+            if not constant and spread < 1.0 / LARGEST_NUMBER:
                 raise ValueError(
                     f"Column {name!r} of {what} varies by {spread:.3g} only; below "
-                    f"{1.0 / _LARGEST:.0e} floats lose their digits. Give it in a smaller unit."
+                    f"{1.0 / LARGEST_NUMBER:.0e} floats lose their digits. Give it in a smaller "
+                    "unit."
                 )
 
 
@@ -168,8 +169,13 @@ class StandardisedData:
         return self.X.shape[0]
 
     @property
+    def weights(self):
+        """The weights; ones where there are none."""
+        return np.ones(self.n_rows) if self.sample_weight is None else self.sample_weight
+
+    @property
     def total_weight(self):
-        """Sum of the weights; the number of rows where there are none."""
+        """Their sum."""
         if self.sample_weight is None:
             return float(self.n_rows)
         return float(np.sum(self.sample_weight))

@@ -83,9 +83,7 @@ class NaturalPremise:
         """
         # The derivatives of n by the antecedent's parameters, each by its own alone.
         natural = np.where(self._is_log, self._natural(x), 1.0)
-        every = np.eye(self._tied.size)
-        transposed, _ = self.premise.pull_back(x, every, every)
-        jacobian = natural[:, None] * transposed.T[self._first]  # dn / dx
+        jacobian = natural[:, None] * self.premise.jacobian(x)[self._first]  # dn / dx
         gradient = np.bincount(self._tied, by_parameters) / natural
         by_displacement = jacobian.T @ gradient + stiffness * x
         gradient += np.linalg.solve(jacobian.T, stiffness * x)
@@ -234,11 +232,6 @@ class GradientDescent(_Descent):
         Length of the first step, in standardised units; positive.
     error_goal, tol, stiffness
         As for :class:`~skanfis.learning.Hybrid`.
-
-    References
-    ----------
-    .. [1] J.-S. R. Jang, "ANFIS: adaptive-network-based fuzzy inference system", IEEE Transactions
-       on Systems, Man, and Cybernetics 23 (1993) 665-685.
 
     Examples
     --------

@@ -44,7 +44,7 @@ _LIKENESS = 1.0 / np.log(3.0) ** 2
 # and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
 # count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
 # noise is fitted.
-ROWS_EACH = 2.0
+ROWS_EACH = 2
 # Least weights where there are fewer distinct rows than this per consequent.
 _UNDERDETERMINED = ((1.0, 1e-4), (ROWS_EACH, 1e-6))
 # Most of a target lies within so many standard deviations of its mean.
@@ -57,11 +57,14 @@ _ALIKE, _MOST_ALIKE = 0.5, 0.99
 _NOTHING = np.finfo(float).tiny
 # What changes a weight by less leaves its second digit as it is.
 _SETTLED = 5e-3
+# What a number, or another turn, must be worth of the evidence, in -2 log p: as much as a parameter
+# costs by Akaike's criterion.
+WORTH = 2.0
 # The target of a fit that is exact to rounding has no more digits than this, squared.
 _LEAST_ERROR = 1e-22
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Laplace:
     """The posterior at a point: all that the evidence and its derivatives are made of."""
 

@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from ..antecedent import Antecedent
-from ..blocks import fitting_rows, row_blocks
+from ..blocks import add_each, fitting_rows, row_blocks
 from ..consequent import basis
 from ..support import RuleSupport
 from .data import StandardisedData, fingerprint
@@ -89,9 +89,8 @@ def _sums(rows, antecedent, enough):
 
 def _added(one, other, enough):
     """Both together, each distinct input once."""
-    sums = [a + b for a, b in zip(one[0], other[0], strict=True)]
     distinct = [np.union1d(a, b)[:enough] for a, b in zip(one[2], other[2], strict=True)]
-    return sums, np.maximum(one[1], other[1]), distinct
+    return add_each(one[0], other[0]), np.maximum(one[1], other[1]), distinct
 
 
 def _radii(rows, antecedent, center, factor):

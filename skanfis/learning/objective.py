@@ -70,9 +70,9 @@ class NormalEquations:
     penalty: np.ndarray  # P
     factor: NormalFactor  # of Phi' S Phi / W + P
     coefficients: np.ndarray  # local, (n_columns, n_outputs)
-    free: np.ndarray | None = None  # what these are made of, see ``CommonLine.free``
+    free: np.ndarray | None  # what these are made of, see ``CommonLine.free``
 
-    def with_penalty(self, penalty, error, free=None):
+    def with_penalty(self, penalty, error, free):
         """The same with another penalty, which takes on the factor's shift; no pass over the rows.
 
         And the change of the coefficients, and the mean squared error, which is ``error`` here.
@@ -136,8 +136,8 @@ class SeparableProblem:
         )
         self._block_rows = fitting_rows(
             sum(self._design.moments.shape)
-            + antecedent.parameters.size * (1 + self.n_basis)
-            + 2 * self._design.own_parameters.size
+            + 2 * (self.n_columns + self._design.own_parameters.size)
+            + 6 * antecedent.parameters.size
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
         self._weight = rows.total_weight
@@ -259,11 +259,9 @@ class SeparableProblem:
             slope, *_ = self._sum(JointPass(*point))
             return replace(self.curvature(evaluation), gradient=-slope)
         gauss_newton, slope, *cross = self._sum(SecondPass(*point))
-        n_raw, n_rules = antecedent.parameters.size, antecedent.n_rules
         halves = []
         for one in cross:
-            by_column = one.reshape(n_raw, self.n_basis, n_rules).transpose(2, 1, 0)
-            columns = np.ascontiguousarray(by_column).reshape(self.n_columns, n_raw)
+            columns = np.ascontiguousarray(one.T)
             half = evaluation.normal.factor.half_solve(self.local.transform_rows(columns))
             gauss_newton -= half.T @ half
             halves.append(half)
@@ -313,11 +311,10 @@ class SeparableProblem:
             # How the outputs share it shows on the sample; all of it is known of all rows.
             found = self.on_sample.mean_squares(evaluation)
             return found * (evaluation.mean_squared_error / max(found.sum(), np.finfo(float).tiny))
-        total, total_weight = np.zeros(self.n_outputs), 0.0
+        total = np.zeros(self.n_outputs)
         for _, residual, weight in self.residuals(evaluation):
             total += (residual**2).sum(axis=1) if weight is None else residual**2 @ weight
-            total_weight += residual.shape[1] if weight is None else weight.sum()
-        return total / total_weight
+        return total / self._weight
 
     def leave_one_out_error(self, evaluation, n_rows):
         """Mean squared error of leaving out each row, at fixed premises (Allen 1974).

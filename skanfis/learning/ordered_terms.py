@@ -7,8 +7,8 @@ r"""The terms of one input, one after another: the gaps between them, and widths
   it. What moves besides is a factor, between the one at which the term is half true half-way to a
   neighbour, and the one at which it is 0.9 true there.
 
-``is_free`` is the classic ANFIS: terms stay in order, but may leave the data by their distance, and
-be four times as wide. It fits exact data better, by rules that cannot be read.
+``is_unbounded`` is the classic ANFIS: terms stay in order, but may leave the data by their
+distance, and be four times as wide. It fits exact data better, by rules that cannot be read.
 """
 
 from dataclasses import dataclass
@@ -79,7 +79,7 @@ class OrderedTerms:
     inverse: np.ndarray  # and back
 
     @classmethod
-    def of(cls, own, parameters, low, high, is_free):
+    def of(cls, own, parameters, low, high, is_unbounded):
         """Of terms from left to right, with all parameters; ``low`` to ``high`` are the data."""
         locations = np.array([term.location for term in own])
         widths = np.concatenate([term.widths for term in own])
@@ -87,15 +87,15 @@ class OrderedTerms:
         values = parameters[locations]
         spacing = (values[-1] - values[0]) / (values.size - 1)
         low, high = min(low, values[0]), max(high, values[-1])
-        if not is_free:
+        if not is_unbounded:
             # Where the data go on further, as in a heavy tail, there is hardly a row.
             low = max(low, 2.0 * values[0] - values[1])
             high = min(high, 2.0 * values[-1] - values[-2])
-        margin = spacing if is_free else _BEYOND * spacing
+        margin = spacing if is_unbounded else _BEYOND * spacing
         low, high = low - margin, high + margin
         gaps = np.diff(np.concatenate([[low], values, [high]]))
         n = gaps.size
-        if is_free:
+        if is_unbounded:
             # Orthonormal columns that sum to zero: right singular vectors of ones.
             basis = np.linalg.svd(np.ones((1, n)))[2][1:].T
             inverse = basis.T
@@ -156,9 +156,7 @@ class OrderedTerms:
         gaps = self.gaps(displacement)
         by_gap = gaps[:, None] * (self.basis - (gaps @ self.basis) / gaps.sum())
         total = np.sum(self._beside(gaps), axis=0)
-        by_left, by_right = by_gap[:-1].copy(), by_gap[1:].copy()
-        by_left[0], by_right[-1] = by_right[0], by_left[-1]
-        by_reach = (by_left + by_right) / total[:, None]
+        by_reach = np.sum(self._beside(by_gap), axis=0) / total[:, None]
         return by_gap.cumsum(axis=0)[:-1], by_reach[self.terms]
 
 

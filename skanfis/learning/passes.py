@@ -75,8 +75,8 @@ class SecondPass:
     @property
     def shapes(self):
         """Of the sums."""
-        n_raw, n_rules = self.antecedent.parameters.size, self.antecedent.n_rules
-        cross = [(n_raw * self.design.n_basis, n_rules)] * self.design.n_outputs
+        n_raw = self.antecedent.parameters.size
+        cross = [(n_raw, self.coefficients.shape[0])] * self.design.n_outputs
         return [(n_raw, n_raw), (n_raw,), *cross]
 
     def __call__(self, Z, target, weight, sums):
@@ -87,18 +87,17 @@ class SecondPass:
         weighted_basis = basis_rows if weight is None else basis_rows * weight
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
-        n_rows = Z.shape[1]
+        columns = (strengths[:, None] * weighted_basis).reshape(-1, Z.shape[1])  # Phi' S
         for k in range(design.n_outputs):
             by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
             by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
             sensitivity = by_parameter(gradients, by_term)
-            # One product for D' S Phi and, the basis beginning with 1, the weighted D itself.
-            products = sensitivity[:, None, :] * weighted_basis
-            square += products[:, 0] @ sensitivity.T
-            slope += products[:, 0] @ (target[k] - output)
+            weighted = sensitivity * weighted_basis[0]  # the basis begins with 1
+            square += weighted @ sensitivity.T
+            slope += weighted @ (target[k] - output)
             if agreement:
-                products *= 1.0 - 0.5 * agreement
-            cross[k] += products.reshape(-1, n_rows) @ strengths.T
+                sensitivity *= 1.0 - 0.5 * agreement
+            cross[k] += sensitivity @ columns.T
             if agreement:
                 excess = by_rule_k - strengths * output  # w_r e_r
                 self._disagree(
@@ -112,34 +111,32 @@ class SecondPass:
         N = sum_r w_r g_r, d log w_r = g_r - N: K and L are sums over the few terms of each rule and
         products with N.
         """
-        antecedent, agreement, n_raw = self.antecedent, self.agreement, slope.size
+        antecedent, half, n_raw = self.antecedent, 0.5 * self.agreement, slope.size
         # w_r e_r^2, where w_r may be next to nothing.
         squares = excess**2
         squares /= np.maximum(strengths, _TINY)
-        weight, n_rows = weighted_basis[0], excess.shape[1]
+        weight, (n_rules, n_rows) = weighted_basis[0], excess.shape
         total = squares.sum(axis=0)
         mean = by_parameter(gradients, antecedent.sum_over_rules(strengths))  # N
         change = by_parameter(gradients, antecedent.sum_over_rules(squares))
         change -= mean * total  # e_r^2 dw_r, summed over rules
-        slope -= 0.5 * agreement * (change @ weight)
+        slope -= half * (change @ weight)
         # - (change N' + N change' + total N N') / 4
-        half = (0.25 * agreement * weight) * (change + 0.5 * total * mean)
-        product = half @ mean.T
+        product = ((0.5 * half * weight) * (change + 0.5 * total * mean)) @ mean.T
         square -= product + product.T
-        outer = mean[:, None, :] * ((0.5 * agreement) * weighted_basis)
-        cross -= outer.reshape(-1, n_rows) @ excess.T
+        columns = (half * excess)[:, None] * weighted_basis
+        cross -= mean @ columns.reshape(-1, n_rows).T
         # Of every rule, its own parameters; those that it lacks are a row of nothing at the end.
         own, size = self.design.own_parameters, n_raw + 1
         every = [gradient.reshape(-1, n_rows) for gradient in gradients]
         of_rule = np.concatenate([*every, np.zeros((1, n_rows))])[own]
-        squares *= 0.25 * agreement * weight
+        squares *= 0.5 * half * weight
         blocks = (of_rule * squares[:, None]) @ of_rule.transpose(0, 2, 1)
         places = (size * own[:, :, None] + own[:, None, :]).ravel()
         whole = np.bincount(places, blocks.ravel(), size**2).reshape(size, size)
         square += whole[:n_raw, :n_raw]
-        of_rule *= (0.5 * agreement) * excess[:, None]
-        apart = np.zeros((n_raw + 1, self.design.n_basis, antecedent.n_rules))
-        apart[own, :, np.arange(antecedent.n_rules)[:, None]] = of_rule @ weighted_basis.T
+        apart = np.zeros((size, n_rules, self.design.n_basis))
+        apart[own, np.arange(n_rules)[:, None]] = of_rule @ columns.transpose(0, 2, 1)
         cross += apart[:n_raw].reshape(cross.shape)
 
 

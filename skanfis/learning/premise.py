@@ -31,7 +31,7 @@ class Premise:
     _ordered: tuple[OrderedTerms, ...]
 
     @classmethod
-    def of(cls, antecedent, minimum, maximum, is_free=False):
+    def of(cls, antecedent, minimum, maximum, is_unbounded=False):
         """The premise of an antecedent; ``minimum`` and ``maximum`` of each input's data."""
         raw = antecedent.parameters
         lower, upper = np.full(raw.size, -LOG_FACTOR), np.full(raw.size, LOG_FACTOR)
@@ -42,8 +42,8 @@ class Premise:
             own = sorted((t for t in terms if t.input == j), key=lambda t: raw[t.location])
             locations = np.array([term.location for term in own])
             if is_ordered and len(own) > 1 and (np.diff(raw[locations]) > 0.0).all():
-                row = OrderedTerms.of(own, raw, minimum[j], maximum[j], is_free)
-                if not is_free:
+                row = OrderedTerms.of(own, raw, minimum[j], maximum[j], is_unbounded)
+                if not is_unbounded:
                     lower[locations], upper[locations] = row.bounds()
                     least, most = row.width_bounds(own, raw)
                     lower[row.widths], upper[row.widths] = least[row.terms], most[row.terms]
@@ -97,12 +97,17 @@ class Premise:
             x = np.where(np.abs(x - edge) < NEXT_TO_NOTHING, edge, x)
         return x
 
-    def pull_back(self, displacement, gradient, gauss_newton):
-        """Gradient and Gauss-Newton matrix by the displacements from those by the parameters."""
+    def jacobian(self, displacement):
+        """Derivatives of the parameters by the displacements."""
         jacobian = np.zeros((self._unit.size, self.size))
         jacobian[np.arange(self._unit.size), self._tied] = self._unit
         for row in self._ordered:
             by_location, by_gaps = row.jacobian(displacement)
             jacobian[row.locations[:, None], row.locations] = by_location
             jacobian[row.widths[:, None], row.locations] = by_gaps
+        return jacobian
+
+    def pull_back(self, displacement, gradient, gauss_newton):
+        """Gradient and Gauss-Newton matrix by the displacements from those by the parameters."""
+        jacobian = self.jacobian(displacement)
         return jacobian.T @ gradient, jacobian.T @ gauss_newton @ jacobian

@@ -13,11 +13,7 @@ conditioned on before the next is asked for; the inputs of which the rules say l
 import numpy as np
 from scipy import linalg
 
-from .evidence import Laplace
-
-# What a number must be worth of the evidence, in -2 log p: as much as a parameter costs by Akaike's
-# criterion.
-_WORTH = 2.0
+from .evidence import WORTH, Laplace
 
 
 def sparse_slopes(posterior: Laplace, coefficients):
@@ -38,7 +34,7 @@ def sparse_slopes(posterior: Laplace, coefficients):
         j, rules = line.slopes[k], every
         while rules.size > 1:
             contrasts = line.contrasts(j, rules)
-            if _loss(state, contrasts) < _WORTH * contrasts.shape[0] * n_outputs:
+            if _loss(state, contrasts) < WORTH * contrasts.shape[0] * n_outputs:
                 break
             rules = np.delete(rules, _farthest(state, line.of_slopes(j, rules)))
         if rules.size > 1:
@@ -48,7 +44,7 @@ def sparse_slopes(posterior: Laplace, coefficients):
             alone = [_loss(state, line.of_slopes(j, rule)) for rule in every[:, None]]
             rules = every[[int(np.argmin(alone))]]
         slope = line.of_slopes(j, rules[:1])
-        if _loss(state, slope) < _WORTH * n_outputs:
+        if _loss(state, slope) < WORTH * n_outputs:
             absent.append((j, tuple(rules.tolist())))
             state = _given(state, slope)
         elif rules.size > 1:

@@ -36,7 +36,7 @@ TOLERANCE = 1e-3
 
 
 def trust_region_step(gradient, hessian, radius, damping=0.0):
-    """Minimise g's + s'(H + damping I)s/2 over |s| <= radius (1 %), H positive semi-definite."""
+    """Minimise g's + s'(H + damping I)s/2 over |s| <= radius, to 1 %, H not negative."""
     values, vectors = np.linalg.eigh(hessian)
     slope = vectors.T @ gradient
     size = np.linalg.norm(slope)

@@ -47,6 +47,8 @@ class Membership(ABC):
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
+    # mu(x) in the parameters' names, as texts print it; not printed where it is empty.
+    formula: ClassVar[str] = ""
 
     @staticmethod
     @abstractmethod

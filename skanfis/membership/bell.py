@@ -19,6 +19,7 @@ class Bell(Membership):
         Parameter("width", "log_width"),
         Parameter("slope", "log_shape"),
     )
+    formula = "1 / (1 + abs((x - center) / width)^(2 * slope))"
 
     @staticmethod
     def value(x, theta):

@@ -18,6 +18,11 @@ import numpy as np
 from .base import Membership, Parameter
 from .profiles import GaussianProfile, LinearProfile, SplineProfile
 
+# t of two flanks without a plateau, and with one.
+_TO_POINT = " where t = max((center - x) / left, (x - center) / right)"
+_TO_PLATEAU = (
+    " where t = max(0, (center - plateau / 2 - x) / left, (x - center - plateau / 2) / right)"
+)
 # The plateau at the start of training, as part of the spacing of terms.
 _FIRST_PLATEAU = 0.25
 
@@ -96,6 +101,7 @@ class Triangular(_TwoSided):
     name = "triangular"
     parameters = _TwoSided.parameters[:3]
     profile = LinearProfile
+    formula = LinearProfile.formula + _TO_POINT
 
 
 class Trapezoidal(_TwoSided):
@@ -103,6 +109,7 @@ class Trapezoidal(_TwoSided):
 
     name = "trapezoidal"
     profile = LinearProfile
+    formula = LinearProfile.formula + _TO_PLATEAU
 
 
 class PiShaped(_TwoSided):
@@ -110,6 +117,7 @@ class PiShaped(_TwoSided):
 
     name = "pi_shaped"
     profile = SplineProfile
+    formula = SplineProfile.formula + _TO_PLATEAU
 
 
 class TwoSidedGaussian(_TwoSided):
@@ -117,6 +125,7 @@ class TwoSidedGaussian(_TwoSided):
 
     name = "two_sided_gaussian"
     profile = GaussianProfile
+    formula = GaussianProfile.formula + _TO_PLATEAU
 
 
 class _OneSided(_Flanked):
@@ -147,6 +156,7 @@ class SShaped(_OneSided):
 
     name = "s_shaped"
     profile = SplineProfile
+    formula = f"{SplineProfile.formula} where t = max(0, (shoulder - x) / width)"
     side = -1.0
 
 
@@ -155,4 +165,5 @@ class ZShaped(_OneSided):
 
     name = "z_shaped"
     profile = SplineProfile
+    formula = f"{SplineProfile.formula} where t = max(0, (x - shoulder) / width)"
     side = 1.0

@@ -10,6 +10,7 @@ class Gaussian(Membership):
 
     name = "gaussian"
     parameters = (Parameter("center", "location"), Parameter("width", "log_width"))
+    formula = "exp(-((x - center) / width)^2 / 2)"
 
     @staticmethod
     def value(x, theta):

@@ -28,6 +28,8 @@ _FLOOR = 1e-10
 class GaussianProfile:
     """exp(-t^2 / 2)."""
 
+    formula = "exp(-t^2 / 2)"
+
     @staticmethod
     def value(t):
         """Mu, for real and complex t >= 0."""
@@ -64,6 +66,8 @@ class _ProfileWithFoot:
 class LinearProfile(_ProfileWithFoot):
     """1 - t."""
 
+    formula = "max(0, 1 - t)"
+
     @staticmethod
     def value(t):
         return np.where(np.real(t) < 1.0, 1.0 - t, 0.0)
@@ -79,6 +83,8 @@ class LinearProfile(_ProfileWithFoot):
 
 class SplineProfile(_ProfileWithFoot):
     """Two parabolas that meet at one half: 1 - 2 t^2, then 2 (1 - t)^2."""
+
+    formula = "2 * max(0, 1 - t)^2 - 4 * max(0, 0.5 - t)^2"
 
     @staticmethod
     def value(t):

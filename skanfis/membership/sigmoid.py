@@ -18,6 +18,8 @@ import numpy as np
 
 from .base import Membership, Parameter
 
+_WHERE = " where s(u) = 1 / (1 + exp(-u))"
+
 
 def _log_sigmoid(u):
     # A quarter of the time of -logaddexp(0, -u).
@@ -38,6 +40,7 @@ class SigmoidDifference(Membership):
         Parameter("width", "log_width"),
         Parameter("flank", "log_width"),
     )
+    formula = "s((x - center + width) / flank) - s((x - center - width) / flank)" + _WHERE
 
     @staticmethod
     def value(x, theta):
@@ -74,6 +77,7 @@ class SigmoidProduct(Membership):
         Parameter("left", "log_width"),
         Parameter("right", "log_width"),
     )
+    formula = "s((x - center + width) / left) * s((center + width - x) / right)" + _WHERE
     signs: ClassVar[tuple[float, float]] = (1.0, -1.0)  # whether each rises or falls, from the left
 
     @classmethod
@@ -114,6 +118,7 @@ class BothRising(SigmoidProduct):
     """Above two cuts, c - a and c + a, over lengths of their own."""
 
     name = "sigmoids_rising"
+    formula = "s((x - center + width) / left) * s((x - center - width) / right)" + _WHERE
     signs = (1.0, 1.0)
 
 
@@ -121,6 +126,7 @@ class BothFalling(SigmoidProduct):
     """Below two cuts."""
 
     name = "sigmoids_falling"
+    formula = "s((center - width - x) / left) * s((center + width - x) / right)" + _WHERE
     signs = (-1.0, -1.0)
 
 
@@ -128,6 +134,7 @@ class FallingRising(SigmoidProduct):
     """Below the lesser of two cuts and above the greater one: true nowhere but for their widths."""
 
     name = "sigmoids_apart"
+    formula = "s((center - width - x) / left) * s((x - center - width) / right)" + _WHERE
     signs = (-1.0, 1.0)
 
 
@@ -168,6 +175,7 @@ class SigmoidRising(_Side):
     """mu(x) = s((x - c) / h), with theta = (c, log h): "above c"."""
 
     name = "sigmoid_rising"
+    formula = "1 / (1 + exp((center - x) / width))"
     side = 1.0
 
 
@@ -175,4 +183,5 @@ class SigmoidFalling(_Side):
     """mu(x) = s((c - x) / h), with theta = (c, log h): "below c"."""
 
     name = "sigmoid_falling"
+    formula = "1 / (1 + exp((x - center) / width))"
     side = -1.0

@@ -19,7 +19,7 @@ from sklearn.exceptions import ConvergenceWarning
 from ..antecedent import TreeAntecedent
 from .clusters import clustered_antecedent, grown_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
-from .sample import DIGITS, counting_weight
+from .sample import DIGITS, counting_weight, in_deviations
 from .splits import Split
 from .tuning import Tuned
 
@@ -104,9 +104,8 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
         # rounding none in what is near to two centres.
         table = np.round(table, DIGITS)
         order = np.lexsort(np.sort(table, axis=1).T)
-        with warnings.catch_warnings():
-            # That there are fewer clusters shows.
-            warnings.simplefilter("ignore", ConvergenceWarning)
+        # That there are fewer clusters shows.
+        with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
             labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
         return labels[np.argsort(order)]
 
@@ -137,8 +136,8 @@ def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):
         along = np.einsum("nk,no,nb->kbo", own, residual, basis, optimize=True)
         squares = along**2 / np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
         # One of the shares follows from the others.
-        n_free = squares.size * (1.0 - 1.0 / count)
-        scores[k] = (squares.sum() * (1.0 - 1.0 / count) - n_free) / np.sqrt(2.0 * n_free)
+        free = 1.0 - 1.0 / count
+        scores[k] = in_deviations(free * squares.sum(), free * squares.size)
     return scores
 
 

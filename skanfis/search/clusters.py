@@ -10,6 +10,7 @@ import numpy as np
 
 from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
 from ..learning.data import StandardisedData
+from .grid import terms_by_input
 from .sample import counting_weight, representative_rows
 
 # Widths in standard deviations of the input: a cluster on one spot still gets a term of some width.
@@ -54,8 +55,7 @@ def grown_antecedent(families, tuned, label, premise_inputs):
     added = _terms_at(families, premise_inputs, rows.X, masses)
     strengths, _ = smaller.strengths_and_shares(np.ascontiguousarray(rows.X.T))
     learnt = _terms_at(families, premise_inputs, rows.X, weight * strengths)
-    for group in smaller.groups:
-        learnt |= {j: group.theta[:, group.inputs == j] for j in np.unique(group.inputs)}
+    learnt |= terms_by_input(smaller)
     terms = {j: np.concatenate([learnt[j], added[j]], axis=1) for j in premise_inputs}
     return _scattered(families, terms)
 

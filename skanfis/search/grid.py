@@ -37,7 +37,7 @@ class Spacing:
         self._columns = [_levels(column, weight) for column in table[:, : rows.X.shape[1]].T]
 
     def n_values(self, j):
-        """How many values an input has: no use in more terms."""
+        """How many values an input has, between its outer quantiles: no use in more terms."""
         return self._columns[j][0].size
 
     def centers(self, j, count):
@@ -74,7 +74,7 @@ def grid_antecedent(families, counts, spacing: Spacing, known=None):
     and ``counts`` have one entry per input. Where a ``known`` rule base has as many terms on an
     input, it has these.
     """
-    terms = {} if known is None else _terms(known)
+    terms = {} if known is None else terms_by_input(known)
     inputs = [j for j, count in enumerate(counts) if count > 1]
     thetas = []
     for j in inputs:
@@ -95,7 +95,7 @@ def _distance(gaps):
     return np.maximum(*sides) ** (1.0 - _NEARER) * np.minimum(*sides) ** _NEARER
 
 
-def _terms(antecedent):
+def terms_by_input(antecedent):
     """Parameters of the terms of every input that has some."""
     return {
         int(j): group.theta[:, group.inputs == j]

@@ -15,8 +15,7 @@ from sklearn.model_selection import GroupKFold
 from ..learning.data import StandardisedData
 from .sample import DIGITS, search_sample
 
-# Folds, and rows that are enough to judge on: of few rows, as many folds as leave out enough; where
-# a single one does, half of the rows are enough to grow, and half to judge.
+# Folds, and rows that are enough to judge on.
 _FOLDS, _ENOUGH = 5, 200
 
 

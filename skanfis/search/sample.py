@@ -51,11 +51,10 @@ def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
     Neither the order of the rows nor whether one is repeated or weighted makes any difference.
     """
-    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     numbers = rows.fingerprints()
     order = np.argsort(numbers, kind="stable")
     first = np.flatnonzero(np.diff(numbers[order], prepend=-np.inf))
-    distinct, weight = order[first], np.add.reduceat(weight[order], first)
+    distinct, weight = order[first], np.add.reduceat(rows.weights[order], first)
     if distinct.size > most:
         upto = np.cumsum(weight)
         wanted = (np.arange(most) + 0.5) * (upto[-1] / most)
@@ -64,6 +63,16 @@ def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
     table = rows.table(distinct)
     order = np.lexsort(table.T[::-1])
     return table[order], weight[order], distinct[order]
+
+
+def to_six_digits(value):
+    """Of columns that are alike, rounding is not to choose."""
+    return float(f"{value:.6g}")
+
+
+def in_deviations(squares, n_free):
+    """A sum of squares by how many deviations it exceeds so many of standard normal numbers'."""
+    return (squares - n_free) / np.sqrt(2.0 * n_free)
 
 
 def weighted_quantile(column, weight, part, side):

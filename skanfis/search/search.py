@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..learning.data import StandardisedData
-from .candidates import KINDS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, splits
 from .start import Start, started
@@ -36,7 +35,7 @@ class StructureSearch:
         self.judges = Judges.of(self.rest)
         self.judged: list[Judged] = []
 
-    def run(self, kinds: Sequence[str] = KINDS) -> Start:
+    def run(self, kinds: Sequence[str]) -> Start:
         """A start from the structure that is chosen."""
         one_rule = self._judge(self.trials.one_rule, [self.trials.one_rule] * len(self.folds))
         for kind in kinds:

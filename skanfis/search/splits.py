@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..antecedent.tree import CRISP, LEAST_WIDTH
-from .sample import counting_weight
+from .sample import counting_weight, in_deviations, to_six_digits
 from .tuning import Tuned
 
 # Cuts that are looked at are next to so many quantiles of a leaf.
@@ -58,8 +58,7 @@ def best_splits(tuned: Tuned, inputs, n_most):
                 log_width = np.log(_width(rows.X[:, j], own, cuts[best]))
                 split = Split(leaf, int(j), float(cuts[best]), float(log_width))
                 found.append((statistics[best], split))
-    # Of columns that are alike, rounding is not to choose: six digits.
-    found.sort(key=lambda pair: -float(f"{pair[0]:.6g}"))
+    found.sort(key=lambda pair: -to_six_digits(pair[0]))
     return [split for _, split in found[:n_most]]
 
 
@@ -81,15 +80,14 @@ def _scored(column, sums, n_basis, variance):
     along = below[:, 1 + n_basis :] - part * whole[1 + n_basis :]
     squares = along.reshape(ends.size, n_basis, -1) ** 2
     squares /= np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
-    n_free = n_basis * variance.size
-    statistics = (squares.sum(axis=(1, 2)) - n_free) / np.sqrt(2.0 * n_free)
+    statistics = in_deviations(squares.sum(axis=(1, 2)), n_basis * variance.size)
     return 0.5 * (column[ends - 1] + column[ends]), statistics
 
 
 def _width(column, own, cut):
     """At the start; of an input that has two values, next to nothing."""
     below, above = column[column < cut], column[column > cut]
-    if np.ptp(below) == 0.0 == np.ptp(above):
+    if np.ptp(below) == 0.0 and np.ptp(above) == 0.0:
         return min(0.5 * (above[0] - below[0]) / CRISP, 0.5 * LEAST_WIDTH)
     center = np.average(column, weights=own)
     spread = np.sqrt(np.average((column - center) ** 2, weights=own))

@@ -33,7 +33,7 @@ from .tuning import (
     with_sparse_slopes,
 )
 
-# What terms without bounds must leave of the expected squared error: nearer, chance decides.
+# Nearer, chance decides.
 _LESS_ERROR = 0.9
 # Of displacements, in spacings of terms: rounding errors stay below.
 _DIGITS = 5
@@ -46,21 +46,21 @@ class Start:
     antecedent: Antecedent
     penalty: Penalty
     displacement: np.ndarray | None = None  # of the premises; None is zero
-    is_free: bool = False  # whether terms have no bounds (see ``premise``)
+    is_unbounded: bool = False  # whether terms have no bounds (see ``premise``)
     # Agreement was raised as far as the tolerance allows: it does not fall as the rows rise.
     agreement_is_raised: bool = False
     candidates: list[dict] = field(default_factory=list)  # what was compared, best first
     term_names: tuple[str, ...] = ()  # where they are given with the rules
 
 
-def started(tuned: Tuned, plan: Plan, left: float, candidates, is_free=False) -> Start:
+def started(tuned: Tuned, plan: Plan, left: float, candidates, is_unbounded=False) -> Start:
     """A start from a training, with the agreement that the tolerance leaves room for.
 
     ``left`` is the factor by which the squared error may still rise. Its root is used up: on new
     rows agreement costs more than the rows that are trained on let see.
     """
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
-    premise = Premise.of(problem.antecedent, *problem.rows.inputs.box, is_free)
+    premise = Premise.of(problem.antecedent, *problem.rows.inputs.box, is_unbounded)
     agreeing = with_most_agreement(tuned, premise, plan.free, np.sqrt(left))
     is_raised = agreeing is not tuned
     return Start(
@@ -68,7 +68,7 @@ def started(tuned: Tuned, plan: Plan, left: float, candidates, is_free=False) ->
         scaled(agreeing.penalty, plan.free, n_rows / plan.n_all, is_raised),
         # Training goes on from there, without the digits that rounding errors reach.
         np.round(agreeing.displacement, _DIGITS),
-        is_free,
+        is_unbounded,
         is_raised,
         candidates,
     )
@@ -80,20 +80,20 @@ def tuned_start(
     """A start from rules that are given, with the weights that are not given found on the rows."""
     if not premises_move:
         plan = replace(plan, weights={"stiffness": 0.0} | plan.weights)
-    sample, free, slopes = search_sample(rows, FEWEST_ROWS), plan.free, plan.consequent_inputs
-    problem = SeparableProblem(sample, antecedent, plan.order, plan.first, consequent_inputs=slopes)
+    sample, free, inputs = search_sample(rows, FEWEST_ROWS), plan.free, plan.consequent_inputs
+    problem = SeparableProblem(sample, antecedent, plan.order, plan.first, consequent_inputs=inputs)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box
-    premise, is_free = Premise.of(antecedent, low, high), False
+    premise, is_unbounded = Premise.of(antecedent, low, high), False
     turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move and free else (0, ARRIVING)
     best = tune(problem, premise, free, n_sample, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
     if is_bounded and has_rows and problem.n_columns <= MOST_COLUMNS:
-        unbounded = Premise.of(antecedent, low, high, is_free=True)
+        unbounded = Premise.of(antecedent, low, high, is_unbounded=True)
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
-            best, is_free = freed, True
+            best, is_unbounded = freed, True
     left, simpler = 1.0, with_sparse_slopes(best, free)
     error = min(best.expected_error, simpler.expected_error)
     if turns and 0.0 < error < np.inf:
@@ -101,7 +101,7 @@ def tuned_start(
         most = tolerated(error, variance, simplicity)
         best = simpler if simpler.expected_error <= most else best
         left = most / best.expected_error
-    return started(best, plan, left, [_as_given(best)], is_free)
+    return started(best, plan, left, [_as_given(best)], is_unbounded)
 
 
 def _as_given(tuned: Tuned):
@@ -141,12 +141,9 @@ def imported_antecedent(model: TSKModel, rows: StandardisedData) -> Antecedent:
     """The rule base of a model in the rows' standardised units, ready to be moved."""
     scale = rows.inputs
     antecedent = model.antecedent.change_units(-scale.offset / scale.scale, 1.0 / scale.scale)
-    is_in_order = all(
-        (np.diff(group.theta[0, group.inputs == j]) > 0.0).all()
-        for group in antecedent.groups
-        for j in np.unique(group.inputs)
-    )
-    if isinstance(antecedent, GridAntecedent) and not is_in_order:
+    if isinstance(antecedent, GridAntecedent):
         # Terms of a grid move with their distances, which must be positive.
-        return RuleTableAntecedent(antecedent.groups, antecedent.rule_terms)
+        places = np.split(antecedent.term_places, np.cumsum(antecedent.counts)[:-1])
+        if any((np.diff(own) <= 0.0).any() for own in places):
+            return RuleTableAntecedent(antecedent.groups, antecedent.rule_terms)
     return antecedent

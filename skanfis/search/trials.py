@@ -25,12 +25,12 @@ from ..model import TSKModel
 from ..policies import TargetRange
 from .candidates import Candidate, rule_base, term_scores
 from .grid import Spacing
-from .sample import effective_weight, unit_scale
+from .sample import effective_weight, to_six_digits, unit_scale
 from .splits import best_splits
 from .tuning import (
+    ARRIVING,
     FEW_TURNS,
     FIRST_PENALTY,
-    FIRST_STEPS,
     MOST_TURNS,
     Tuned,
     tune,
@@ -87,9 +87,8 @@ class Trials:
         self.one_rule = Candidate((1,) * rows.X.shape[1])
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
-        # A line has no premises to move: begun is done.
-        line = self._train(self._problem(self.one_rule), first_steps=FIRST_STEPS)
-        self._begun[self.one_rule] = self._found[self.one_rule] = line
+        line = self._train(self._problem(self.one_rule), turns=0, first_steps=ARRIVING)
+        self._found[self.one_rule] = line
 
     def _scores(self, candidate):
         # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
@@ -139,8 +138,7 @@ class Trials:
         self._begun |= begun
         # Clusters anew have learnt nothing yet: beside rules that go on they are judged trained.
         seen = self.tuned if kind == "scattered" else begun.__getitem__
-        # Of columns that are alike, rounding is not to choose: six digits.
-        return min(begun, key=lambda one: float(f"{self.expected(seen(one)):.6g}"), default=None)
+        return min(begun, key=lambda one: to_six_digits(self.expected(seen(one))), default=None)
 
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
@@ -192,8 +190,8 @@ class Trials:
         plan, rows = self.plan, self.rows_for(candidate)
         penalty = plan.first if smaller is None else smaller.penalty
         antecedent = rule_base(candidate, rows, plan.families, self.spacing, plan.seed, smaller)
-        slopes = plan.consequent_inputs
-        return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=slopes)
+        inputs = plan.consequent_inputs
+        return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=inputs)
 
     def _train(self, problem, turns=MOST_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
         free, weight = self.plan.free, effective_weight(problem.rows)
@@ -207,11 +205,11 @@ class Trials:
         if held is not None:
             antecedent, coefficients = held(tuned.problem, tuned.solved)
         n_inputs, targets = seen.X.shape[1], unit_scale(seen.y)
-        slopes, order = tuned.problem.consequent_inputs, self.plan.order
+        inputs, order = tuned.problem.consequent_inputs, self.plan.order
         model = TSKModel(
             antecedent=antecedent,
             initial_antecedent=antecedent,
-            coefficients=in_user_units(coefficients, seen.inputs, targets, slopes, order),
+            coefficients=in_user_units(coefficients, seen.inputs, targets, inputs, order),
             reference=np.zeros(n_inputs),
             spread=np.ones(n_inputs),
             minimum=seen.inputs.minimum,

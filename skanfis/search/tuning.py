@@ -19,6 +19,7 @@ from ..learning.evidence import (
     LARGEST,
     PRIOR_DISPLACEMENT,
     SMALLEST,
+    WORTH,
     Laplace,
     extrapolated,
     is_settled,
@@ -42,14 +43,13 @@ FIRST_STEPS = 5
 ARRIVING = 50
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 MOST_COLUMNS = 512
+# Of these, and of grids (``trials``).
 _FEW_STEPS, FEW_TURNS = 3, 2
 # Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
 # A turn: a few iterations of the premises, and steps of the weights to follow them. Neither is
 # finished while the other moves: what is left is done in the training that follows.
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
-# The smallest rise of the evidence, in -2 log p, after which another turn follows.
-_RISE = 0.5
 # The first turn of terms without bounds goes far.
 _UNBOUNDED_ITERATIONS = 25
 # Of agreement: less of a rise is not worth a training.
@@ -152,7 +152,8 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: fl
     penalty = replace(problem.penalty, **least)
     evaluation = problem.evaluate(premise.parameters(x))
     start = _improved(problem, evaluation, x, penalty, 0, free, n_rows)
-    first = _turned(start, premise, penalty, free, FIRST_STEPS, _UNBOUNDED_ITERATIONS, False)
+    steps, far = FIRST_STEPS, _UNBOUNDED_ITERATIONS
+    first = _turned(start, premise, penalty, free, steps, far, has_least=False)
     return _risen(first, premise, free, MOST_TURNS - 1, _STEPS, has_least=False)
 
 
@@ -161,7 +162,7 @@ def _risen(tuned: Tuned, premise, free, turns, steps, has_least=True) -> Tuned:
     best = last = tuned
     for _ in range(turns):
         last = _turned(last, premise, last.penalty, free, steps, has_least=has_least)
-        rises = last.score < best.score - _RISE
+        rises = last.score < best.score - WORTH
         best = last if last.score < best.score else best
         if not rises:
             break
@@ -237,7 +238,8 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, left: float) -> Tu
     The consequents alone tell how much that is at least; then the premises follow, which makes room
     for more, or for less.
     """
-    if "agreement" not in free or not tuned.displacement.size or left <= 1.0:
+    is_known = np.isfinite(tuned.expected_error)
+    if "agreement" not in free or not tuned.displacement.size or left <= 1.0 or not is_known:
         return tuned
     others = [key for key in free if key != "agreement"]
     most, best, agreement = left * tuned.expected_error, tuned, 0.0

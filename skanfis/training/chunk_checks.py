@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from ..learning.data import LARGEST_NUMBER
 from ..model import TSKModel
 
 # What the premises and the columns of the design depend on.
 _STRUCTURE = ("n_mfs", "mf", "order", "premise_features", "consequent_features")
 # Sums of squares of weights, and of standardised rows, stay finite within these.
-_SMALLEST_WEIGHT, _LARGEST = 1e-100, 1e100
+_SMALLEST_WEIGHT = 1.0 / LARGEST_NUMBER
 # Parameters that a file has carried agree to their last digits.
 _ROUNDING = 1e-12
 
@@ -68,7 +69,7 @@ def check_begin(estimator, n_rows, finds_structure):
     if estimator.max_iter == 0 and isinstance(imported, TSKModel):
         raise ValueError(
             "max_iter=0 takes the imported model as it is, and partial_fit learns its "
-            "consequents: use solver='lse'."
+            "consequents: leave max_iter at its default, with solver='lse'."
         )
     if finds_structure and n_rows < 2:
         raise ValueError(
@@ -99,11 +100,11 @@ def check_distance(base: TSKModel, scale):
         for end in (scale.minimum[j], scale.maximum[j]):
             # Both are divided before: their difference might overflow.
             away = abs(end / base.spread[j] - base.reference[j] / base.spread[j])
-            if not away <= _LARGEST:
+            if not away <= LARGEST_NUMBER:
                 raise ValueError(
-                    f"Column {name!r} of X holds {end:.3g}, more than {_LARGEST:.0e} standard "
-                    f"deviations from the rows of the premises (mean {base.reference[j]:.6g}, "
-                    f"deviation {base.spread[j]:.3g}): drop such rows."
+                    f"Column {name!r} of X holds {end:.3g}, more than {LARGEST_NUMBER:.0e} "
+                    f"standard deviations from the rows of the premises (mean "
+                    f"{base.reference[j]:.6g}, deviation {base.spread[j]:.3g}): drop such rows."
                 )
 
 
@@ -113,12 +114,12 @@ def faded_weights(sample_weight, n_rows, forgetting):
     ValueError where a weight is beyond what sums of squares hold.
     """
     if sample_weight is not None and n_rows:
-        outside = (sample_weight < _SMALLEST_WEIGHT) | (sample_weight > _LARGEST)
+        outside = (sample_weight < _SMALLEST_WEIGHT) | (sample_weight > LARGEST_NUMBER)
         if outside.any():
             raise ValueError(
                 f"sample_weight holds {sample_weight[np.argmax(outside)]:.3g}; weights that count "
                 f"against those of other chunks must be zero, or lie from {_SMALLEST_WEIGHT:.0e} "
-                f"to {_LARGEST:.0e}."
+                f"to {LARGEST_NUMBER:.0e}."
             )
     if forgetting == 1.0:
         return sample_weight
@@ -137,6 +138,7 @@ def named_premises(model: TSKModel, data):
         input_names=data.input_names,
         output_names=data.output_names,
         posterior=None,
+        rows_extrapolation=model.told_extrapolation,
     )
 
 

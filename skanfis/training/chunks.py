@@ -2,12 +2,12 @@ r"""Sums over rows that come in chunks, at premises that stay, and the model tha
 
     G = sum s phi phi' ,    c = sum s phi y ,    q = sum s y^2 ,    W = sum s ,
 
-with phi = w(x) (x) [1, z], inputs and targets standardised by all rows in the sums. Sums of two
+with phi = kron(w(x), [1, z]), inputs and targets standardised by all rows in the sums. Sums of two
 sets of rows are carried over to the scales of both, exactly since z' = t + g z, and added: the
 order and the size of chunks make no difference, and no digits are lost as a sensor drifts.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..blocks import fitting_rows, row_blocks
 from ..consequent import LocalBasis, basis, in_user_units, with_common_slopes
 from ..learning.covariance import posterior_of
 from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
+from ..learning.evidence import ROWS_EACH
 from ..learning.firing import FIRES, inverse_factor
 from ..learning.gram import DesignMoments
 from ..learning.objective import SeparableProblem
@@ -31,8 +32,6 @@ from .pruning import redundant_rules
 _FREE = ("agreement", "alpha", "slope")
 # What adds up over rows, each with its weight.
 _SUMS = ("weight", "gram", "slope", "square", "second", "strongest")
-# Distinct rows per consequent that are counted: beyond, nothing asks for their number.
-_ROWS_EACH = 2
 # Rows of a rule that are kept because one of them may be its farthest.
 _MOST_FAR = 8
 _TINY = float(np.finfo(float).tiny)
@@ -87,12 +86,16 @@ class RowSums:
             best, top = strengths.argmax(axis=0), strengths.max(axis=0)
             strongest += np.bincount(best, weights=weight, minlength=n_rules)
             peak = np.maximum(peak, strengths.max(axis=1))
+            root = np.sqrt(strengths)
             for j, x in enumerate(raw[own]):
-                distance = np.sqrt(strengths) * np.abs(x - centers[:, j, None])
+                distance = root * np.abs(x - centers[:, j, None])
                 extent[:, j] = np.maximum(extent[:, j], distance.max(axis=1))
-            distinct, distinct_inputs = _with_prints(
-                base, raw, rows.y[part].T, best, distinct, distinct_inputs, len(slope)
-            )
+            numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
+            marks = fingerprint(np.vstack([numbers, rows.y[part].T]))
+            distinct = np.vstack([distinct, marks[:, None]])
+            distinct = _distinct(distinct, ROWS_EACH * len(slope))
+            own_inputs = np.column_stack([best, numbers])
+            distinct_inputs = _distinct(np.vstack([distinct_inputs, own_inputs]), 1 + n_inputs)
             rule, row = np.nonzero(strengths >= FIRES * top)
             every = basis(Z)
             weighted = every if weight is None else every * weight
@@ -105,7 +108,6 @@ class RowSums:
             for k, values in enumerate(target):
                 slope[:, k] += (strengths @ (weighted * values).T).ravel()
                 square[k] += weighted[0] @ values**2
-        ones = np.ones(rows.n_rows) if sample_weight is None else sample_weight
         return cls(
             base,
             own,
@@ -113,7 +115,7 @@ class RowSums:
             rows.targets,
             rows.n_rows,
             rows.total_weight,
-            float(np.sum(ones**2)),
+            float(np.sum(rows.weights**2)),
             design.gram(gram),
             slope,
             square,
@@ -158,7 +160,7 @@ class RowSums:
             both,
             peak=np.maximum(one.peak, two.peak),
             extent=np.maximum(one.extent, two.extent),
-            distinct=_distinct(distinct, _ROWS_EACH * len(self.slope)),
+            distinct=_distinct(distinct, ROWS_EACH * len(self.slope)),
             distinct_inputs=_distinct(distinct_inputs, both.second.shape[1]),
             farthest=_far_rows(farthest, both.second, inputs),
         )
@@ -199,16 +201,6 @@ class RowSums:
         return RuleSupport(share, center, factor, radius * known).change_units(
             scale.offset, scale.scale
         )
-
-
-def _with_prints(base, raw, y, best, distinct, distinct_inputs, n_columns):
-    """Fingerprints of distinct rows, and of distinct inputs by rule, with those of a block."""
-    numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
-    marks = fingerprint(np.vstack([numbers, y]))
-    return (
-        _distinct(np.vstack([distinct, marks[:, None]]), _ROWS_EACH * n_columns),
-        _distinct(np.vstack([distinct_inputs, np.column_stack([best, numbers])]), 1 + len(raw)),
-    )
 
 
 def joined_scales(one: Scale, other: Scale, weight: float, other_weight: float) -> Scale:
@@ -323,7 +315,7 @@ class Solved:
     model: TSKModel
     penalty: Penalty
     mean_squared_error: float  # of the standardised target, summed over outputs
-    redundant_rules: list[dict] = field(default_factory=list)
+    redundant_rules: list[dict]
 
 
 def fitted_weights(estimator, sums: RowSums):
@@ -389,14 +381,18 @@ def solve(sums: RowSums, given, first=None) -> Solved:
 
 def _model(sums, problem, evaluation):
     """The model in the user's units."""
-    inputs, targets, slopes = sums.inputs, sums.targets, sums.consequent_inputs
-    order = 1 if slopes.size else 0
+    posterior = None
+    if sums.n_rows > 1:
+        # Premises stay: what is not known of them is not counted.
+        posterior = posterior_of(problem, None, evaluation, sums.effective_weight)
+    inputs, targets, own = sums.inputs, sums.targets, sums.consequent_inputs
+    order = 1 if own.size else 0
     coefficients = with_common_slopes(
-        evaluation.coefficients, evaluation.masses, problem.penalty.common, slopes
+        evaluation.coefficients, evaluation.masses, problem.penalty.common, own
     )
     return replace(
         sums.base,
-        coefficients=in_user_units(coefficients, inputs, targets, slopes, order),
+        coefficients=in_user_units(coefficients, inputs, targets, own, order),
         reference=inputs.offset,
         spread=inputs.scale,
         minimum=inputs.minimum,
@@ -405,6 +401,5 @@ def _model(sums, problem, evaluation):
         rule_rows=sums.strongest * (sums.n_rows / sums.weight),
         support=sums.support(),
         target=TargetRange(targets.minimum, targets.maximum, targets.scale),
-        # Premises stay: what is not known of them is not counted.
-        posterior=posterior_of(problem, None, evaluation, sums.effective_weight),
+        posterior=posterior,
     )

@@ -1,6 +1,7 @@
 """What goes into a fit, validated rows, and what it leaves behind."""
 
 from dataclasses import dataclass
+from numbers import Real
 
 import numpy as np
 from sklearn.utils.validation import check_consistent_length, validate_data
@@ -101,8 +102,11 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
     if sample_weight is not None:
         # A chunk may be without any weight, which scikit-learn refuses from some version on;
         # weights of chunks count against one another and stay as they are.
-        if not (is_chunk and np.array_equal(sample_weight, np.zeros(len(X)))):
-            sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+        if isinstance(sample_weight, Real):
+            sample_weight = np.full(len(X), sample_weight)
+        with named_refusals(sample_weight=sample_weight):
+            if not (is_chunk and np.array_equal(sample_weight, np.zeros(len(X)))):
+                sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
         sample_weight = np.asarray(sample_weight, dtype=float)
         sample_weight = sample_weight if is_chunk else bearable_weights(sample_weight)
         keep = positive_weights(sample_weight, len(X), 0 if is_chunk else 2)

@@ -10,6 +10,7 @@
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -96,10 +97,10 @@ class _Fit:
         elif is_many(self.rows) and self.huber is None:
             self.rows = with_sample(self.rows)
         # A slope by a column that never changes is nothing that data could tell of.
-        slopes, is_constant = request.consequent_inputs, self.rows.inputs.is_constant
+        inputs, is_constant = request.consequent_inputs, self.rows.inputs.is_constant
         self.request = replace(
             request,
-            consequent_inputs=slopes[~is_constant[slopes]],
+            consequent_inputs=inputs[~is_constant[inputs]],
             held=held_in_search(data.constraints),
         )
 
@@ -122,11 +123,7 @@ class _Fit:
         return start
 
     def run(self, rows: StandardisedData, start: Start) -> SolverRun:
-        """The run of the solver from a start.
-
-        Of many rows a sample decides where the premises are: what is left to do on all rows is a
-        step or two.
-        """
+        """The run of the solver from a start; of many rows, what is left to do is a step or two."""
         if rows.sample is None or not isinstance(self.solver, VariableProjection):
             return self._solved(rows, start, self.solver)
         thorough = clone(self.solver).set_params(tol=_THOROUGH * self.solver.tol)
@@ -136,7 +133,7 @@ class _Fit:
 
     def _solved(self, rows, start, solver, is_watched=True):
         low, high = rows.inputs.box
-        premise = Premise.of(start.antecedent, low, high, start.is_free)
+        premise = Premise.of(start.antecedent, low, high, start.is_unbounded)
         problem = SeparableProblem(
             rows.sample or rows,
             start.antecedent,
@@ -149,11 +146,12 @@ class _Fit:
             problem = problem.on_all(rows)
         validation = None
         if self.held_out is not None:
-            slopes, stopping = self.request.consequent_inputs, self.stopping
+            inputs, stopping = self.request.consequent_inputs, self.stopping
             validation = ValidationLoss(
-                self.held_out, slopes, stopping.n_iter_no_change, stopping.tol
+                self.held_out, inputs, stopping.n_iter_no_change, stopping.tol
             )
-        watchers = [self.printer, self._teller(start)] if is_watched else []
+        tell = self.callbacks and partial(self._tell, start)
+        watchers = [self.printer, tell] if is_watched else []
         displacement = start.displacement
         if displacement is not None:
             displacement = np.clip(displacement, premise.lower, premise.upper)
@@ -170,16 +168,9 @@ class _Fit:
         result = validation.restored(result)
         return SolverRun(start, problem, premise, result, tuple(validation.losses))
 
-    def _teller(self, start):
-        """What tells scikit-learn's callbacks of every iteration; None where there are none."""
-        if self.callbacks is None:
-            return None
-        callbacks = self.callbacks
-
-        def watch(n_iter, evaluation):
-            return callbacks.task("iteration", lambda: self.builder.model(start, evaluation))
-
-        return watch
+    def _tell(self, start, n_iter, evaluation):
+        """Tell scikit-learn's callbacks of an iteration."""
+        return self.callbacks.iteration(lambda: self.builder.model(start, evaluation))
 
     def robust_run(self) -> tuple[SolverRun, np.ndarray]:
         """Runs and weights in turns, until the weights settle.
@@ -195,7 +186,7 @@ class _Fit:
 
     def _robust_turns(self, weights):
         rows, epsilon = self.rows, self.huber.epsilon
-        start, change = self.start(without_outliers(rows, weights)), np.inf
+        start = self.start(without_outliers(rows, weights))
         # Those far off are not yet known for what they are: no rule is to go and meet them.
         run = self.run(reweighted(rows, without_weight(weights)), start)
         for _ in range(_MOST_TURNS):

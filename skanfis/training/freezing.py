@@ -64,15 +64,15 @@ class ModelBuilder:
         rows, trained = self.rows, evaluation.antecedent
         offset, scale = rows.inputs.offset, rows.inputs.scale
         firing = self.firing(evaluation) if firing is None else firing
-        slopes, order = self.request.consequent_inputs, self.request.order
+        inputs, order = self.request.consequent_inputs, self.request.order
         coefficients = with_common_slopes(
-            evaluation.coefficients, evaluation.masses, start.penalty.common, slopes
+            evaluation.coefficients, evaluation.masses, start.penalty.common, inputs
         )
         support = rule_support(rows, trained, self.n_coefficients, firing)
         model = TSKModel(
             antecedent=trained.change_units(offset, scale),
             initial_antecedent=start.antecedent.change_units(offset, scale),
-            coefficients=in_user_units(coefficients, rows.inputs, rows.targets, slopes, order),
+            coefficients=in_user_units(coefficients, rows.inputs, rows.targets, inputs, order),
             reference=offset,
             spread=scale,
             minimum=rows.inputs.minimum,
@@ -113,6 +113,7 @@ def as_given(estimator, data, model) -> Fitted:
         initial_antecedent=model.antecedent,
         input_names=data.input_names,
         output_names=data.output_names,
+        rows_extrapolation=model.told_extrapolation,
     )
     rows = data.rows()
     # Rows beyond the model's range count as they are predicted, or where that is not at all, held.

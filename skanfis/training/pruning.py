@@ -6,10 +6,10 @@ rows O_rs = mean of w_r w_s: O_rs / sqrt(O_rr O_ss) is close to one. They then h
 between them, however it is divided. Of two that repeat one another the stronger one stays.
 """
 
-from collections.abc import Sequence
 from dataclasses import fields, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..model import TSKModel
 from ..support import RuleSupport
@@ -41,12 +41,15 @@ def redundant_rules(overlap, peak):
     return [{"rule": int(r), "reason": found[r], "weight": float(weight[r])} for r in sorted(found)]
 
 
-def model_without_rules(model: TSKModel, rules: Sequence[int] | np.ndarray) -> TSKModel:
+def model_without_rules(model: TSKModel, rules: ArrayLike) -> TSKModel:
     """The model without some rules: those that are left fire as before, in proportion.
 
     ValueError where there is no such rule, or where none would be left.
     """
-    numbers = np.unique(np.asarray(rules, dtype=int))
+    numbers = np.asarray(rules)
+    if numbers.size and numbers.dtype.kind not in "iu":
+        raise TypeError(f"rules={rules!r} must be whole numbers, those of rules.")
+    numbers = np.unique(numbers)
     unknown = numbers[(numbers < 0) | (numbers >= model.n_rules)]
     if unknown.size:
         raise ValueError(
@@ -68,6 +71,7 @@ def model_without_rules(model: TSKModel, rules: Sequence[int] | np.ndarray) -> T
         rule_weights=weights / weights.sum(),
         rule_rows=model.rule_rows[kept],
         support=_support_of(model.support, kept),
+        posterior=None,  # it is of all rules
         term_names=tuple(model.term_names[t] for t in terms),
     )
 

@@ -24,11 +24,10 @@ from sklearn.linear_model import HuberRegressor
 
 from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import column_statistics
+from ..learning.sampling import SAMPLE_ROWS, with_sample
 
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
-# Rows that the linear model sees: the median of so many residuals is good to a hundredth.
-_MOST_ROWS, _SEED = 20_000, 0
 # Of the linear model, robust standard deviations that no shape of a sound target leaves.
 _FAR = 10.0
 # Of its minimiser: so tight that the first weights do not depend on the order of the rows.
@@ -40,7 +39,7 @@ _DIGITS = 2
 _OUTLIER = 0.5
 
 
-def huber_weights(problem, evaluation, epsilon, sample_weight=None):
+def huber_weights(problem, evaluation, epsilon, sample_weight):
     """Weights (n_rows,) by the residuals at an evaluation; ``sample_weight`` is the rows' own."""
     sizes = np.empty(problem.rows.n_rows)
     for part, residual, _ in problem.residuals(evaluation):
@@ -55,11 +54,8 @@ def huber_weights(problem, evaluation, epsilon, sample_weight=None):
 def robust_start(rows):
     """The rows with the target's scale as it is without what is far off, and their weights."""
     weights = np.ones(rows.n_rows)
-    some = rows
-    if rows.n_rows > _MOST_ROWS:
-        rng = np.random.default_rng(_SEED)
-        some = rows.part(np.sort(rng.choice(rows.n_rows, _MOST_ROWS, replace=False)))
-    lines = _robust_lines(some)
+    is_large = rows.n_rows > SAMPLE_ROWS
+    lines = _robust_lines(with_sample(rows, SAMPLE_ROWS).sample if is_large else rows)
     if lines is None:
         return rows, weights
     sizes = np.empty(rows.n_rows)
@@ -91,9 +87,8 @@ def _robust_lines(rows):
         if spread == 0.0:
             return None
         linear = HuberRegressor(max_iter=_MOST_STEPS, tol=_TIGHT)
-        with warnings.catch_warnings():
-            # A rough line will do.
-            warnings.simplefilter("ignore", ConvergenceWarning)
+        # A rough line will do.
+        with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
             try:
                 linear.fit(Z.T, (values - center) / spread, sample_weight=own)
             except ValueError:
@@ -113,16 +108,14 @@ def _weighted_median(values, weight):
 
 def reweighted(rows, weights):
     """The rows with weights by Huber's loss, on top of their own."""
-    own = rows.sample_weight
-    return replace(rows, sample_weight=weights if own is None else own * weights)
+    return replace(rows, sample_weight=rows.weights * weights)
 
 
 def without_outliers(rows, weights):
     """The rows that have at least half of their weight; all of them where these are few."""
     kept = weights >= _OUTLIER
-    given = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
     # What is said of most rows is said of none.
-    return rows.part(kept) if 2.0 * given[kept].sum() >= given.sum() else rows
+    return rows.part(kept) if 2.0 * rows.weights[kept].sum() >= rows.weights.sum() else rows
 
 
 def without_weight(weights):

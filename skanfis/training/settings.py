@@ -73,14 +73,12 @@ def _imported(estimator, names):
             "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
         )
     check_inputs(model, names, "partition")
-    as_it_is = "means nothing where imported rules are taken as they are (max_iter=0)"
-    refused = [
-        ("monotonic_cst", estimator.max_iter == 0, f"{as_it_is}: use solver='lse', or"),
-        ("constraints", estimator.max_iter == 0, f"{as_it_is}: use solver='lse', or"),
-        ("premise_features", True, "means nothing to imported rules, which have their inputs:"),
-        ("consequent_features", estimator.max_iter == 0, f"{as_it_is}: use solver='lse', or"),
-    ]
-    for name, is_refused, why in refused:
-        if is_refused and getattr(estimator, name) is not None:
-            raise ValueError(f"{name}={getattr(estimator, name)!r} {why} leave it at None.")
+    refused = {"premise_features": "to imported rules, which have their inputs:"}
+    if estimator.max_iter == 0:
+        why = "where imported rules are taken as they are (max_iter=0): use solver='lse', or"
+        refused |= dict.fromkeys(("monotonic_cst", "constraints", "consequent_features"), why)
+    for name, why in refused.items():
+        if getattr(estimator, name) is not None:
+            given = f"{name}={getattr(estimator, name)!r}"
+            raise ValueError(f"{given} means nothing {why} leave it at None.")
     return model

@@ -65,12 +65,12 @@ class Callbacks:
         """Tell of the beginning of the fit."""
         self.context.call_on_fit_task_begin(estimator=self.estimator, **self.data)
 
-    def task(self, name, make_model):
-        """Tell of a task that has just ended; whether a callback wants to stop.
+    def iteration(self, make_model):
+        """Tell of an iteration that has just ended; whether a callback wants to stop.
 
         ``make_model`` makes the model as it is then, if a callback asks for it.
         """
-        context = self.context.subcontext(task_name=name)
+        context = self.context.subcontext(task_name="iteration")
         context.call_on_fit_task_begin(estimator=self.estimator, **self.data)
         return self._end(context, make_model)
 
@@ -149,7 +149,7 @@ class ValidationLoss:
 def held_out_loss(rows: StandardisedData, consequent_inputs, evaluation):
     """Mean squared error of rows that were not trained on, standardised, summed over outputs.
 
-    Rows beyond the training rows' range count as predict holds them, at its edge.
+    Rows beyond the training rows' range count at its nearest point, whatever the policy.
     """
     low, high = (edge[:, None] for edge in rows.inputs.box)
     coefficients = evaluation.coefficients

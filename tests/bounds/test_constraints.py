@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import lsq_linear, minimize
@@ -68,6 +69,16 @@ def test_predictions_rise_everywhere(params, rng):
     # A structure that is found may grow under what is held.
     if params.get("n_mfs") != "auto":
         assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
+
+
+def test_signs_are_found_by_the_names_of_columns_that_are_numbers(rng):
+    X, _, y = planted(rng)
+    frame = pd.DataFrame(X, columns=["0", "1"])
+    one, other = (
+        ANFISRegressor(**QUICK, monotonic_cst={name: 1}).fit(frame, y) for name in (0, "0")
+    )
+    assert one.constraints_["certified"]
+    assert_array_equal(one.predict(frame), other.predict(frame))
 
 
 def test_the_search_judges_what_is_kept(rng):

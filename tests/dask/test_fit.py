@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.exceptions import UndefinedMetricWarning
 from sklearn.metrics import r2_score
 
 pytest.importorskip("dask")
@@ -159,8 +160,48 @@ def test_what_is_lazy_is_what_is_eager(n_outputs):
     table = dd.from_pandas(pd.DataFrame(X), npartitions=3)
     assert_array_equal(model.predict(table).compute().to_numpy(), eager)
     assert_array_equal(table.map_partitions(model.coverage).compute(), model.coverage(X))
-    with pytest.raises(TypeError, match=r"X\.compute"):
-        model.coverage(table)
+    for method in (model.coverage, model.strengths, model.apply, model.in_bounds):
+        with pytest.raises(TypeError, match=r"fit, predict, score: give X\.compute"):
+            method(table)
+
+
+def scores(X, y, chunks, **settings):
+    """That of a cluster, and that of one process; rows beyond the range are far beyond it."""
+    model = DaskANFISRegressor(n_mfs=2, **settings).fit(*data(600))
+    return model.score(*cut(chunks, X, y)), ANFISRegressor.score(model, X, y)
+
+
+@pytest.mark.parametrize("value", [0.1, 1e9 + 0.1])
+def test_score_of_a_constant_is_zero(value):
+    X, _ = data(600)
+    assert scores(X, np.full(600, value), (250, 0, 350)) == (0.0, 0.0)
+
+
+def test_score_far_from_the_training_mean_loses_no_digits():
+    X, y = data(600)
+    found, expected = scores(X, y + 1e9, (250, 1, 349))
+    assert found == pytest.approx(expected, rel=1e-12)
+
+
+def test_score_of_one_row_is_nan_and_of_no_prediction_refused():
+    X, y = data(600)
+    with pytest.warns(UndefinedMetricWarning, match="less than two samples"):
+        assert np.isnan(scores(X[:1], y[:1], 1)).all()
+    X[300] += 1e6
+    with pytest.raises(ValueError, match="y is not finite, or X is out of range"):
+        scores(X, y, 250, out_of_bounds="nan")
+
+
+def test_score_after_merge_is_that_of_one_process():
+    X, y = data(600)
+    first = ANFISRegressor(n_mfs=2).fit(X, y)
+    parts = [
+        DaskANFISRegressor(partition=first, solver="lse").partial_fit(X[part], y[part])
+        for part in (slice(300), slice(300, None))
+    ]
+    merged = parts[0].merge(parts[1])
+    expected = r2_score(y, merged.predict(X))
+    assert merged.score(*cut(250, X, y)) == pytest.approx(expected, rel=1e-12)
 
 
 def parts_of(*tables):
@@ -233,6 +274,11 @@ def weighted(weight):
             ValueError,
             "Partition 1: Negative values in sample_weight",
         ),
+        (
+            lambda: cut(100, *data(300), np.ones(300), np.array([1, pd.NA, 2] * 100)),
+            ValueError,
+            r"Partition \d: groups has no value for some rows",
+        ),
         (lambda: weighted(np.zeros(300)), ValueError, "Found 0 rows with a positive weight"),
     ],
 )
@@ -254,6 +300,8 @@ def test_prediction_wants_the_columns_of_training():
     model = DaskANFISRegressor(n_mfs=2).fit(table[NAMES].to_numpy(), table["error"])
     with pytest.raises(ValueError, match="expecting 2 features"):
         model.predict(da.zeros((10, 3)))
+    with pytest.raises(ValueError, match="X has 1 dimensions, and a table has two"):
+        model.predict(da.zeros(10))
 
 
 def test_arrays_without_names_are_warned_of_once_and_not_by_every_block():

@@ -228,7 +228,11 @@ def test_targets_are_written_or_refused_by_name(tmp_path, log, capsys):
     )
     found = sorted(path.name for path in out.iterdir())
     assert found == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
+    # What an earlier run has written goes with it, what is not the command's stays.
+    for name in ("compensator.c", "px4.params", "notes.txt"):
+        (out / name).write_text("old")
     assert main([*arguments, "--force"]) == 0
+    assert sorted(path.name for path in out.iterdir()) == sorted([*found, "notes.txt"])
     assert main(arguments) == 4
 
 

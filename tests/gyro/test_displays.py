@@ -16,6 +16,7 @@ from skanfis.gyro import (
     ResidualSurfaceDisplay,
     ScaleFactorErrorDisplay,
 )
+from skanfis.gyro.displays import three_digits
 
 from ..quick import quick
 
@@ -109,6 +110,26 @@ def test_tables_hold_what_is_drawn_in_the_unit(unit, log):
     np.testing.assert_allclose(cells[f"mean error after [{unit}]"], mesh.ravel(), rtol=1e-12)
     with pytest.raises(ValueError, match=r"unit='deg' must be one of deg/s, deg/h"):
         display_of(ErrorDisplay, log, unit="deg")
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        *((9.996, "10.0"), (9.994, "9.99"), (-99.96, "-100"), (999.6, "1,000"), (1234.5, "1,234")),
+        *((0.09996, "0.100"), (0.001, "0.00100"), (9.996e-7, "1.00e-06"), (9.94e-5, "0.0000994")),
+        *((0.0, "0"), (np.nan, "–"), (-np.inf, "-inf")),
+    ],
+)
+def test_numbers_have_three_digits(value, text):
+    assert three_digits(value) == text
+
+
+def test_the_allan_deviation_needs_every_row(log):
+    rate, before, after = log["rate"], log["output"], log["after"]
+    with pytest.raises(ValueError, match="after is NaN in some rows; leave out these runs"):
+        AllanDisplay.from_predictions(
+            rate, before, after.where(after.index > 0), sampling_interval=1.0
+        )
 
 
 def test_bad_columns_are_named(log):

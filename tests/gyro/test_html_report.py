@@ -20,7 +20,7 @@ from skanfis.gyro._headline import formula_of, proven_bounds, rules_text
 from skanfis.gyro._options import ReportOptions, parse_limit
 from skanfis.gyro._results import Picture, Results
 from skanfis.gyro._split import choose_split
-from skanfis.gyro.displays import figures
+from skanfis.gyro.displays import three_digits
 from skanfis.gyro.html_report import check_installed, report_page
 from skanfis.inspection import readability
 
@@ -186,7 +186,7 @@ def test_the_verdict_comes_first(page, calibration):
     title = "Use the arcsine law instead of the fuzzy rules"
     assert title in text[: text.index("Summary")]
     assert "are of the fuzzy rules, as --write asks" in text
-    assert f"leaves {figures(verdict.rms['arcsine law'])} °/s RMS" in text
+    assert f"leaves {three_digits(verdict.rms['arcsine law'])} °/s RMS" in text
     simple = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="recommended")
     text = "".join(Outline(report_page(Results(simple, ReportOptions()), TITLE)).text)
     model = next(each for each in simple.simpler if each.name == "arcsine law").estimator.base_
@@ -205,7 +205,7 @@ def test_one_unit_throughout(page, calibration, no_drawing, monkeypatch):
         told = text[text.index("How it was checked") : text.index("Figures of merit")]
         assert unit in told
         assert other not in told
-        assert f"{figures(factor * rms)} {unit}" in text
+        assert f"{three_digits(factor * rms)} {unit}" in text
 
 
 def test_every_picture_says_what_it_shows_and_has_its_data(page, calibration):

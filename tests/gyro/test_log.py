@@ -56,6 +56,13 @@ def test_runs_of_two_devices_with_one_label_are_told_apart(tmp_path):
     assert list(read["run"]) == ["a / 1", "a / 2", "b / 1", "b / 2"]
 
 
+def test_runs_whose_labels_read_alike_are_numbered(tmp_path):
+    frame = pd.DataFrame({"temperature": 20.0, "output": 1.0, "rate": 1.0}, index=range(3))
+    frame["device"], frame["run"] = ["x", "x / y", "w"], ["y / z", "z", "z"]
+    read = read_log(table(tmp_path, frame))
+    assert list(read["run"]) == ["x / y / z", "x / y / z (2)", "w / z"]
+
+
 @pytest.mark.parametrize(
     ("text", "options", "message"),
     [
@@ -179,6 +186,18 @@ def test_logs_that_are_refused(log, spoil, column, row, message):
     with pytest.raises(LogError, match=message) as caught:
         check_log(spoil(log).reset_index(drop=True))
     assert (caught.value.column, caught.value.row) == (column, row)
+
+
+@pytest.mark.parametrize(
+    ("part", "inputs"),
+    [
+        *(("output", ["temperature", "output"]), ("temperature", ["temperature"])),
+        *(("time", ["time"]), ("time", ["temperature_rate"])),
+    ],
+)
+def test_a_log_without_one_of_the_inputs_is_refused(log, part, inputs):
+    with pytest.raises(LogError, match=f"the log has no {part}"):
+        check_log(log.drop(columns=part), inputs=inputs)
 
 
 @pytest.mark.parametrize("factor", [1e-40, 1e40])

@@ -50,11 +50,19 @@ def test_apply_never_replaces_what_it_reads(files, tmp_path, target, capsys):
     assert "old" not in (tmp_path / "log-compensated.csv").read_text()
 
 
-def test_a_calibration_never_replaces_its_log(files, tmp_path, capsys):
+@pytest.mark.parametrize("name", ["rules.txt", "px4.params"])
+def test_a_calibration_never_replaces_its_log(files, tmp_path, name, capsys):
     (tmp_path / "out").mkdir()
-    (tmp_path / "log.csv").rename(tmp_path / "out" / "rules.txt")
-    assert main(["out/rules.txt", "--output", "out", "--force"]) == 4
-    assert "rules.txt is what is read" in capsys.readouterr().err
+    (tmp_path / "log.csv").rename(tmp_path / "out" / name)
+    assert main([f"out/{name}", "--output", "out", "--force"]) == 4
+    assert f"{name} is what is read" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("files")
+def test_the_folder_is_called_after_the_first_file_of_a_pattern(tmp_path, capsys):
+    (tmp_path / "log-compensator").write_text("")
+    assert main(["l*.csv"]) == 4
+    assert "log-compensator is a file" in capsys.readouterr().err
 
 
 def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, capsys):

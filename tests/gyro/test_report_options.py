@@ -61,9 +61,15 @@ def test_both_sides_of_a_limit(text, value, result):
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "is_sure"), [(1.0, 4.9, True), (1.0, 5.1, False), (-6.0, 1.0, False)]
+    ("value", "low", "high", "result", "is_sure"),
+    [
+        *((1.0, 1.0, 4.9, "pass", True), (1.0, 1.0, 5.1, "pass", False)),
+        *((1.0, -6.0, 1.0, "pass", False), (6.0, 5.1, 19.0, "fail", True)),
+        # All that is permitted lies in the interval.
+        *((6.0, -7.0, 19.0, "fail", False), (-6.0, -19.0, -5.1, "fail", True)),
+    ],
 )
-def test_an_interval_over_the_limit_is_said(low, high, is_sure):
-    check = check_limit(parse_limit("bias=5deg/h"), table_of(1.0, low, high))
-    assert check.result == "pass"
+def test_an_interval_over_the_limit_is_said(value, low, high, result, is_sure):
+    check = check_limit(parse_limit("bias=5deg/h"), table_of(value, low, high))
+    assert check.result == result
     assert (check.remark == "") == is_sure

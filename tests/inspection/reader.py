@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..oracles import sigmoid, textbook_membership
+from ..oracles import by_formula, sigmoid
 
 NUMBER = r"[-+]?\d[\d.]*(?:e[-+]?\d+)?"
 
@@ -15,12 +15,14 @@ class Read:
     """What stands in a text.
 
     Of every rule its number; pairs (input, term); by output its value, what of it is the common
-    line's, and {input: (slope, place)}. The common line by output; terms; limits of the outputs.
+    line's, and {input: (slope, place)}. The common line by output; terms; the formulas of their
+    families; limits of the outputs.
     """
 
     rules: list
     common: dict
     terms: dict
+    formulas: dict
     limits: dict
 
     def predict(self, row):
@@ -37,7 +39,7 @@ class Read:
         """How true "name is term" is of a row."""
         if (name, term) in self.terms:
             function, numbers = self.terms[name, term]
-            return textbook_membership(function, row[name], numbers)
+            return by_formula(self.formulas[function], row[name], numbers)
         if re.fullmatch("[01]", term):
             return float(row[name] == float(term))
         sign, cut, *half = term.replace("± ", "").split()
@@ -63,10 +65,11 @@ def read_text(text, names):
             _, premise, *conclusions = joined.split("\n")
             said = dict(_conclusion(line[7:], names) for line in conclusions)
             rules.append((int(heading[1]), _premise(premise[5:]), said))
-        for line in re.findall(r"Common to the rules, (.*?)\.(?:\n| A part of|$)", joined):
+        for line in re.findall(r"Common to the rules, (.*?)\.(?:\n| Every value|$)", joined):
             output, _, slopes = line.partition(": ")
             common[output] = _slopes(slopes, names)
-    return Read(rules, common, _terms(text), _limits(text))
+    formulas = dict(re.findall(r"A (\w+) term is (.*?) true\. ", " ".join(text.split())))
+    return Read(rules, common, _terms(text), formulas, _limits(text))
 
 
 def _premise(text):

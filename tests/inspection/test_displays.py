@@ -131,6 +131,8 @@ class TestSurface:
             ({"held": {"rate": np.nan}}, ValueError, "must be a number in the range of training"),
             ({"held": {"rate": 5.0}}, ValueError, r"held\['rate'\]=5.0"),
             ({"held": {"rate": "high"}}, ValueError, r"held\['rate'\]='high'"),
+            ({"held": {"time": 1e6}}, ValueError, r"held\['time'\]: that input is drawn"),
+            ({"held": {1: 30.0}}, ValueError, r"held\[1\]: that input is drawn"),
             ({"grid_resolution": 1}, ValueError, "grid_resolution=1"),
         ],
     )

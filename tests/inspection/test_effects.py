@@ -56,6 +56,14 @@ def test_both_shares_are_those_of_the_definition(rules, order):
         assert_allclose(found["rows"].reindex(every), parts, rtol=0, atol=1e-10)
 
 
+def test_an_input_called_as_the_rest_keeps_its_share():
+    model = MODELS["grid, order 1, 1 outputs"]
+    X, names = rows_of(model, 1.0, 20), ("three or more", *NAMES[1:])
+    expected, found = effects(model, X).table, effects(replace(model, input_names=names), X).table
+    assert list(found.index) == [text.replace("time", names[0]) for text in expected.index]
+    assert_allclose(found, expected, rtol=0, atol=1e-15)
+
+
 def test_what_fit_keeps_is_what_its_rows_give():
     rng = np.random.default_rng(0)
     X = rng.uniform([250.0, -1e-3, 0.0], [330.0, 1e-3, 5.0], (60, 3))

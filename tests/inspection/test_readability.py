@@ -61,7 +61,7 @@ def test_nothing_is_found_at_the_limits():
 
 def test_what_is_beyond_a_limit_is_said():
     (sentence,) = found_of(A_GRID, alone=np.array([0.51])).findings
-    assert sentence.startswith("No rule can be read without the others: the strongest alone misses")
+    assert sentence.startswith("No rule can be read without the others: used alone, the strongest")
     two = found_of(MODELS["grid, order 1, 2 outputs"], alone=np.array([0.0, 3.0]))
     assert "No rule of 'y1'" in two.findings[0]
     assert two.summary["strongest_alone"] == 3.0

@@ -12,7 +12,7 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.inspection import explain, rules_table
 
-from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, narrow_target, rows_of
+from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, OFFSET, SCALE, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
@@ -56,6 +56,14 @@ def test_what_a_rule_does_not_look_at_is_missing():
     assert "if" not in rules_table(MODELS["one rule, order 1, 1 outputs"])
 
 
+def test_an_input_called_value_has_a_column_of_its_own():
+    names = ("value", *NAMES[1:])
+    table, other = rules_table(replace(A_GRID, input_names=names)), rules_table(A_GRID)
+    assert list(table["then y"]) == ["value", *names]
+    assert_array_equal(table["then y"], other["then y"])
+    assert_array_equal(table["at"], other["at"])
+
+
 def test_a_pipeline_is_told_in_raw_units():
     g = np.random.default_rng(0)
     X = pd.DataFrame(g.uniform([250.0, -1e-3], [330.0, 1e-3], (80, 2)), columns=["kelvin", "rate"])
@@ -81,6 +89,16 @@ def test_contributions_add_up_to_the_prediction(model, policy):
     assert_allclose(sums(table, model), expected, rtol=0, atol=1e-12 * np.nanmax(abs(expected)))
     strengths = table.groupby(["row", "output"])["strength"].sum()
     assert_allclose(strengths, 1.0, rtol=1e-12)
+
+
+def test_beyond_the_range_are_the_tangents_of_a_model_that_must_rise():
+    at = OFFSET + SCALE * [0.3, np.nan, 0.1]
+    model = replace(A_GRID, out_of_bounds="linear", max_extrapolation=0.5, tangent_at=at)
+    rows = rows_of(model, 2.0, 30)
+    assert_allclose(sums(explain(model, rows), model), model.predict(rows), rtol=0, atol=1e-11)
+    # Else the tangents at the nearest points are followed.
+    other = replace(model, tangent_at=None)
+    assert np.abs(other.predict(rows) - model.predict(rows)).max() > 0.1
 
 
 def test_an_output_that_is_held_has_a_line_for_it():

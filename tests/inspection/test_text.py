@@ -18,6 +18,7 @@ from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
 from skanfis.export import export_json, read_json
 from skanfis.inspection import export_text, readability, rules_html
+from skanfis.inspection.rules import parts_led
 from skanfis.inspection.sentences import Sentences, rounded
 from skanfis.inspection.text import number
 
@@ -188,10 +189,10 @@ def test_a_rule_by_hand():
     model = replace(model, support=replace(support, center=center, share=np.ones(2)))
     text = export_text(model, feature_names=["rooms", "age", "river"], show_terms=False)
     assert text == dedent("""\
-        2 rules, 3 inputs.
+        2 rules, 3 inputs, 100 rows.
 
         Common to the rules, y: +3 per age from 1.
-        A part of every value is from this line; a slope that a rule states stands in its place.
+        Every value has a part of this line in it; a rule's own slope stands in place of the line's.
 
         Rule 1, strongest on 75 % of the rows:
           IF rooms < 6.8 ± 0.3
@@ -278,10 +279,10 @@ def test_a_category_is_listed_by_its_levels(rng):
 
 
 @ALL
-def test_every_rule_is_told_once_the_weightiest_first(model):
-    labels = [label for label, _, _ in read_text(export_text(model), NAMES).rules]
+def test_every_rule_is_told_once_the_strongest_on_most_rows_first(model):
+    labels, led = [one[0] for one in read_text(export_text(model), NAMES).rules], parts_led(model)
     assert sorted(labels) == list(range(model.n_rules))
-    assert labels == sorted(labels, key=lambda r: (-model.rule_weights[r], r))
+    assert labels == sorted(labels, key=lambda r: (-led[r], -model.rule_weights[r], r))
 
 
 def test_long_sentences_are_wrapped_and_read_as_ever(rng):
@@ -311,7 +312,7 @@ def test_rules_that_matter_and_a_line_for_the_rest():
 def test_a_grid_in_words():
     text = export_text(A_GRID)
     lines = text.splitlines()
-    assert lines[0] == "12 rules, 3 inputs."
+    assert lines[0] == f"12 rules, 3 inputs, {A_GRID.rule_rows.sum():.0f} rows."
     start = [line.partition(",")[0] for line in lines].index("Rule 0")
     assert lines[start + 1] == "  IF time is low AND chip temperature is low AND rate is low"
     assert "Outside these ranges the value at the edge is held: out_of_bounds='clip'." in lines

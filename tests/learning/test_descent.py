@@ -106,7 +106,7 @@ def two_bells(rows, alpha=0.0):
     n_inputs = low.size
     antecedent = oracles.even_grid([Bell] * n_inputs, [2] * n_inputs, low, high, 0.5)
     problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=alpha, slope=alpha))
-    return problem, Premise.of(antecedent, low, high, is_free=True)
+    return problem, Premise.of(antecedent, low, high, is_unbounded=True)
 
 
 @pytest.mark.theory

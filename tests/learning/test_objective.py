@@ -159,7 +159,7 @@ def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
 @pytest.mark.theory
 def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
     whole = arrays(*case.at_point())
-    monkeypatch.setattr(blocks, "_FEWEST_ROWS", 8)
+    monkeypatch.setattr(blocks, "FEWEST_ROWS", 8)
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
     split = Case(

@@ -184,7 +184,7 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
     rows = StandardisedData.of(X, X[:, :1])
     antecedent = start_of(kind, rows)
     # A truth that is displaced at random lies in the box of free terms, whatever the start.
-    premise = Premise.of(antecedent, *oracles.box(rows), is_free=True)
+    premise = Premise.of(antecedent, *oracles.box(rows), is_unbounded=True)
     truth = premise.parameters(displaced * g.uniform(-1.0, 1.0, premise.size))
     Z = rows.inputs.apply(rows.X.T, np.empty(rows.X.T.shape))
     phi = oracles.dense_design(antecedent, truth, Z, 1)

@@ -7,7 +7,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.membership import FAMILIES as EVERY_FAMILY
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian, membership_families
 
-from ..oracles import central_difference, complex_step, corners, textbook_membership
+from ..oracles import (
+    by_formula,
+    central_difference,
+    complex_step,
+    corners,
+    textbook_membership,
+)
 
 # What sets families apart. Whatever else is added is taken for smooth, one at its center, and
 # falling to both sides.
@@ -101,6 +107,9 @@ def test_value_is_the_formula_in_papers(family, rng):
         # exp(-450) in the tail magnifies the last bit of its argument 450 times; next to a foot
         # that of x counts.
         assert_allclose(family.value(x, theta)[term], expected, rtol=1e-11, atol=1e-300)
+        # A difference of two sigmoids loses its digits in the tails.
+        numbers = dict(zip(names, numbers, strict=True))
+        assert_allclose(by_formula(family.formula, x[term], numbers), expected, 1e-9, 1e-15)
 
 
 @FAMILIES

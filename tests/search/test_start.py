@@ -36,9 +36,9 @@ def of_grid(count, truth, rng, noise=0.0, n_rows=300, weights=(), simplicity=0.0
 
 def test_terms_have_no_bounds_where_data_are_next_to_exact(rng):
     rows, found = of_grid(2, lambda x: x > 0.2, rng, 0.01)
-    assert found.is_free
+    assert found.is_unbounded
     antecedent = found.antecedent
-    premise = Premise.of(antecedent, *rows.inputs.box, is_free=True)
+    premise = Premise.of(antecedent, *rows.inputs.box, is_unbounded=True)
     low, high = antecedent.with_parameters(premise.parameters(found.displacement)).groups[0].theta.T
     # They cross where the step is, and the one gives way to the other within a twentieth.
     z = rows.inputs.apply(np.array([[0.15, 0.25]]), np.empty((1, 2)))[0]
@@ -52,7 +52,7 @@ def sine(x):
 
 def test_terms_have_bounds_where_there_is_noise(rng):
     _, found = of_grid(3, sine, rng, 0.1)
-    assert not found.is_free
+    assert not found.is_unbounded
 
 
 def test_of_rules_that_are_given_simplicity_raises_the_agreement(rng):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE
 from skanfis.learning.objective import SeparableProblem
@@ -103,3 +104,11 @@ class TestAgreement:
         apart = tuning.tune(problem, premise, FREE, 100.0)
         assert tuning.with_most_agreement(apart, premise, FREE[1:], 2.0) is apart
         assert tuning.with_most_agreement(apart, premise, FREE, 1.0) is apart
+
+
+def test_agreement_is_not_raised_where_the_error_is_not_known():
+    # Few rows and terms of many parameters: premises take more than half of the rows.
+    x = np.linspace(-1.0, 1.0, 20)
+    model = ANFISRegressor(mf="sigmoid_product", order=0, partition="grid")
+    model.fit(x[:, None], np.abs(x))
+    assert np.abs(model.predict(x[:, None]) - np.abs(x)).max() < 0.02

@@ -1,10 +1,14 @@
 """How far the tangent is followed: against the definition row by row, and on planted functions."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from skanfis import ANFISRegressor
+from skanfis.exceptions import OutOfBoundsWarning
+from skanfis.options import LinearExtrapolation
 from skanfis.policies import FARTHEST, MAX_EXTRAPOLATION
 
 from ..quick import quick
@@ -78,3 +82,16 @@ def test_weights_are_copies_and_order_is_of_no_account(rng):
         quick(2).fit(X[::-1], y[::-1], sample_weight=times[::-1]).model_.rows_extrapolation,
     ]
     assert_array_equal(told, told[0])
+
+
+def test_auto_of_a_model_as_given_is_its_own_limit(rng):
+    """And not that of the policy with which it was taken."""
+    X = rng.uniform(size=(100, 2))
+    model = quick(2).fit(X, X[:, 0] ** 2)
+    unknown = replace(model.model_, rows_extrapolation=None, posterior=None, max_extrapolation=2.0)
+    policy = LinearExtrapolation(np.inf)
+    given = ANFISRegressor(partition=unknown, max_iter=0, out_of_bounds=policy).fit(X, X[:, 0])
+    given.set_params(out_of_bounds="linear")
+    with pytest.warns(OutOfBoundsWarning, match="max_extrapolation=2.0"):
+        found = given.predict(X + 5.0)
+    assert_array_equal(found, unknown.predict(X + 5.0)[:, 0])

@@ -2,6 +2,7 @@
 
 import pickle
 from copy import deepcopy
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -10,13 +11,15 @@ from sklearn.base import clone
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
-from skanfis.exceptions import ForgottenRowsWarning
+from skanfis.exceptions import ForgottenRowsWarning, OutOfBoundsWarning
+from skanfis.options import LinearExtrapolation
 
 from ..quick import quick
 
 GIVEN = {"agreement": 1e-3, "alpha": 1e-4}
-# Of standard deviations of the target.
-EXACT = 1e-10
+# Of standard deviations of the target. Weights that the evidence finds are rounded to three digits:
+# where one is half way, the order of a sum says which.
+EXACT, BY_EVIDENCE = 1e-10, 1e-3
 CHUNKINGS = {
     "one": [300],
     "rows": [1] * 15 + [285],
@@ -77,12 +80,14 @@ def test_any_chunks_equal_one_fit(whole_and_settings, chunking):
     whole, settings = whole_and_settings
     model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS[chunking])
     once = ANFISRegressor(**settings).partial_fit(X, y)
-    assert difference(model, once, X) < EXACT
-    assert (model.agreement_, model.alpha_) == (once.agreement_, once.alpha_)
+    tolerance = EXACT if "alpha" in settings else BY_EVIDENCE
+    assert difference(model, once, X) < tolerance
+    weights = once.agreement_, once.alpha_
+    assert (model.agreement_, model.alpha_) == pytest.approx(weights, rel=10.0 * tolerance)
     has_slopes = settings.get("order", 1) == 1 and settings.get("alpha") != 0.0
-    assert difference(model, whole, X) < (0.05 if has_slopes else EXACT)
+    assert difference(model, whole, X) < (0.05 if has_slopes else tolerance)
     assert model.agreement_ == pytest.approx(whole.agreement_, rel=0.02)
-    assert model.loss_curve_[-1] == pytest.approx(once.loss_curve_[-1], rel=1e-9)
+    assert model.loss_curve_[-1] == pytest.approx(once.loss_curve_[-1], rel=10.0 * tolerance)
     assert model.redundant_rules_ == whole.redundant_rules_
     for name in ("minimum", "maximum", "reference", "spread", "rule_weights", "rule_rows"):
         found, expected = getattr(model.model_, name), getattr(whole.model_, name)
@@ -300,7 +305,7 @@ def test_what_chunks_cannot_be_asked(premises):
         with pytest.raises(AttributeError) as caught:
             model.partial_fit(X, one)
         assert message in str(caught.value.__cause__)
-    with pytest.raises(ValueError, match="max_iter=0 takes the imported model as it is"):
+    with pytest.raises(ValueError, match=r"max_iter=0 .*leave max_iter at its default"):
         chunk(premises, max_iter=0).partial_fit(X, one)
     with pytest.raises(ValueError, match="first chunk has 1 row;"):
         ANFISRegressor().partial_fit(X[:1], one[:1])
@@ -315,3 +320,56 @@ def test_what_chunks_cannot_be_asked(premises):
         model.partial_fit(X, y, np.full(60, 1e200))
     with pytest.raises(ValueError, match="order was 1 at the first partial_fit"):
         model.set_params(order=0).partial_fit(X, y)
+
+
+def test_names_that_were_given_stay(premises):
+    X, y = surface()
+    model = chunk(premises).partial_fit(X[:200], y[:200])
+    model.rename_terms({"x1": ["cold", "hot"]})
+    assert "x1 is cold" in model.readability_.rules["if"].iloc[0]
+    names = (*premises.model_.term_names[:3], "cold", "hot")
+    other = chunk(premises).partial_fit(X[200:], y[200:])
+    for later in (model.merge(other), model.partial_fit(X[200:], y[200:])):
+        assert later.model_.term_names == names
+        assert difference(later, chunk(premises).partial_fit(X, y), X) < BY_EVIDENCE
+
+
+def test_one_row_says_nothing_of_noise(premises):
+    X, y = surface()
+    model = chunk(premises, **GIVEN).partial_fit(X[:1], y[:1])
+    assert model.noise_std_ is None
+    with pytest.raises(ValueError, match=r"has no posterior, as one .* seen a single row"):
+        model.predict(X, return_std=True)
+    model.partial_fit(X[1:], y[1:])
+    whole = chunk(premises, **GIVEN).partial_fit(X, y)
+    assert model.noise_std_ == pytest.approx(whole.noise_std_, rel=1e-6)
+
+
+def test_a_constant_target_at_first_settles_nothing():
+    """The weights that a fit to it found would let no slope in, ever."""
+    X, y = surface(600)
+    y[:100] = y[0]
+    first = ANFISRegressor(n_mfs=[3, 2]).fit(X[:100], y[:100])
+    model = in_chunks(ANFISRegressor(n_mfs=[3, 2]), X, y, [100, 500])
+    assert difference(model, chunk(first).partial_fit(X, y), X) < BY_EVIDENCE
+    assert model.score(X[100:], y[100:]) > 0.9
+
+
+def test_auto_is_the_limit_of_the_rules_that_were_given(premises):
+    """And not the limit that was asked for at an earlier call."""
+    X, y = surface()
+    unknown = replace(premises.model_, rows_extrapolation=None, posterior=None)
+    beyond = np.add(X[:5], [3e3, 0.0])
+    model = chunk(unknown, out_of_bounds=LinearExtrapolation(np.inf)).partial_fit(X, y)
+    model.set_params(out_of_bounds="linear")
+    with pytest.warns(OutOfBoundsWarning, match=f"={unknown.max_extrapolation}"):
+        found = model.predict(beyond)
+    assert np.array_equal(found, chunk(unknown).partial_fit(X, y).model_.predict(beyond)[:, 0])
+
+
+def test_a_chunk_without_weight_in_any_form_changes_nothing(premises):
+    X, y = surface()
+    model = chunk(premises).partial_fit(X, y)
+    before = model.predict(X)
+    for nothing in (0.0, np.zeros(300), [0] * 300):
+        assert np.array_equal(model.partial_fit(X, 2.0 * y, nothing).predict(X), before)

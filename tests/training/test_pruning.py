@@ -86,3 +86,23 @@ def test_rules_that_are_not_there_are_refused():
         model.without_rules([2])
     with pytest.raises(ValueError, match="names all 2 rules: one at least must be left"):
         model.without_rules([0, 1])
+
+
+def test_what_is_left_has_no_posterior_until_it_is_fitted():
+    X, y = gap()
+    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, y)
+    left = model.without_rules([1])
+    given = ANFISRegressor(partition=left, max_iter=0).fit(X, y)
+    assert_array_equal(given.predict(X), left.predict(X)[:, 0])
+    with pytest.raises(ValueError, match=r"has no posterior, as one .* that lost rules"):
+        given.predict(X, return_std=True)
+    assert given.readability_.line in str(given.readability_)
+    assert ANFISRegressor(partition=left).fit(X, y).predict(X, return_std=True)[1].min() > 0.0
+
+
+@pytest.mark.parametrize("rules", [[True, False, False, False], [1.9], "1", [1, None]])
+def test_rules_that_are_no_numbers_are_refused(rules):
+    model = ANFISRegressor(n_mfs=2, solver="lse").fit(*gap())
+    with pytest.raises(TypeError, match=r"rules=.* must be whole numbers, those of rules"):
+        model.without_rules(rules)
+    assert model.without_rules([]) is model.model_

@@ -143,7 +143,11 @@ def test_weights_that_do_not_settle_are_told(monkeypatch):
 @pytest.mark.floors
 def test_of_many_rows_some_tell_the_first_weights(monkeypatch):
     X, y, truth, is_outlier = with_outliers(1500)
-    monkeypatch.setattr(robust, "_MOST_ROWS", 500)
+    monkeypatch.setattr(robust, "SAMPLE_ROWS", 500)
     model = quick(n_mfs=[3, 1], loss="huber").fit(X, y)
     assert model.robust_weights_[is_outlier].max() < 0.1
     assert np.sqrt(np.mean((model.predict(X) - truth) ** 2)) < 0.1
+    # The same ones in any order of the rows.
+    order = np.random.default_rng(0).permutation(len(y))
+    again = quick(n_mfs=[3, 1], loss="huber").fit(X[order], y[order])
+    assert_allclose(again.predict(X), model.predict(X), rtol=0, atol=1e-9)

@@ -109,7 +109,8 @@ def export_c(
     """
     stem, name = check_arguments(path, name, dtype, std, min_coverage)
     source = Source(fold(estimator), Dialect(name, dtype, std), min_coverage, saturate)
-    text = source.file(f"{stem}.h") + self_test(known_answers(source), source.dialect)
+    included = f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n\n'
+    text = included + source.body() + self_test(known_answers(source), source.dialect)
     code = CCode(name, header(source, units, notes), text, source.cost)
     write_files(code, path)
     return code

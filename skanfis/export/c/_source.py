@@ -165,10 +165,6 @@ class Source:
         operations += [n_shares, 0, n_shares + products, n_sums]
         return operations
 
-    def file(self, include):
-        """All of it; ``include`` is the name of the header."""
-        return f'#include "{include}"\n\n#include <float.h>\n#include <math.h>\n\n{self.body()}'
-
     def body(self):
         """What follows the lines that include other files."""
         dialect, indices = self.dialect, ["r", "o"]

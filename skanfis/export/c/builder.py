@@ -93,12 +93,12 @@ def cost_lines(cost, besides=""):
     yield f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack."
 
 
-def input_lines(names, low, high, units=None):
+def input_lines(names, low, high, units):
     """The inputs and their range."""
     return ["Inputs x, and their range in the training data:", *_ranges(names, low, high, units)]
 
 
-def _ranges(names, low, high, units=None):
+def _ranges(names, low, high, units):
     units, sides = units or {}, zip(names, low, high, strict=True)
     for k, (name, *ends) in enumerate(sides):
         unit = f" [{comment(units[name])}]" if name in units else ""

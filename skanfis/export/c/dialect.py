@@ -35,6 +35,15 @@ _BITS = {
 STATUS = {name: bit for name, (bit, _) in _BITS.items()}
 
 
+def status_word(is_out, is_silent, is_uncovered):
+    """The status of rows that are finite; of one without an answer no coverage is told."""
+    return (
+        STATUS["OUT_OF_RANGE"] * is_out
+        | STATUS["UNCOVERED"] * (~is_silent & is_uncovered)
+        | STATUS["NO_OUTPUT"] * is_silent
+    )
+
+
 @dataclass(frozen=True)
 class Dialect:
     """Turns templates into C.

@@ -35,8 +35,7 @@ class ErrorModel:
     def __call__(self, points):
         """The error at points (n_points, n_inputs); outside the range that at its edge."""
         X = np.clip(points, *self.ends.T)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", OutOfBoundsWarning)
+        with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
             predicted = self._estimator.predict(pd.DataFrame(X, columns=self.names))
         return self._own * X[:, self._output] - predicted if self._is_rate else predicted
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...export.c.dialect import write_files
-from ..c_code import SUBTRACT, raw_rate_of, units_of
+from ..c_code import SUBTRACT, input_units, raw_rate_of
 from ..metrics import rms
 from .autopilots import NOTES, Cubic
 from .error_model import ErrorModel
@@ -61,9 +61,9 @@ def _write(calibration, text, folder):
     is_relative = name == "ardupilot"
     largest = high - low if is_relative else max(-low, high)
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
-    left = _held_out_rms(calibration, make, is_relative)
     if not np.isfinite(largest):
         raise RefusedError("no bound of its difference from the model could be proven.")
+    left = _held_out_rms(calibration, make, is_relative)
     if left > _MOST_TIMES * model_rms:
         raise RefusedError(
             f"it leaves {left:.4g} deg/s RMS on rows held out, and the model {model_rms:.4g}; more "
@@ -77,7 +77,9 @@ def _write(calibration, text, folder):
     notes = [f"In the place of the model in compensator.json: {worth}.", _THERMOMETER]
     if is_code:
         use = f"{SUBTRACT} {raw_rate_of(compensator)}"
-        write_files(made.code([use, *notes], units_of(compensator)), folder / FILES[name][0][:-2])
+        write_files(
+            made.code([use, *notes], input_units(compensator)), folder / FILES[name][0][:-2]
+        )
     else:
         written = made.text([NOTES[name], *notes], *details)
         (folder / FILES[name][0]).write_text(written, encoding="ascii", newline="\n")

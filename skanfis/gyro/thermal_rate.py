@@ -69,10 +69,6 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
             A log.
         y : None
             Not used; here for scikit-learn.
-
-        Returns
-        -------
-        self : ThermalRate
         """
         constant = self.time_constant
         if not (isinstance(constant, int | float | np.number) and 0.0 < constant < np.inf):
