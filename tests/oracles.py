@@ -114,12 +114,8 @@ def textbook_membership(function, x, numbers):
 def by_formula(formula, x, numbers):
     """What a printed formula says: "f where t = g", "f where s(u) = g", or "f"."""
     formula, _, where = formula.replace("^", "**").partition(" where ")
-    words = {
-        "exp": np.exp,
-        "abs": np.abs,
-        "max": lambda *v: np.max(np.broadcast_arrays(*v), axis=0),
-    }
-    words |= numbers | {"x": x}
+    words = numbers | {"x": x, "exp": np.exp, "abs": np.abs}
+    words["max"] = lambda *v: np.max(np.broadcast_arrays(*v), axis=0)
     name, _, value = where.partition(" = ")
     if name == "s(u)":
         words["s"] = lambda u: eval(value, words | {"u": u})

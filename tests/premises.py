@@ -33,11 +33,8 @@ def shared_places(family):
     centers = np.array([[-1.0, 0.5, 0.5, 2.0], [-2.0, -2.0, 0.0, 0.5]])
     theta = family.from_center_and_width(centers, np.array([[1.0, 0.5, 0.8, 1.2]] * 2))
     groups = [TermGroup(family, np.full(4, j), theta[:, j]) for j in range(2)]
-    groups.append(
-        TermGroup(
-            family, np.array([2]), family.from_center_and_width(np.array([1.5]), np.array([2.0]))
-        )
-    )
+    alone = family.from_center_and_width(np.array([1.5]), np.array([2.0]))
+    groups.append(TermGroup(family, np.array([2]), alone))
     table = np.array([[0, 4, 8], [1, 5, 8], [2, 6, 8], [3, 7, 8]])
     return RuleTableAntecedent(tuple(groups), table)
 
@@ -89,10 +86,7 @@ def locations(antecedent, vector):
 
 def kind_of(antecedent):
     """Of every parameter, "location", "log_width" or "log_shape"."""
-    kinds = [
-        np.repeat([p.kind for p in group.family.parameters], group.n_terms)
-        for group in antecedent.groups
-    ]
+    kinds = [np.repeat([p.kind for p in g.family.parameters], g.n_terms) for g in antecedent.groups]
     return np.concatenate(kinds)
 
 

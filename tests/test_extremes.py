@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis import ANFISRegressor
-from skanfis.inspection import export_text
 from skanfis.learning import VariableProjection
 
 
@@ -50,16 +49,9 @@ def test_what_floats_do_not_hold_is_refused(x_scale, y_scale, message, settings)
         ANFISRegressor(**settings).fit(X * x_scale, y * y_scale)
 
 
-def test_text_of_a_constant_target():
-    X, y = table()
-    text = export_text(ANFISRegressor(n_mfs=2).fit(X, np.full(len(y), 3e99)))
-    assert "Held within the limits of its training: y, 3e+99 to 3e+99." in text
-
-
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-@pytest.mark.parametrize(
-    ("x_scale", "y_scale"), [(1e-97, 1e-97), (1e97, 1e97), (1e-97, 1e97), (1e97, 1e-97)]
-)
+@pytest.mark.parametrize("x_scale", [1e-97, 1e97])
+@pytest.mark.parametrize("y_scale", [1e-97, 1e97])
 def test_what_floats_hold_is_learnt(x_scale, y_scale):
     X, y = table()
     found = ANFISRegressor(**SHORT).fit(X * x_scale, y * y_scale).predict(X * x_scale)

@@ -34,11 +34,8 @@ def gyro(n_rows=120):
     rng = np.random.default_rng(0)
     X = rng.uniform([0.0, -40.0, -300.0], [1800.0, 85.0, 300.0], (n_rows, 3))
     time, temperature, rate = X.T
-    y = (
-        0.02 * np.exp(-time / 400.0)
-        + 3e-4 * (temperature - 25.0)
-        + 2e-6 * (temperature - 25.0) ** 2
-    )
+    y = 0.02 * np.exp(-time / 400.0) + 3e-4 * (temperature - 25.0)
+    y += 2e-6 * (temperature - 25.0) ** 2
     y += 1e-4 * np.tanh(rate / 100.0) * (1.0 + temperature / 100.0) + 1e-4 * rng.normal(size=n_rows)
     return X, y
 

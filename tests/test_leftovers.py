@@ -37,9 +37,8 @@ def test_a_test_that_changes_the_folder_fails_the_run(action, told, tmp_path):
     (tmp_path / "tests" / "test_one.py").write_text(SUITE.format(action=action))
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "tests"]
     bare = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    done = subprocess.run(
-        command, cwd=tmp_path, env=bare, capture_output=True, text=True, check=False
-    )
+    caught = {"capture_output": True, "text": True, "check": False}
+    done = subprocess.run(command, cwd=tmp_path, env=bare, **caught)
     assert "1 passed" in done.stdout
     assert done.returncode == bool(told), done.stdout
     assert all(line in done.stdout for line in told)

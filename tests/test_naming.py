@@ -22,9 +22,8 @@ def grid(*counts):
 
 def model(antecedent):
     """What given names are held against."""
-    return SimpleNamespace(
-        antecedent=antecedent, input_names=INPUTS, minimum=BOX[0], maximum=BOX[1]
-    )
+    box = {"minimum": BOX[0], "maximum": BOX[1]}
+    return SimpleNamespace(antecedent=antecedent, input_names=INPUTS, **box)
 
 
 def scattered(centers):

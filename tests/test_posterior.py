@@ -46,9 +46,8 @@ def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt,
     The joint precision is J' J of every residual that the cost is made of, by complex steps, and
     inverted whole; the noise is what the residual leaves after the trace of the smoother.
     """
-    dense = oracles.DenseProblem(
-        rows, problem.antecedent, problem.order, penalty, problem.consequent_inputs
-    )
+    antecedent, order, inputs = problem.antecedent, problem.order, problem.consequent_inputs
+    dense = oracles.DenseProblem(rows, antecedent, order, penalty, inputs)
     theta, beta = evaluation.antecedent.parameters, evaluation.coefficients[:, 0]
     n, p = rows.n_rows, beta.size
     by_beta = dense.residual_matrix(theta)
@@ -58,17 +57,9 @@ def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt,
     jacobian = np.hstack([by_beta, by_theta @ to_theta])
     precision = jacobian.T @ jacobian
     precision[p:, p:] += penalty.stiffness * np.eye(x.size)
-    new_design = oracles.dense_design(
-        problem.antecedent, theta, new, problem.order, problem.consequent_inputs
-    )
+    new_design = oracles.dense_design(antecedent, theta, new, order, inputs)
     by_premises = oracles.complex_step(
-        lambda t: (
-            oracles.dense_design(
-                problem.antecedent, t, new, problem.order, problem.consequent_inputs
-            )
-            @ beta
-        ),
-        theta,
+        lambda t: oracles.dense_design(antecedent, t, new, order, inputs) @ beta, theta
     )
     row = np.hstack([new_design, by_premises @ to_theta])
     if not is_learnt:
@@ -115,9 +106,8 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch):
     solved = evaluation.coefficients.reshape(n_rules, -1, 1) * rows.targets.scale
     coefficients = np.zeros((n_rules, 1 + 2 * order, 1))
     coefficients[:, 0] = solved[:, 0] + rows.targets.offset
-    coefficients[:, 1 + problem.consequent_inputs] = (
-        solved[:, 1:] / scale[problem.consequent_inputs, None]
-    )
+    used = problem.consequent_inputs
+    coefficients[:, 1 + used] = solved[:, 1:] / scale[used, None]
     model = oracle_model(rows, evaluation.antecedent, coefficients, posterior)
     model = replace(model, minimum=np.full(2, -1e3), maximum=np.full(2, 1e3))
     X = (rows.inputs.offset[:, None] + scale[:, None] * new).T
@@ -398,12 +388,7 @@ def posterior_covariance(model):
     """The covariance that the factors of a posterior of one output stand for."""
     posterior = model.posterior
     n_premises = posterior.premises.shape[1]
-    top = np.hstack(
-        [
-            posterior.noise[0] * posterior.consequents,
-            np.zeros((len(posterior.consequents), n_premises)),
-        ]
-    )
+    top = np.pad(posterior.noise[0] * posterior.consequents, ((0, 0), (0, n_premises)))
     bottom = np.hstack([-posterior.cross[0] @ posterior.consequents, posterior.premises])
     factor = np.vstack([top, bottom])
     return factor.T @ factor - (posterior.pinned[0] @ factor).T @ (posterior.pinned[0] @ factor)

@@ -16,9 +16,7 @@ from .inspection.test_text import with_common_slopes
 A_GRID = MODELS["grid, order 1, 2 outputs"]
 VARIED = {
     "slopes in common": with_common_slopes(A_GRID),
-    "slopes of zero": replace(
-        A_GRID, coefficients=A_GRID.coefficients * [[1.0], [1.0], [0.0], [1.0]]
-    ),
+    "slopes of zero": replace(A_GRID, coefficients=A_GRID.coefficients * np.c_[[1, 1, 0, 1]]),
 }
 
 

@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn import config_context
 from sklearn.base import clone
-from sklearn.cluster import AgglomerativeClustering, KMeans
+from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.metrics import get_scorer
@@ -43,7 +43,6 @@ def surface(n_rows=240, seed=0, noise=0.0):
 
 
 X, Y = surface()
-FRAME = pd.DataFrame(X, columns=NAMES)
 
 
 def same_bits(one, other, data=X):
@@ -177,30 +176,6 @@ def test_attributes_reproduce_the_predictions(place, settings):
     )
 
 
-def test_clustered_rules_start_at_the_clusters():
-    # Clusters far apart in every input: no two share a term.
-    rng = np.random.default_rng(3)
-    clump = rng.permutation(np.repeat(np.arange(3), 80))
-    data = np.array([[0, 5, -4], [4, -3, 0], [-6, 0, 4]])[clump] + 0.5 * rng.normal(size=(240, 3))
-    target = clump + 0.1 * np.sin(data[:, 0])
-    ward = AgglomerativeClustering(n_clusters=3)
-    model = ANFISRegressor(partition=ward, solver=VariableProjection(tol=0.1)).fit(data, target)
-    # Clusters are sought in standardised inputs and target together; the order is the clusterer's.
-    labels = ward.fit_predict(StandardScaler().fit_transform(np.column_stack([data, target])))
-    terms = model.initial_memberships_
-    found, widths = (
-        np.array([[terms[t][what] for t in rule] for rule in model.rules_])
-        for what in ("center", "width")
-    )
-    expected = [[data[labels == k].mean(axis=0), data[labels == k].std(axis=0)] for k in range(3)]
-    expected = np.array(expected)[np.argsort([m[0][0] for m in expected])]
-    order = np.argsort(found[:, 0])
-    assert_allclose(found[order], expected[:, 0], rtol=1e-9)
-    # No narrower than a tenth of the input's deviation.
-    least = 0.1 * data.std(axis=0)
-    assert_allclose(widths[order], np.maximum(expected[:, 1], least) * np.sqrt(3), rtol=1e-9)
-
-
 FREE = {"agreement": 0.0, "alpha": 1e-12, "solver": VariableProjection(tol=0.01, stiffness=0.0)}
 
 
@@ -237,18 +212,6 @@ def test_one_column_of_targets_is_the_vector_in_another_shape():
     assert_array_equal(column.consequents_, flat.consequents_[:, :, None])
 
 
-def test_same_target_twice():
-    given = {"agreement": 1e-3, "alpha": 1e-4}
-    alone = ANFISRegressor(n_mfs=2, solver=VariableProjection(stiffness=1e-3), **given).fit(X, Y)
-    twice = ANFISRegressor(n_mfs=2, solver=VariableProjection(stiffness=2e-3), **given).fit(
-        X, np.column_stack([Y, Y])
-    )
-    found = twice.predict(X)
-    assert_array_equal(found[:, 0], found[:, 1])
-    # Twice the cost has the same minimum, and the solver the same steps but for rounding.
-    assert_allclose(found[:, 0], alone.predict(X), rtol=0, atol=1e-7 * np.ptp(Y))
-
-
 def test_outputs_share_the_premises_and_have_their_own_consequents():
     targets = np.column_stack([Y, -5e6 * Y + 1.0, np.cos(X[:, 1] / 40.0)])
     model = ANFISRegressor(n_mfs=2, **FREE).fit(X, targets)
@@ -261,24 +224,6 @@ def test_outputs_share_the_premises_and_have_their_own_consequents():
     assert np.abs(error).max() < 1e-6
     for found in (model, quick().fit(X, targets)):
         assert_allclose(found.predict(X)[:, 1], -5e6 * found.predict(X)[:, 0] + 1.0, rtol=1e-9)
-
-
-# ----------------------------------------------------------------------------------------- coverage
-
-
-def test_coverage_is_near_one_amid_data_and_low_in_an_empty_cell():
-    data = np.random.default_rng(0).uniform(size=(1500, 2))
-    # Without the upper right quarter.
-    data = data[(data < 0.45).any(axis=1)]
-    model = ANFISRegressor(n_mfs=3, solver=VariableProjection(stiffness=1.0))
-    model.fit(data, np.sin(3 * data[:, 0]) + data[:, 1] ** 2)
-    assert model.coverage([[0.2, 0.2], [0.2, 0.8], [0.8, 0.2]]).min() > 0.95
-    axis = np.linspace(0.05, 0.95, 10)
-    square = np.stack(np.meshgrid(axis, axis), axis=-1).reshape(-1, 2)
-    coverage = model.coverage(square)
-    assert_array_equal(square[np.argmin(coverage)], [0.95, 0.95])
-    # In the corner its own rule, without data, has a share of 0.84 by either input: 0.3 are left.
-    assert coverage.min() < 0.4
 
 
 # ------------------------------------------------------------------------------ the same every time
@@ -336,12 +281,8 @@ def test_pickled_model_is_the_same_to_the_last_bit_and_small():
 def test_whole_numbers_lists_and_order_of_memory():
     whole = np.round(X).astype(np.int32)
     expected = quick().fit(whole.astype(float), Y)
-    for data in (
-        whole,
-        whole.tolist(),
-        np.asfortranarray(whole, dtype=float),
-        whole.astype(object),
-    ):
+    by_column = np.asfortranarray(whole, dtype=float)
+    for data in (whole, whole.tolist(), by_column, whole.astype(object)):
         model = quick().fit(data, Y.tolist())
         # Sums run along the memory: equal but for rounding.
         assert_allclose(model.predict(data), expected.predict(whole), rtol=0, atol=1e-10)

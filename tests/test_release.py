@@ -72,9 +72,8 @@ def test_one_release_writes_address_date_and_version(tmp_path, monkeypatch):
 )
 def test_no_release_of_what_is_not_ready(monkeypatch, url, answers, reason):
     release = script("release")
-    monkeypatch.setitem(
-        release["prepare"].__globals__, "git", lambda *arguments: answers.get(arguments[0], "")
-    )
+    shared = release["prepare"].__globals__
+    monkeypatch.setitem(shared, "git", lambda *arguments: answers.get(arguments[0], ""))
     with pytest.raises(SystemExit, match=reason):
         release["prepare"](url, True)
 

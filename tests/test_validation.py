@@ -43,8 +43,10 @@ def test_numbers_so_large_that_their_sum_overflows_are_finite(dtype):
 
 
 def test_check_is_switched_off_with_that_of_scikit_learn():
+    bad = np.array([[np.nan, 1.0]])
     with config_context(assume_finite=True):
-        check_finite(np.array([[np.nan, 1.0]]), "X", NAMES)
+        assert check_finite(bad, "X", NAMES) is None
+    assert "first at row 0" in message_of(bad)
 
 
 @pytest.mark.parametrize("missing", [None, np.nan, np.datetime64("NaT"), pd.NaT, pd.NA])

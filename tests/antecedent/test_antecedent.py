@@ -11,11 +11,9 @@ from .. import oracles
 
 
 def grid(*names_and_counts, inputs=None):
-    families = {"g": Gaussian, "b": Bell}
     names, counts = zip(*names_and_counts, strict=True)
-    return oracles.random_grid(
-        np.random.default_rng(1), [families[name] for name in names], counts, inputs
-    )
+    families = [{"g": Gaussian, "b": Bell}[name] for name in names]
+    return oracles.random_grid(np.random.default_rng(1), families, counts, inputs)
 
 
 def scattered(family, n_rules, inputs):
@@ -80,10 +78,8 @@ def test_without_terms_one_rule_always_fires(Z):
     assert antecedent.n_terms == 0
     assert antecedent.rule_terms.shape == (1, 0)
     assert antecedent.parameters.size == 0
-    for same in [
-        antecedent.with_parameters(np.empty(0)),
-        antecedent.change_units(np.ones(3), np.ones(3)),
-    ]:
+    moved = antecedent.change_units(np.ones(3), np.ones(3))
+    for same in (antecedent.with_parameters(np.empty(0)), moved):
         assert_array_equal(same.strengths(Z), np.ones((1, 60)))
 
 

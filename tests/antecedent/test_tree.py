@@ -31,14 +31,8 @@ def sides(found, Z):
 def by_paths(found, Z):
     """Strengths as products down the paths."""
     above = sides(found, Z)
-    return np.array(
-        [
-            np.prod(
-                [above[n] if up else 1.0 - above[n] for n, up in path] or [0 * Z[0] + 1], axis=0
-            )
-            for path in found.paths
-        ]
-    )
+    true = [[above[n] if up else 1.0 - above[n] for n, up in path] for path in found.paths]
+    return np.array([np.prod(path or [0 * Z[0] + 1], axis=0) for path in true])
 
 
 @SIZES
@@ -76,10 +70,8 @@ def test_gradient_and_gauss_newton_by_cuts_and_widths(agreement, order, n_output
     assert premise.size == 8
     x = 0.2 * g.normal(size=premise.size)
     evaluation = problem.evaluate(premise.parameters(x))
-    linearisation = problem.linearise(evaluation)
-    gradient, gauss_newton = premise.pull_back(
-        x, linearisation.gradient, linearisation.gauss_newton
-    )
+    raw = problem.linearise(evaluation)
+    gradient, gauss_newton = premise.pull_back(x, raw.gradient, raw.gauss_newton)
     slope = oracles.central_difference(lambda d: dense.cost(premise.parameters(d)), x, 1e-3)
     assert_allclose(gradient, slope, rtol=0, atol=1e-8 * np.abs(slope).max())
     jacobian = oracles.central_difference(premise.parameters, x, 1e-3)
@@ -125,10 +117,8 @@ def test_a_walk_from_the_root_meets_every_place_once(n_rules, rng):
     come[n_rules if n_rules > 1 else 0] = 1.0
     above = sides(found, Z)
     for k, (node, (up, down)) in enumerate(zip(order, ends, strict=True)):
-        come[up], come[down] = (
-            come[n_rules + k] * above[node],
-            come[n_rules + k] * (1 - above[node]),
-        )
+        here = come[n_rules + k]
+        come[up], come[down] = here * above[node], here * (1 - above[node])
     assert_allclose(come[:n_rules], found.strengths(Z), rtol=1e-9, atol=1e-14)
 
 
@@ -152,9 +142,7 @@ class TestOneTermEach:
 
     def test_three_cuts_of_an_input_on_one_path_are_refused_by_name(self):
         found = self.two_cuts(0.2, 1.5).split(0, 1, 1.8, -1.0)
-        with pytest.raises(
-            ValueError, match=r"Rule 0 has 3 terms of 'rate' \(at 0\.2, 1\.5, 1\.8\)"
-        ):
+        with pytest.raises(ValueError, match=r"Rule 0 has 3 terms of 'rate' \(at 0.2, 1.5, 1.8\)"):
             found.with_one_term_each(["time", "rate"])
 
     def test_terms_that_are_no_sides_are_refused(self):

@@ -9,12 +9,7 @@ from scipy.optimize import LinearConstraint, minimize
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
 from skanfis.bounds.certified import cuts_of
-from skanfis.bounds.construction import (
-    RuleOrder,
-    is_in_order,
-    nearest_in_order,
-    with_equal_widths,
-)
+from skanfis.bounds.construction import RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
 from skanfis.bounds.search import largest
 from skanfis.consequent import in_user_units
@@ -38,10 +33,8 @@ def tree(rng, n_inputs):
 
 def grid(rng, n_inputs):
     counts = rng.integers(2, 4, n_inputs)
-    thetas = [
-        np.stack([np.sort(rng.normal(size=n)), np.log(rng.uniform(0.3, 2.0, n))]) for n in counts
-    ]
-    return GridAntecedent.build([Gaussian] * n_inputs, range(n_inputs), thetas)
+    thetas = [[np.sort(rng.normal(size=n)), np.log(rng.uniform(0.3, 2.0, n))] for n in counts]
+    return GridAntecedent.build([Gaussian] * n_inputs, range(n_inputs), list(map(np.stack, thetas)))
 
 
 def scattered(rng, n_inputs):

@@ -47,9 +47,8 @@ def case(request, rng):
 
 def test_ranges_hold(case, rng):
     group, low, high, found = case
-    places = low + np.vstack([np.linspace(0.0, 1.0, 101)[:, None], rng.uniform(size=(60, 1))]) * (
-        high - low
-    )
+    parts = np.append(np.linspace(0.0, 1.0, 101), rng.uniform(size=60))[:, None]
+    places = low + parts * (high - low)
     for x in np.minimum(places, high):
         at = np.tile(x, (N_TERMS, 1))
         log_mu, gradient = group.family.log_value_and_gradient(at, group.theta)

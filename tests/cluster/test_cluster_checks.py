@@ -1,15 +1,15 @@
-"""What both clusterers have to do, whatever the order of the rows; errors say where."""
+"""What both clusterers have to do, whatever the order of the rows, and what they refuse."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 from sklearn.base import clone
 
-from skanfis import cluster
+from skanfis.cluster import FuzzyCMeans, SubtractiveClustering
 
 BOTH = pytest.mark.parametrize(
     "clusterer",
-    [cluster.SubtractiveClustering(0.3), cluster.FuzzyCMeans(4, m=1.5, random_state=0)],
+    [SubtractiveClustering(0.3), FuzzyCMeans(4, m=1.5, random_state=0)],
     ids=["subtractive", "fcm"],
 )
 
@@ -40,3 +40,21 @@ def test_errors_name_the_row_and_the_column(clusterer, rng):
         clone(clusterer).fit(X, sample_weight=[1, -2, *[1] * 8])
     with pytest.raises(ValueError, match=r"weight.*zero"):
         clone(clusterer).fit(X, sample_weight=np.zeros(10))
+
+
+@pytest.mark.parametrize(
+    ("clusterer", "message"),
+    [
+        (FuzzyCMeans(m=1.0), "'m' parameter"),
+        (FuzzyCMeans(init=np.zeros((2, 2))), r"init has shape \(2, 2\), but n_clusters=3"),
+        (FuzzyCMeans(init=np.full((3, 2), np.nan)), "init contains NaN"),
+        (FuzzyCMeans(11), "n_clusters=11 needs as many distinct rows .* there are 10"),
+        (SubtractiveClustering(0.0), "'radius' parameter"),
+        (SubtractiveClustering([0.5]), r"radius has shape \(1,\), but X has 2 columns"),
+        (SubtractiveClustering([0.5, -1.0]), "must be positive and finite"),
+        (SubtractiveClustering(accept=0.1), "reject=0.15 exceeds accept=0.1"),
+    ],
+)
+def test_bad_parameters_are_refused(rng, clusterer, message):
+    with pytest.raises(ValueError, match=message):
+        clusterer.fit(rng.normal(size=(10, 2)))

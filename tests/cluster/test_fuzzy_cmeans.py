@@ -116,17 +116,3 @@ class TestCoincidentCenters:
         else:
             model.fit(X)
         assert (np.ptp(model.cluster_centers_, axis=0).max() < 1e-3) == coincide
-
-
-@pytest.mark.parametrize(
-    ("setting", "message"),
-    [
-        ({"m": 1.0}, "'m' parameter"),
-        ({"init": np.zeros((2, 2))}, r"init has shape \(2, 2\), but n_clusters=3"),
-        ({"init": np.full((3, 2), np.nan)}, "init contains NaN"),
-        ({"n_clusters": 11}, "n_clusters=11 needs as many distinct rows .* there are 10"),
-    ],
-)
-def test_bad_parameters_are_refused(rng, setting, message):
-    with pytest.raises(ValueError, match=message):
-        FuzzyCMeans(**setting).fit(rng.normal(size=(10, 2)))

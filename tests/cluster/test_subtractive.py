@@ -106,17 +106,3 @@ class TestInvariance:
         assert found.widths_[1] == 0.0
         # Not even where another value turns up later.
         assert_array_equal(found.predict(np.insert(X, 1, -1e9, axis=1)), expected.labels_)
-
-
-@pytest.mark.parametrize(
-    ("setting", "message"),
-    [
-        ({"radius": 0.0}, "'radius' parameter"),
-        ({"radius": [0.5]}, r"radius has shape \(1,\), but X has 2 columns"),
-        ({"radius": [0.5, -1.0]}, "must be positive and finite"),
-        ({"accept": 0.1}, "reject=0.15 exceeds accept=0.1"),
-    ],
-)
-def test_bad_parameters_are_refused(rng, setting, message):
-    with pytest.raises(ValueError, match=message):
-        SubtractiveClustering(**setting).fit(rng.normal(size=(10, 2)))

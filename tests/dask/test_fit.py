@@ -94,13 +94,10 @@ def test_few_rows_are_fetched_and_trained_on_as_ever():
     table = frame(500).assign(weight=np.linspace(0.0, 2.0, 500), run=np.arange(500) // 50)
     lazy = dd.from_pandas(table, npartitions=3)
     settings = {"n_mfs": 2, "early_stopping": True}
+    kinds = (ANFISRegressor, table), (DaskANFISRegressor, lazy), (DaskANFISRegressor, table)
     here, there, eager = (
         model(**settings).fit(own[NAMES], own["error"], own["weight"], own["run"])
-        for model, own in (
-            (ANFISRegressor, table),
-            (DaskANFISRegressor, lazy),
-            (DaskANFISRegressor, table),
-        )
+        for model, own in kinds
     )
     assert_array_equal(there.consequents_, here.consequents_)
     assert list(there.feature_names_in_) == NAMES
@@ -258,11 +255,7 @@ def weighted(weight):
         (with_other_columns, ValueError, r"Partition 1: .*has the columns temperature, Rate"),
         (with_text, ValueError, r"Partition 1: .*holds text in column 'rate'"),
         (with_unknown_chunks, ValueError, r"Partition \d: X has 100 rows and y \d+"),
-        (
-            lambda: cut(100, data(300)[0], data(299)[1]),
-            ValueError,
-            "Partition 2: X has 100 rows and y 99",
-        ),
+        (lambda: cut(100, data(300)[0], data(299)[1]), ValueError, "Partition 2: .*100 .* y 99"),
         (of_other_partitions, ValueError, "y has 2 partitions, X has 3"),
         (
             lambda: (cut(100, data(300)[0])[0], data(300)[1]),

@@ -99,9 +99,8 @@ def test_seed_fixes_the_experiment_whatever_the_noise_and_the_devices():
     quiet = make_ofog(**small, noise=0.0)
     random_parts = PARTS[9:]
     assert not quiet[[*random_parts, "noise"]].any(axis=None)
-    assert_array_equal(
-        noisy[["time", "temperature", "rate"]], quiet[["time", "temperature", "rate"]]
-    )
+    given = ["time", "temperature", "rate"]
+    assert_array_equal(noisy[given], quiet[given])
     # The noise within the sine moves the gain of the other biases by far less than itself.
     assert_allclose(noisy[PARTS[:9]], quiet[PARTS[:9]], atol=1e-8)
     louder = make_ofog(**small, noise=3.0)
@@ -169,9 +168,8 @@ def test_phase_is_refused_exactly_where_a_device_reaches_a_quarter_turn():
 
 
 def test_sampling_keeps_to_the_durations_asked_for():
-    data = make_ofog(
-        n_devices=1, n_runs=1, duration=0.3, sampling_interval=0.1, dwell_time=0.1, random_state=0
-    )
+    short = {"duration": 0.3, "sampling_interval": 0.1, "dwell_time": 0.1}
+    data = make_ofog(n_devices=1, n_runs=1, **short, random_state=0)
     assert_allclose(data["time"], [0.0, 0.1, 0.2])
 
 

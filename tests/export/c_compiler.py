@@ -65,11 +65,10 @@ _CALL = """
 UNTOUCHED = -12345.0
 
 
-def gcc(arguments, folder):
-    """Run the compiler; its messages are the failure's."""
-    done = subprocess.run(
-        [COMPILER, *arguments], cwd=folder, capture_output=True, text=True, check=False
-    )
+def gcc(arguments, folder, compiler=COMPILER):
+    """It compiles without a message; else these are the failure's."""
+    command = [compiler, *arguments]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[:4000]
 
 

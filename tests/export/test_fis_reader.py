@@ -72,10 +72,9 @@ def test_rule_base_is_of_the_kind_that_suits_and_means_the_same(n_terms, rules, 
     rows = rng.uniform(0.0, 4.0, (20, len(n_terms)))
     for row, outputs in zip(rows, model.predict(rows), strict=True):
         # Term k stands at k and has deviation 1.
-        log_mu = [
-            sum(-((x - k) ** 2) / 2 for x, k in zip(row, rule, strict=True) if k) for rule in rules
-        ]
-        assert_allclose(outputs, average(np.exp(log_mu), np.arange(len(rules)) + 1.0))
+        asked = (np.array(rule) for rule in rules)
+        mu = [np.exp(-0.5 * np.sum((row - rule)[rule > 0] ** 2)) for rule in asked]
+        assert_allclose(outputs, average(mu, np.arange(len(rules)) + 1.0))
 
 
 REFUSED = [
@@ -97,11 +96,7 @@ REFUSED = [
     ("Range=[0 10]", f"Range=[0 {'1' * 200}]", "a number of size up to"),
     # membership functions
     ("MF1='flat'", "MF1='flat':'quadratic',[3]", "'quadratic' with 1 parameters is not supported"),
-    (
-        "MF1='flat'",
-        "MF1='flat':'constant',[3 4]",
-        "'constant' with 2 parameters is not .* linear with 3 are",
-    ),
+    ("MF1='flat'", "MF1='flat':'constant',[3 4]", "'constant' with 2 .* linear with 3 are"),
     # rules
     ("1 1, 2 1", "1 1 1, 2 1 (1) : 1", "3 numbers for 2 inputs"),
     ("1 1, 2 1", "1 1, 2 1 (0.5) : 1", "weight '0.5'; only weight 1"),
@@ -151,9 +146,8 @@ def test_refuses_many_rules_over_wide_consequents_before_memory_is_asked_for():
     # A short file: 20,000 rules share one linear consequent of 1,000 inputs.
     n_inputs, n_rules = 1000, 20_000
     head = system([0] * n_inputs, [(0,) * n_inputs])
-    text = head.replace("NumRules=1\n", f"NumRules={n_rules}\n") + f"\n{'0 , 1 (1) : 1'}" * (
-        n_rules - 1
-    )
+    text = head.replace("NumRules=1\n", f"NumRules={n_rules}\n")
+    text += "\n0 , 1 (1) : 1" * (n_rules - 1)
     with pytest.raises(ValueError, match="are 20,020,000 numbers; at most 20,000,000 are read"):
         parse_fis(text)
 

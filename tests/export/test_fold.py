@@ -55,13 +55,8 @@ SCALERS = {
 # that training has not moved has its corner on the edge of the box, where the last bit decides on
 # which side of it the tangent is taken.
 CASES = [
-    (
-        kind,
-        scaler,
-        ("clip", "nan" if kind == "triangles" else "linear", "nan")[place % 3],
-        1 + place % 2,
-    )
-    for place, (kind, scaler) in enumerate(product(KINDS, SCALERS))
+    (kind, scaler, ("clip", "nan" if kind == "triangles" else "linear", "nan")[i % 3], 1 + i % 2)
+    for i, (kind, scaler) in enumerate(product(KINDS, SCALERS))
 ]
 
 
@@ -251,10 +246,8 @@ def test_what_has_no_rules_is_refused():
         fold(3)
     with pytest.raises(TypeError, match="fitted ANFIS estimator"):
         fold(ANFISRegressor)
-    for unfitted in (
-        make_pipeline(StandardScaler(), ANFISRegressor()),
-        GridSearchCV(ANFISRegressor(), {}),
-    ):
+    pipe = make_pipeline(StandardScaler(), ANFISRegressor())
+    for unfitted in (pipe, GridSearchCV(ANFISRegressor(), {})):
         with pytest.raises(NotFittedError):
             fold(unfitted)
 

@@ -44,9 +44,8 @@ MIN_COVERAGE = 0.2
 def simulated():
     log = make_ofog(n_devices=1, n_runs=4, duration=1800, sampling_interval=20, random_state=0)
     rate = np.gradient(log["temperature"]) / 20.0
-    return log.assign(
-        output=COUNTS * log["output"] + 3e4, thermal_rate=rate, unused=np.ones(len(log))
-    )
+    log["output"] = COUNTS * log["output"] + 3e4
+    return log.assign(thermal_rate=rate, unused=np.ones(len(log)))
 
 
 @pytest.fixture(name="log")
@@ -139,9 +138,8 @@ def expected(model, X):
         refused |= rows & (policy in ("nan", "raise"))
     coverage = model.coverage(X)
     status = 1 * ~model.in_bounds(X) + 8 * refused + 4 * (~refused & (coverage < MIN_COVERAGE))
-    unsure = (np.abs(coverage - MIN_COVERAGE) < 1e-4) | (
-        np.abs(phase - model.base_.max_phase) < 1e-5
-    )
+    unsure = np.abs(coverage - MIN_COVERAGE) < 1e-4
+    unsure |= np.abs(phase - model.base_.max_phase) < 1e-5
     return rate, status, refused, unsure, policies
 
 
@@ -210,10 +208,8 @@ def test_no_answer_to_what_is_not_finite_or_has_no_rate(tmp_path):
 @needs_compiler
 def test_files_make_a_program_that_tests_itself(log, tmp_path):
     model, X = whole()
-    search = GridSearchCV(
-        model, {"residual__n_mfs": [1, 2]}, cv=KFold(2, shuffle=True, random_state=0)
-    )
-    search.fit(X, log["rate"])
+    folds = KFold(2, shuffle=True, random_state=0)
+    search = GridSearchCV(model, {"residual__n_mfs": [1, 2]}, cv=folds).fit(X, log["rate"])
     code = export_c_physics(search, tmp_path / "gyro-7", name="gyro", dtype="float", std="c89")
     assert (tmp_path / "gyro-7.c").read_text() == code.source
     flags = ["-std=c89", *STRICT, *SANITIZE, "-DGYRO_SELF_TEST", "-DGYRO_SELF_TEST_MAIN"]
@@ -265,10 +261,8 @@ def test_header_of_a_compensator_says_units_and_how_inputs_are_made(log, tmp_pat
         "MISRA C:2012",
     ):
         assert part in text
-    model = ResidualRegressor(
-        OpenLoopArcsineRegressor("output", "temperature"), quick([1, 1, 1, 1])
-    )
-    model.fit(X, log["rate"])
+    law = OpenLoopArcsineRegressor("output", "temperature")
+    model = ResidualRegressor(law, quick([1, 1, 1, 1])).fit(X, log["rate"])
     compensator = GyroCompensator(model, inputs, "rate", COUNTS, "counts", 25.0)
     text = told(export_c_compensator(compensator, tmp_path / "gyro", std="c99").header)
     assert "compensated rate: take it in the place of the raw rate" in text
@@ -326,11 +320,7 @@ def refused(log, base=None, residual=None):
     [
         ({"base": LinearRegression()}, TypeError, "base must be an OpenLoopArcsineRegressor"),
         ({"residual": LinearRegression()}, TypeError, "LinearRegression has no rules"),
-        (
-            {"residual": make_pipeline(PolynomialFeatures(), quick(n_mfs=1))},
-            ValueError,
-            "PolynomialFeatures",
-        ),
+        ({"residual": make_pipeline(PolynomialFeatures(), quick(1))}, ValueError, "Polynomial"),
         (
             {
                 "base": OpenLoopArcsineRegressor("output", "temperature", out_of_bounds="nan"),

@@ -203,9 +203,8 @@ def test_physics_and_policy(tmp_path, log, capsys):
     arguments += ["--write", "rules"]
     assert main([*arguments, "--output", str(out), "--c", "c99"]) == 0
     assert capsys.readouterr().err == ""
-    assert sorted(path.name for path in out.iterdir()) == sorted(
-        [*FILES, "compensator.c", "compensator.h"]
-    )
+    found = sorted(path.name for path in out.iterdir())
+    assert found == sorted([*FILES, "compensator.c", "compensator.h"])
     rules = (out / "rules.txt").read_text(encoding="utf-8")
     assert rules.startswith("rate [deg/s] = arcsin(output [deg/s]")
     assert "THEN rate beyond the law is " in rules
@@ -223,9 +222,7 @@ def test_targets_are_written_or_refused_by_name(tmp_path, log, capsys):
     assert main([*arguments, "--target", "px4:x"]) == 5
     told = capsys.readouterr().out
     assert "target         rate-table: it differs from the model by " in told
-    assert (
-        "REFUSED        px4:x: the model needs temperature and output, and this target says" in told
-    )
+    assert "REFUSED        px4:x: the model needs temperature and output, and this target" in told
     found = sorted(path.name for path in out.iterdir())
     assert found == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
     # What an earlier run has written goes with it, what is not the command's stays.
@@ -249,10 +246,7 @@ def one_run_without_levels(log):
             lambda log: log.assign(time=log["time"].round(-2)),
             "log.csv, line 3, column 'time': time does not increase",
         ),
-        (
-            lambda log: log.assign(temperature=20.0),
-            "log.csv, column 'temperature': the temperature spans 0",
-        ),
+        (lambda log: log.assign(temperature=20.0), "column 'temperature': the temperature spans 0"),
         (one_run_without_levels, "could not be checked: the log has 1 device(s), 1 run(s)"),
     ],
 )
@@ -275,10 +269,7 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, message, cap
         (["--units", "time=year"], "time has no unit 'year'"),
         (["--terms", "2,x"], "must be search, or numbers"),
         (["--terms", "2,2"], "has 2 numbers for 4 inputs: time, temperature, "),
-        (
-            ["--terms", "2", "--inputs", "time", "output"],
-            "has 1 number for 2 inputs: time, output.",
-        ),
+        (["--terms", "2", "--inputs", "time", "output"], "has 1 number for 2 inputs: time, output"),
         (["--terms", "2,2", "--inputs", "output"], "has 2 numbers for 1 input: output."),
         (["--physics", "--inputs", "temperature"], "needs the output"),
         (["--inputs", "rate"], "invalid choice: 'rate'"),
@@ -413,9 +404,8 @@ def test_a_glitch_is_named_by_its_line(tmp_path, log, capsys):
 
 def thermal_cycle(*turns, n_rows=300, lag=0.05):
     """A MEMS log: a bias that is a parabola of the temperature, and lags behind by its rate."""
-    temperature = np.concatenate(
-        [np.linspace(a, b, n_rows, endpoint=False) for a, b in pairwise(turns)]
-    )
+    legs = [np.linspace(a, b, n_rows, endpoint=False) for a, b in pairwise(turns)]
+    temperature = np.concatenate(legs)
     time = 10.0 * np.arange(temperature.size)
     bias = 0.2 + 0.01 * temperature + 1e-4 * temperature**2
     bias += lag * np.sign(np.gradient(temperature))
@@ -480,9 +470,8 @@ def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_p
     assert "record two more" in said
     assert "2 legs, 5 pieces of each" in said
     assert "written is     a constant, as recommended" in said
-    rates = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
-    assert rates.estimator.model.n_rules == 1
     compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
+    assert compensator.estimator.model.n_rules == 1
     assert (compensator.scale_factor, compensator.output_unit) == (131.0, "counts")
 
 

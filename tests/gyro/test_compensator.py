@@ -178,10 +178,7 @@ def of_law(**changes):
         (of_law(sagnac_factor=[float("nan")]), r"law\.sagnac_factor\[0\]: nan is not a number"),
         (of_law(sagnac_factor=[0.0, 1.0]), r"law\.sagnac_factor\[0\], in size: 0.0 is not"),
         (of_law(thermometer_lag=True), r"law\.thermometer_lag: True is not a number"),
-        (
-            of_law(thermometer_lag=1e60),
-            r"law\.thermometer_lag: 1e\+60 is not a number of size up to 1e\+50",
-        ),
+        (of_law(thermometer_lag=1e60), r"law\.thermometer_lag: 1e\+60 is not a number of size"),
         (of_law(minimum=[0.0]), r"law\.minimum: .* must be a list of 2 number"),
         (of_law(minimum=[1e30, 0.0]), "the law's minimum is above its maximum"),
         (of_law(thermometer_lag=5.0), "no column for the temperature's rate"),

@@ -27,10 +27,6 @@ def data():
     return log[["output", "temperature", "time"]], log["rate"].to_numpy()
 
 
-def compensator(**anfis):
-    return ResidualRegressor(OpenLoopArcsineRegressor(), quick(**anfis))
-
-
 def test_the_second_learns_what_the_first_leaves(rng):
     """A line and a parabola orthogonal to it: each part finds its own."""
     x = np.linspace(-1.0, 1.0, 41)[:, None]
@@ -46,10 +42,8 @@ def test_rounds_take_from_the_base_what_is_not_its_own(rng):
     """Two columns that go together: least squares in turn ends where least squares of both is."""
     x = rng.normal(size=(200, 2)) @ [[1.0, 0.7], [0.0, 0.7]]
     y = 2.0 * x[:, 0] - 1.0 * x[:, 1]
-    parts = [
-        make_pipeline(make_column_transformer(("passthrough", [j])), LinearRegression())
-        for j in (0, 1)
-    ]
+    columns = [make_column_transformer(("passthrough", [j])) for j in (0, 1)]
+    parts = [make_pipeline(column, LinearRegression()) for column in columns]
     slopes = {}
     for n_rounds in (1, 3, 60):
         model = ResidualRegressor(*parts, n_rounds=n_rounds).fit(x, y)

@@ -126,10 +126,9 @@ def test_numbers_have_three_digits(value, text):
 
 def test_the_allan_deviation_needs_every_row(log):
     rate, before, after = log["rate"], log["output"], log["after"]
+    lacking = after.where(after.index > 0)
     with pytest.raises(ValueError, match="after is NaN in some rows; leave out these runs"):
-        AllanDisplay.from_predictions(
-            rate, before, after.where(after.index > 0), sampling_interval=1.0
-        )
+        AllanDisplay.from_predictions(rate, before, lacking, sampling_interval=1.0)
 
 
 def test_bad_columns_are_named(log):

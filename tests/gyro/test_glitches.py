@@ -15,12 +15,10 @@ def found(log):
     return [row for row, _ in find_glitches(log, (log["output"] - log["rate"]).to_numpy())]
 
 
-@pytest.mark.parametrize(
-    ("part", "size"), [("output", 20.0), ("rate", -50.0), ("temperature", 40.0)]
-)
-def test_one_row_is_named(part, size):
+@pytest.mark.parametrize(("part", "by"), [("output", 20.0), ("rate", -50.0), ("temperature", 40.0)])
+def test_one_row_is_named(part, by):
     log, row = simulated(0), 77
-    log.loc[row, part] += size
+    log.loc[row, part] += by
     assert found(log) == [row]
 
 

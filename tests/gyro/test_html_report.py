@@ -4,7 +4,6 @@ import base64
 import io
 import re
 import sys
-from html.parser import HTMLParser
 
 import numpy as np
 import pandas as pd
@@ -24,30 +23,7 @@ from skanfis.gyro.displays import three_digits
 from skanfis.gyro.html_report import check_installed, report_page
 from skanfis.inspection import readability
 
-VOID = {"meta", "img", "br"}
-
-
-class Outline(HTMLParser):
-    """Tags, attributes and text; every tag must be closed in its turn."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.attributes, self.tags, self.text = [], [], [], []
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append(tag)
-        self.attributes += [(tag, *pair) for pair in attributes]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        self.text.append(data)
-
+from ..outline import Outline
 
 pytestmark = pytest.mark.usefixtures("given_weights", "coarse_report")
 
@@ -88,6 +64,10 @@ def page(calibration, options, coarse_report):
     return report_page(Results(calibration, options), TITLE)
 
 
+def text_of(calibration):
+    return Outline(report_page(Results(calibration, ReportOptions()), TITLE)).text
+
+
 @pytest.fixture
 def no_drawing(monkeypatch):
     """Pictures are made but not painted, which takes longer than all else."""
@@ -96,10 +76,10 @@ def no_drawing(monkeypatch):
 
 def test_is_well_formed_and_escaped(page):
     outline = Outline(page)
-    text = "".join(outline.text)
+    text = outline.text
     assert "Gyro compensation: <gyro> & co.csv" in text
     # What was typed is data; control signs are shown as such.
-    assert "script" not in outline.tags
+    assert "script" not in outline.names
     assert text.count(r"<script>alert('1')</script>\x00\u202e") == 4
     assert not {"\x00", "\u202e"} & set(text)
     # On a phone no table may push the page wider than the screen.
@@ -108,8 +88,8 @@ def test_is_well_formed_and_escaped(page):
 
 def test_needs_nothing_from_elsewhere(page):
     outline = Outline(page)
-    assert not {"script", "link", "iframe", "object"} & set(outline.tags)
-    sources = [value for _, name, value in outline.attributes if name in ("src", "href")]
+    assert not {"script", "link", "iframe", "object"} & set(outline.names)
+    sources = [own[name] for _, own in outline.tags for name in ("src", "href") if name in own]
     assert sources
     kinds = ("data:image/png;base64,", "data:text/csv;charset=utf-8;base64,")
     assert all(value.startswith(kinds) for value in sources)
@@ -119,7 +99,7 @@ def test_needs_nothing_from_elsewhere(page):
 
 def test_says_what_is_proven(calibration, page):
     results = Results(calibration, ReportOptions())
-    text = " ".join(" ".join(Outline(page).text).split())
+    text = Outline(page).text
     told = text[text.rindex("What is proven") : text.rindex("Can the rules be read?")]
     assert f"{results.shown(proven_bounds(calibration).largest)} °/s" in told
     assert "never against it proven" in told
@@ -130,7 +110,7 @@ def test_physics_shows_its_law(few_rivals, no_drawing):
     inputs = ("temperature", "temperature_rate", "output")
     settings = {"terms": (1, 1, 1), "physics": True, "outside": "linear"}
     calibration = calibration_of(log, inputs, **settings)
-    text = " ".join(Outline(report_page(Results(calibration, ReportOptions()), "law.csv")).text)
+    text = text_of(calibration)
     law, found = calibration.compensator.estimator.base_, calibration.rules[-1].model_
     assert f"{law.sagnac_factor_[0]:.8g}" in text
     assert rules_text(calibration).splitlines()[0] in text
@@ -162,7 +142,7 @@ def test_the_formula_of_what_is_simpler_can_be_computed(calibration, name):
 
 def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(calibration, no_drawing):
     cubic = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="cubic")
-    text = " ".join(Outline(report_page(Results(cubic, ReportOptions()), TITLE)).text)
+    text = text_of(cubic)
     assert "and the value at the edge is held" in text
     assert "largest compensation, proven" in text
     assert "addition to the arcsine law" not in text
@@ -171,24 +151,23 @@ def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(calibration,
 def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
     log = make_ofog(n_devices=1, n_runs=3, duration=600.0, rates=[0.0], random_state=0)
     calibration = calibration_of(log, inputs=("temperature",), terms=(2,), outside="nan")
-    text = " ".join(Outline(report_page(Results(calibration, ReportOptions()), "rest.csv")).text)
+    text = text_of(calibration)
     assert "°/h" in text
     assert "Scale-factor error against rate" not in text
     assert "there is no value" in text
 
 
 def test_the_verdict_comes_first(page, calibration):
-    text = "".join(Outline(page).text)
+    text = Outline(page).text
     verdict = calibration.verdict
-    assert (
-        verdict.recommended != verdict.model
-    )  # three rules, where the law of the sensor knows more
+    # Three rules, where the law of the sensor knows more.
+    assert verdict.recommended != verdict.model
     title = "Use the arcsine law instead of the fuzzy rules"
     assert title in text[: text.index("Summary")]
     assert "are of the fuzzy rules, as --write asks" in text
     assert f"leaves {three_digits(verdict.rms['arcsine law'])} °/s RMS" in text
     simple = calibration_of(calibration.log, terms=(1, 1, 1, 1), write="recommended")
-    text = "".join(Outline(report_page(Results(simple, ReportOptions()), TITLE)).text)
+    text = text_of(simple)
     model = next(each for each in simple.simpler if each.name == "arcsine law").estimator.base_
     assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What is written") :]
     assert "are of the arcsine law, as recommended" in text
@@ -201,7 +180,7 @@ def test_one_unit_throughout(page, calibration, no_drawing, monkeypatch):
     hourly = report_page(Results(calibration, ReportOptions()), TITLE)
     rms = np.sqrt(np.mean((calibration.after - calibration.rate)[calibration.in_range] ** 2))
     for text, unit, factor, other in ((page, "°/s", 1.0, "°/h"), (hourly, "°/h", 3600.0, "°/s")):
-        text = " ".join(Outline(text).text)
+        text = Outline(text).text
         told = text[text.index("How it was checked") : text.index("Figures of merit")]
         assert unit in told
         assert other not in told
@@ -210,8 +189,8 @@ def test_one_unit_throughout(page, calibration, no_drawing, monkeypatch):
 
 def test_every_picture_says_what_it_shows_and_has_its_data(page, calibration):
     outline = Outline(page)
-    alternatives = [value for *which, value in outline.attributes if which == ["img", "alt"]]
-    assert len(set(alternatives)) == outline.tags.count("img") >= 8
+    alternatives = [own["alt"] for tag, own in outline.tags if tag == "img"]
+    assert len(set(alternatives)) == len(alternatives) >= 8
     for subject in ("time", "temperature", "scale-factor", "warming", "rows over", "held-out",
                     "Coverage", "Membership"):  # fmt: skip
         assert any(subject.lower() in text.lower() for text in alternatives), subject
@@ -244,16 +223,13 @@ def test_the_way_to_get_what_is_missing_is_said(calibration, monkeypatch, no_dra
     with pytest.raises(ImportError, match="the report needs weasyprint: pip install weasyprint"):
         check_installed(pdf=True)
     monkeypatch.setitem(sys.modules, "jinja2", None)
-    for make in (
-        check_installed,
-        lambda: report_page(Results(calibration, ReportOptions()), "log.csv"),
-    ):
+    for make in (check_installed, lambda: text_of(calibration)):
         with pytest.raises(ImportError, match="pip install jinja2"):
             make()
 
 
 def test_limits_on_both_sides_of_the_figure(page):
-    text = " ".join(Outline(page).text)
+    text = Outline(page).text
     section = text[text.index("Limits of the specification") : text.index("Pictures")]
     assert re.findall(r"pass|fail|not measured", section) == ["pass", "fail", "not measured"]
     assert "1 of 3 limits are kept; not kept: residual rms; could not be measured" in text

@@ -49,18 +49,17 @@ def test_units_are_converted(tmp_path, part, unit, values, expected):
     np.testing.assert_allclose(read[part], expected, atol=1e-12)
 
 
-def test_runs_of_two_devices_with_one_label_are_told_apart(tmp_path):
-    frame = pd.DataFrame({"temperature": 20.0, "output": 1.0, "rate": 1.0}, index=range(4))
-    frame["device"], frame["run"] = ["a", "a", "b", "b"], [1, 2, 1, 2]
-    read = read_log(table(tmp_path, frame))
-    assert list(read["run"]) == ["a / 1", "a / 2", "b / 1", "b / 2"]
-
-
-def test_runs_whose_labels_read_alike_are_numbered(tmp_path):
-    frame = pd.DataFrame({"temperature": 20.0, "output": 1.0, "rate": 1.0}, index=range(3))
-    frame["device"], frame["run"] = ["x", "x / y", "w"], ["y / z", "z", "z"]
-    read = read_log(table(tmp_path, frame))
-    assert list(read["run"]) == ["x / y / z", "x / y / z (2)", "w / z"]
+@pytest.mark.parametrize(
+    ("device", "run", "labels"),
+    [
+        (["a", "a", "b", "b"], [1, 2, 1, 2], ["a / 1", "a / 2", "b / 1", "b / 2"]),
+        # Those that read alike are numbered.
+        (["x", "x / y", "w"], ["y / z", "z", "z"], ["x / y / z", "x / y / z (2)", "w / z"]),
+    ],
+)
+def test_runs_of_two_devices_are_told_apart(tmp_path, device, run, labels):
+    frame = pd.DataFrame({"device": device, "run": run}).assign(temperature=20, output=1, rate=1)
+    assert list(read_log(table(tmp_path, frame))["run"]) == labels
 
 
 @pytest.mark.parametrize(

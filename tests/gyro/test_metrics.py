@@ -130,11 +130,7 @@ AT_REST = {"rate": [0.0, 0.0]}
             {"error": [1, 2, 3], "temperature_rate": [1, 2, 3], "temperature": [2, 4, 6]},
             INDEPENDENT,
         ),
-        (
-            "bias_temperature_sensitivity",
-            {"error": [1, 2], "temperature": [5, 5]},
-            "temperature never changes",
-        ),
+        ("bias_temperature_sensitivity", {"error": [1, 2], "temperature": [5, 5]}, "never changes"),
         ("bias_repeatability", {"error": [1, 2], "run": [0, 0], **AT_REST}, "There is 1 run"),
         ("bias_stability_10s", {"error": [1, 2], "time": [1, 1], **AT_REST}, "time must increase"),
         ("bias_stability_10s", {"error": [1, 2], "time": [0, 60], **AT_REST}, "are 60 s apart"),

@@ -91,19 +91,13 @@ def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, capsys):
 
 @pytest.mark.usefixtures("files")
 def test_apply_refuses_options_of_a_calibration_by_name(tmp_path, capsys):
-    for arguments, told in (
-        (
-            ["--apply", "model.json", "--terms", "1", "--write", "law"],
-            "--terms, --write: of no use with --apply.",
-        ),
-        (
-            ["--apply", "model.json", "--scale-factor", "3"],
-            "--scale-factor: of no use with --apply.",
-        ),
-        (["--trust"], "--trust: of no use without --apply."),
+    for typed, told in (
+        ("--apply model.json --terms 1 --write law", "--terms, --write: of no use with --apply."),
+        ("--apply model.json --scale-factor 3", "--scale-factor: of no use with --apply."),
+        ("--trust", "--trust: of no use without --apply."),
     ):
         with pytest.raises(SystemExit, match="2"):
-            main(["log.csv", *arguments])
+            main(["log.csv", *typed.split()])
         assert told in capsys.readouterr().err
     assert not list(tmp_path.glob("log-compen*"))
 
@@ -151,9 +145,7 @@ def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path):
         (folder / "part.csv").write_text("")
     with _staged(tmp_path) as folder:
         (folder / "done.csv").write_text("")
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
-        [alive.name, other.name, "done.csv"]
-    )
+    assert {path.name for path in tmp_path.iterdir()} == {alive.name, other.name, "done.csv"}
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of another kind")

@@ -131,9 +131,8 @@ def test_nonlinearity_is_not_that_of_the_noise(rng):
 def test_what_is_missing_is_said(log):
     rest = log.assign(rate=0.0, before=log["before"] - log["rate"], after=0.001)
     table = figures(report_of(rest, *ALL, full_scale=100.0))
-    assert table.loc["scale_factor_error", "note"] == (
-        "No scale factor: the rate is 0 deg/s in all rows."
-    )
+    note = "No scale factor: the rate is 0 deg/s in all rows."
+    assert table.loc["scale_factor_error", "note"] == note
     assert np.isnan(table.loc["scale_factor_error", "before"])
     few = figures(report_of(log[log["run"] < 2], "run"))
     assert few.loc["bias_repeatability", "note"] == "no interval: fewer than 5 runs"

@@ -9,7 +9,6 @@ import pandas as pd
 import polars as pl
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.integrate import solve_ivp
 from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
@@ -35,22 +34,6 @@ def test_rate_of_a_ramp_comes_up_with_the_time_constant(steps):
     X = np.column_stack([time, 5.0 - 0.02 * time])
     rate = ThermalRate(30.0, time=0).fit_transform(X).ravel()
     assert_allclose(rate, -0.02 * (1 - np.exp(-(time - time[0]) / 30)), rtol=1e-9)
-
-
-def test_temperature_less_its_rate_is_that_of_a_body_that_lags(rng):
-    time = np.cumsum(rng.uniform(1, 30, 60))
-    temperature = np.cumsum(rng.normal(size=60))
-    solution = solve_ivp(
-        lambda t, y: (np.interp(t, time, temperature) - y) / 80.0,
-        time[[0, -1]],
-        temperature[:1],
-        t_eval=time,
-        max_step=0.2,
-        rtol=1e-8,
-    )
-    X = np.column_stack([time, temperature])
-    rate = ThermalRate(80.0, time=0).fit_transform(X).ravel()
-    assert_allclose(temperature - 80.0 * rate, solution.y[0], atol=1e-4)
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
@@ -140,10 +123,7 @@ def test_new_columns_have_names_and_keep_the_index(log):
         ({"time_constant": 0.0}, "time_constant=0.0 must be a positive number"),
         ({"time_constant": np.inf}, "time_constant=inf must be a positive number"),
         ({"time_constant": "1 min"}, "time_constant='1 min' must be a positive"),
-        (
-            {"time": "seconds"},
-            r"time='seconds' is no column of X, which has 4 feature\(s\): \['t', 'T'",
-        ),
+        ({"time": "seconds"}, r"time='seconds' is no column of X.* 4 feature\(s\): \['t', 'T'"),
         ({"time": 4}, "time=4 is no column of X, which has 4 feature"),
         ({"time": True}, "time=True is no column of X"),
         ({"run": "t"}, "time='t' and run='t' are one column"),

@@ -202,8 +202,11 @@ def test_every_picture_takes_every_name():
         output_names=(other,),
         term_names=tuple(f"{(name, other)[t % 2]}{t}" for t in range(A_GRID.antecedent.n_terms)),
     )
-    drawn(MembershipDisplay.from_estimator(model))
-    drawn(ResponseSurfaceDisplay.from_estimator(model, None, [name, f"{other}2"]))
+    labels = [as_label(name) for name in model.input_names]
+    memberships = drawn(MembershipDisplay.from_estimator(model))
+    assert [axes.get_xlabel() for axes in memberships.axes_] == labels
+    surface = drawn(ResponseSurfaceDisplay.from_estimator(model, None, model.input_names[:2]))
+    assert [surface.ax_.get_xlabel(), surface.ax_.get_ylabel()] == labels[:2]
 
 
 def test_a_title_names_a_few_of_the_inputs_that_are_held():

@@ -75,11 +75,8 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
     X = rows_of(model, 1.0, 30)
     display = EffectsDisplay.from_estimator(model, X)
     for curve in display.curves:
-        group = next(
-            one
-            for one in model.antecedent.groups
-            if model.input_names[one.inputs[0]] == curve["input"]
-        )
+        groups = {model.input_names[one.inputs[0]]: one for one in model.antecedent.groups}
+        group = groups[curve["input"]]
         expected = group.family.value(np.tile(curve["points"], (group.n_terms, 1)), group.theta)
         assert_allclose(curve["terms"], expected, atol=1e-9)
     fewer = EffectsDisplay.from_estimator(model, X, max_shown=1)
@@ -103,9 +100,8 @@ def test_the_band_is_the_deviation_of_the_mean_over_other_inputs():
 
 def test_a_category_is_drawn_by_its_levels():
     X, y = categories()
-    encoder = make_column_transformer(
-        (OneHotEncoder(sparse_output=False), ["fibre"]), remainder="passthrough"
-    )
+    encoder = OneHotEncoder(sparse_output=False)
+    encoder = make_column_transformer((encoder, ["fibre"]), remainder="passthrough")
     model = make_pipeline(encoder, quick(n_mfs=[2, 1, 1, 1])).fit(X, y)
     for table in (X, None):
         display = drawn(EffectsDisplay.from_estimator(model, table))
@@ -118,10 +114,8 @@ def test_a_category_is_drawn_by_its_levels():
         for level, mean in zip("abc", curve["mean"], strict=True):
             rows = X.assign(fibre=level, rate=rate)
             assert_allclose(mean, model.predict(rows).sum() / n, atol=1e-9)
-        labels = [
-            one.get_text() for one in display.axes_[display.curves.index(curve)].get_xticklabels()
-        ]
-        assert labels == ["a", "b", "c"]
+        axes = display.axes_[display.curves.index(curve)]
+        assert [one.get_text() for one in axes.get_xticklabels()] == ["a", "b", "c"]
 
 
 def test_axes_may_be_given():

@@ -51,10 +51,8 @@ def test_tables_hold_the_measures(model):
 def test_nothing_is_found_at_the_limits():
     found = found_of(A_GRID, printed_errors=np.array([1.05]))
     assert found.findings == []
-    assert str(found).splitlines() == [
-        "84 numbers; the text as printed errs 5 % more than the model.",
-        WELL,
-    ]
+    line = "84 numbers; the text as printed errs 5 % more than the model."
+    assert str(found).splitlines() == [line, WELL]
     assert found.rules["if"][0] == "time is low AND chip temperature is low AND rate is low"
     assert found_of(A_GRID, errors=np.zeros(1)).line == "84 numbers"
 

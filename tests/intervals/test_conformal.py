@@ -5,6 +5,7 @@ import warnings
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn import config_context
 from sklearn.base import clone
 from sklearn.dummy import DummyRegressor
 from sklearn.frozen import FrozenEstimator
@@ -219,27 +220,20 @@ def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(me
     assert (np.diff(upper - lower, axis=0) > 0.0).all()
 
 
-def test_groups_and_weights_reach_a_regressor_in_a_pipeline(metadata_routing):
+def test_groups_and_weights_reach_a_regressor_in_a_pipeline():
     rng = np.random.default_rng(9)
     X, y = bent(rng, 60)
     run, weight = np.arange(60) // 6, rng.integers(0, 3, size=60).astype(float)
-    rules = quick(**SHORT).set_fit_request(sample_weight=True, groups=True)
-    scaler = StandardScaler().set_fit_request(sample_weight=True)
-    given = {"sample_weight": weight, "groups": run}
-    model = ConformalRegressor(make_pipeline(scaler, rules), cv=5).fit(X, y, **given)
+    with config_context(enable_metadata_routing=True):
+        rules = quick(**SHORT).set_fit_request(sample_weight=True, groups=True)
+        scaler = StandardScaler().set_fit_request(sample_weight=True)
+        model = ConformalRegressor(make_pipeline(scaler, rules), cv=5)
+        model.fit(X, y, sample_weight=weight, groups=run)
     folds = list(GroupKFold(5).split(X, y, run))
     for estimator, (train, _) in zip(model.estimators_, folds, strict=True):
         alone = StandardScaler().fit(X[train], sample_weight=weight[train])
         fitted = quick(**SHORT).fit(alone.transform(X[train]), y[train], weight[train], run[train])
         assert_allclose(estimator.predict(X), fitted.predict(alone.transform(X)), rtol=1e-12)
-
-
-@pytest.fixture
-def metadata_routing():
-    from sklearn import config_context
-
-    with config_context(enable_metadata_routing=True):
-        yield
 
 
 RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
@@ -252,11 +246,7 @@ RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
         ("needs 9 groups or more; there are 8", {}, {"groups": np.arange(24) // 3}),
         ("single group", {}, {"groups": np.zeros(24)}),
         ("leaves out rows, not groups", {"method": "loo"}, {"groups": np.arange(24)}),
-        (
-            r"tells nothing of its noise.* another method",
-            {"method": "loo", "estimator": BayesianRidge()},
-            {},
-        ),
+        ("nothing of its noise.* another", {"method": "loo", "estimator": BayesianRidge()}, {}),
         ("not have: use scaled=False", {"estimator": LinearRegression()}, {}),
         ("every row must be held out once", {"cv": ShuffleSplit(2, random_state=0)}, {}),
         ("An iterator can be used once only", {"cv": iter([])}, {}),

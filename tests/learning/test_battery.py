@@ -13,7 +13,7 @@ from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
 
 from .. import oracles
-from .test_varpro import planted
+from .test_varpro import assert_is_as_planted, planted
 
 ITERATIVE = sorted(set(SOLVERS) - {"lse"})
 KINDS = ["one input", "grid", "bells", "two families", "scattered"]
@@ -60,23 +60,17 @@ def test_at_the_truth_there_is_nothing_to_gain(name, kind):
     # The first evaluation is a difference of numbers of size one.
     assert result.loss_curve[0] < 1e-13
     assert result.evaluation.mean_squared_error < 1e-13
-    Z = np.random.default_rng(9).uniform(-1.5, 1.5, (len(rows.X.T), 100))
-    expected = oracles.dense_design(premise.antecedent, truth, Z, 1) @ beta
-    parameters = result.evaluation.antecedent.parameters
-    phi = oracles.dense_design(premise.antecedent, parameters, Z, 1)
-    found = rows.targets.offset + rows.targets.scale * (phi @ result.evaluation.coefficients)
-    assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
+    assert_is_as_planted(rows, premise, truth, beta, result.evaluation)
 
 
 @every_solver
 def test_loss_curve_begins_at_the_start(name, rng):
     rows, premise = noisy()
+    problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8, slope=1e-8))
     for start in (None, 0.1 * rng.normal(size=premise.size)):
         result = solve(name, rows, premise, start=start)
-        problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8, slope=1e-8))
-        there = problem.evaluate(
-            premise.parameters(np.zeros(premise.size) if start is None else start)
-        )
+        at = np.zeros(premise.size) if start is None else start
+        there = problem.evaluate(premise.parameters(at))
         assert_allclose(result.loss_curve[0], there.mean_squared_error, rtol=1e-9)
 
 

@@ -15,10 +15,6 @@ def table(rng, n_rows=N_ROWS):
     return rng.normal(size=(n_rows, 3)) * [1.0, 1e-6, 1e6] + [0.0, 1e-3, -1e7]
 
 
-def fields(scale):
-    return np.stack([scale.offset, scale.scale, scale.minimum, scale.maximum])
-
-
 @pytest.mark.parametrize("weighted", [False, True])
 def test_statistics_are_mean_deviation_and_range(rng, weighted):
     values, weight = table(rng), rng.uniform(0.01, 5.0, N_ROWS) if weighted else None

@@ -123,22 +123,25 @@ class Dense:
         return total
 
 
+def assert_is_the_marginal_likelihood(rows, antecedent, order, penalty):
+    """To the last constant, so that rule bases of any size and order can be compared."""
+    found = posterior(rows, antecedent, order, penalty)
+    dense = Dense(rows, antecedent, order, penalty)
+    expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
+    assert_allclose(in_full(found), expected + prior_of_pulls(penalty), atol=1e-7)
+    assert_allclose(found.noise_variance, variance, rtol=1e-5)
+
+
 class TestAtGivenPremises:
     @pytest.mark.theory
     @pytest.mark.parametrize("n_rules", [1, 2, 3])
     @pytest.mark.parametrize("order", [0, 1])
     @pytest.mark.parametrize("n_outputs", [1, 2])
     def test_it_is_the_marginal_likelihood_of_normal_data(self, order, n_rules, n_outputs):
-        # To the last constant, so that rule bases of any size and order can be compared.
         g = np.random.default_rng(n_rules)
-        rows = oracles.bumpy_rows(g, 14, 1, n_outputs)
-        antecedent = rules(g, n_rules)
+        rows, antecedent = oracles.bumpy_rows(g, 14, 1, n_outputs), rules(g, n_rules)
         for penalty in PENALTIES:
-            found = posterior(rows, antecedent, order, penalty)
-            dense = Dense(rows, antecedent, order, penalty)
-            expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
-            assert_allclose(in_full(found), expected, atol=1e-7)
-            assert_allclose(found.noise_variance, variance, rtol=1e-5)
+            assert_is_the_marginal_likelihood(rows, antecedent, order, penalty)
 
     def test_effective_parameters_are_the_trace_of_the_hat_matrix(self):
         g = np.random.default_rng(4)
@@ -162,12 +165,7 @@ class TestAtGivenPremises:
         problem = SeparableProblem(rows, antecedent, order, FIRST)
         for plain in PENALTIES:
             penalty = with_pulls(plain, problem.common_line, g)
-            found = posterior(rows, antecedent, order, penalty)
-            dense = Dense(rows, antecedent, order, penalty)
-            expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
-            expected += prior_of_pulls(penalty)
-            assert_allclose(in_full(found), expected, atol=1e-6)
-            assert_allclose(found.noise_variance, variance, rtol=1e-5)
+            assert_is_the_marginal_likelihood(rows, antecedent, order, penalty)
 
 
 def at_fixed_premises(seed):
@@ -355,10 +353,8 @@ class TestPremises:
         # The noise is held where the prior of the weight is concerned.
         at, penalty = at_fixed_premises(seed)
         g = np.random.default_rng(seed)
-        premises = {
-            "displacement": 0.2 * g.normal(size=6),
-            "curvature": 10.0 ** g.uniform(-4.0, 0.0, 6),
-        }
+        premises = {"displacement": 0.2 * g.normal(size=6)}
+        premises["curvature"] = 10.0 ** g.uniform(-4.0, 0.0, 6)
         penalty = replace(penalty, stiffness=1e-3)
         for _ in range(100):
             penalty = reestimated(at(penalty, **premises), ["stiffness"])

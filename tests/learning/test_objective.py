@@ -32,9 +32,8 @@ def dead_rule(rng):
 
 def dead_term(rng):
     """A grid whose last term on the first input lies outside the data."""
-    thetas = [
-        Gaussian.start(c, np.ones(c.size), 0.6) for c in (np.array([-1, 1, 90]), np.array([-1, 1]))
-    ]
+    centers = np.array([-1, 1, 90]), np.array([-1, 1])
+    thetas = [Gaussian.start(c, np.ones(c.size), 0.6) for c in centers]
     return GridAntecedent.build([Gaussian, Gaussian], [0, 1], thetas)
 
 
@@ -47,13 +46,7 @@ def duplicated_rule(rng):
 
 CASES = {
     # antecedent from rng, order, outputs, weighted, and the consequents' inputs if not all
-    "consequents in one input": (
-        lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2]),
-        1,
-        2,
-        True,
-        [1],
-    ),
+    "slopes of one": (lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2]), 1, 2, True, [1]),
     "rules listed one by one": (lambda g: oracles.random_table(g, inputs=2), 1, 1, True),
     "grid of gaussians": (lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2]), 1, 1, False),
     "grid of bells": (lambda g: oracles.random_grid(g, [Bell] * 2, [2, 3]), 1, 1, True),
@@ -147,9 +140,8 @@ def test_gauss_newton_is_the_schur_complement(case):
 def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
     # Solving with one factorisation and projecting with another is 4 % wrong here (anchors.md).
     g = np.random.default_rng(3)
-    case = Case(
-        duplicated_rule(g), 1, oracles.bumpy_rows(g, 250), Penalty(alpha=alpha, slope=alpha)
-    )
+    penalty = Penalty(alpha=alpha, slope=alpha)
+    case = Case(duplicated_rule(g), 1, oracles.bumpy_rows(g, 250), penalty)
     point = case.problem.antecedent.parameters  # the two rules are the same still
     linearisation = case.problem.linearise(case.problem.evaluate(point))
     # Rounding grows by 1 / alpha along what the two rules leave open, in the dense problem too.

@@ -44,10 +44,8 @@ def test_gaps_are_what_moves(antecedent, rng):
     for displacement in in_the_box(premise, rng, 5):
         for j, places in locations(antecedent, premise.parameters(displacement)).items():
             ends = span(start[j], j, MARGIN)
-            changes = [
-                np.log(np.diff(np.concatenate([ends[:1], p, ends[1:]]))) for p in (places, start[j])
-            ]
-            change = changes[0] - changes[1]
+            gaps = [np.diff([ends[0], *own, ends[1]]) for own in (places, start[j])]
+            change = np.log(gaps[0]) - np.log(gaps[1])
             own = np.array([int(t[0]) for _, _, t in terms(antecedent, at)[j]])
             assert_allclose(np.diff(change), UNIT * displacement[own], rtol=1e-7, atol=1e-9)
 
@@ -57,9 +55,8 @@ def test_widths_go_with_the_mean_distance_to_the_neighbours(antecedent, rng):
     premise = Premise.of(antecedent, LOW, HIGH)
     raw = antecedent.parameters
     for displacement in in_the_box(premise, rng, 3):
-        moved, by_hand = (
-            terms(antecedent, v) for v in (premise.parameters(displacement), raw + displacement)
-        )
+        moved = terms(antecedent, premise.parameters(displacement))
+        by_hand = terms(antecedent, raw + displacement)
         start = locations(antecedent, raw)
         for j, own in moved.items():
             growth = np.log(distances(np.array([t[0] for _, _, t in own])) / distances(start[j]))

@@ -31,10 +31,8 @@ def planted(rng, n_rows=600, noise=0.1):
     By the fourth none does, by the fifth the last one alone.
     """
     X = rng.uniform(-1.7, 1.7, (n_rows, 5))
-    slopes = np.array(
-        [[1.0, 0.7, 0.5, 0.0, 0.0], [1.0, 0.7, -1.0, 0.0, 0.0], [-1.0, 0.7, 2.0, 0.0, 0.6]]
-    )
-    values = np.array([0.0, 1.0, -1.0]) + X @ slopes.T
+    slopes = [[1.0, 0.7, 0.5, 0.0, 0.0], [1.0, 0.7, -1.0, 0.0, 0.0], [-1.0, 0.7, 2.0, 0.0, 0.6]]
+    values = np.array([0.0, 1.0, -1.0]) + X @ np.transpose(slopes)
     y = np.sum(TREE.strengths(X.T).T * values, axis=1)
     return X, y + noise * rng.standard_normal(n_rows)
 

@@ -153,9 +153,8 @@ class TestOnKnownProblems:
         # |A x - b|^2 / 2 + stiffness |x|^2 / 2
         A, b = np.array([[2.0, 1.0], [0.0, 1.0], [1.0, 1.0]]), np.array([1.0, -0.5, 0.7])
         problem = Residuals(lambda x: A @ x - b, lambda x: A)
-        result = varpro(
-            problem, Box([-3, -3], [3, 3]), max_iter=100, tol=1e-12, stiffness=stiffness
-        )
+        box = Box([-3, -3], [3, 3])
+        result = varpro(problem, box, max_iter=100, tol=1e-12, stiffness=stiffness)
         expected = np.linalg.solve(A.T @ A + stiffness * np.eye(2), A.T @ b)
         assert_allclose(result.evaluation.x, expected, rtol=1e-5, atol=1e-7)
         assert result.n_iter < 12  # its curvature is known too
@@ -193,6 +192,17 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
     return StandardisedData.of(X, y), premise, truth, beta
 
 
+def assert_is_as_planted(rows, premise, truth, beta, evaluation):
+    """At new rows."""
+    Z = np.random.default_rng(9).uniform(-1.5, 1.5, (len(rows.X.T), 100))
+    expected, phi = (
+        oracles.dense_design(premise.antecedent, parameters, Z, 1)
+        for parameters in (truth, evaluation.antecedent.parameters)
+    )
+    found = rows.targets.offset + rows.targets.scale * (phi @ evaluation.coefficients)
+    assert_allclose(found, expected @ beta, atol=1e-6 * rows.targets.scale[0])
+
+
 def solve(rows, premise, alpha=1e-8, **settings):
     problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=alpha, slope=alpha))
     return problem, varpro(problem, premise, **({"max_iter": 200, "tol": 1e-6} | settings))
@@ -206,13 +216,7 @@ class TestOnRuleBases:
         rows, premise, truth, beta = planted(kind, seed)
         _, result = solve(rows, premise, alpha=1e-14, max_iter=500)
         assert result.loss_curve[0] > 1e-6
-        Z = np.random.default_rng(9).uniform(-1.5, 1.5, (len(rows.X.T), 100))
-        expected = oracles.dense_design(premise.antecedent, truth, Z, 1) @ beta
-        phi = oracles.dense_design(
-            premise.antecedent, result.evaluation.antecedent.parameters, Z, 1
-        )
-        found = rows.targets.offset + rows.targets.scale * (phi @ result.evaluation.coefficients)
-        assert_allclose(found, expected, atol=1e-6 * rows.targets.scale[0])
+        assert_is_as_planted(rows, premise, truth, beta, result.evaluation)
 
     @pytest.mark.parametrize("kind", ["grid", "bells", "scattered"])
     def test_no_bounded_minimiser_of_scipy_finds_less(self, kind):

@@ -5,15 +5,16 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.membership import FAMILIES as EVERY_FAMILY
-from skanfis.membership import MEMBERSHIPS, Bell, Gaussian, membership_families
-
-from ..oracles import (
-    by_formula,
-    central_difference,
-    complex_step,
-    corners,
-    textbook_membership,
+from skanfis.membership import (
+    MEMBERSHIPS,
+    Bell,
+    Gaussian,
+    SigmoidDifference,
+    SigmoidProduct,
+    membership_families,
 )
+
+from ..oracles import by_formula, central_difference, complex_step, corners, textbook_membership
 
 # What sets families apart. Whatever else is added is taken for smooth, one at its center, and
 # falling to both sides.
@@ -116,10 +117,9 @@ def test_value_is_the_formula_in_papers(family, rng):
 def test_log_value_is_the_logarithm_of_the_value(family, rng):
     theta = random_theta(family, rng)
     x = points(family, theta, NEAR)
+    expected = np.log(floored(family, x, theta))
     # Where mu is nearly one its logarithm is known to the last bit of one only.
-    assert_allclose(
-        family.log_value(x, theta), np.log(floored(family, x, theta)), rtol=1e-12, atol=1e-15
-    )
+    assert_allclose(family.log_value(x, theta), expected, rtol=1e-12, atol=1e-15)
 
 
 @FAMILIES
@@ -190,13 +190,9 @@ def test_change_of_units_moves_term_and_point_together(family, rng, offset, scal
     before = theta.copy()
     moved = family.change_units(theta, offset, scale)
     assert_array_equal(theta, before)
+    found, expected = family.log_value(offset + scale * x, moved), family.log_value(x, theta)
     # The point near the centre is known to the last bit of the offset.
-    assert_allclose(
-        family.log_value(offset + scale * x, moved),
-        family.log_value(x, theta),
-        rtol=1e-8,
-        atol=1e-8,
-    )
+    assert_allclose(found, expected, rtol=1e-8, atol=1e-8)
     back = family.change_units(moved, -offset / scale, 1.0 / scale)
     assert_allclose(back, theta, rtol=1e-9, atol=1e-9)
 
@@ -235,14 +231,25 @@ def test_center_and_width_give_the_half_height_of_a_gaussian(family, rng):
 
 @pytest.mark.parametrize("slope", [0.5, 0.6, 1.0, 30.0])
 def test_bell_of_any_slope(rng, slope):
-    theta = np.stack(
-        [rng.normal(size=4), np.log(rng.uniform(0.5, 2.0, 4)), np.full(4, np.log(slope))]
-    )
+    center, width = rng.normal(size=4), rng.uniform(0.5, 2.0, 4)
+    theta = np.stack([center, np.log(width), np.full(4, np.log(slope))])
     x = points(Bell, theta, np.array([-3.0, -1.0, -0.5, 0.01, 0.99, 1.0, 2.5]))
     log_mu, gradient = Bell.log_value_and_gradient(x, theta)
     # Steep shoulders: (1 % off the width)^60 magnifies rounding of the distance 60 times.
     assert_allclose(np.exp(log_mu), Bell.value(x, theta), rtol=1e-12)
     assert_allclose(gradient, gradient_by_complex_step(Bell, x, theta), rtol=1e-10, atol=1e-14)
+
+
+@pytest.mark.parametrize("family", [SigmoidDifference, SigmoidProduct])
+@pytest.mark.parametrize("log_ratio", [-12.0, 6.0, 12.0])
+def test_flanks_much_longer_or_shorter_than_the_width(family, log_ratio):
+    theta = np.zeros((len(family.parameters), 1))
+    theta[1] = log_ratio
+    with np.errstate(all="raise", under="ignore"):
+        x = np.append(np.linspace(-8.0, 8.0, 33), 1e8)[None]
+        log_mu, gradient = family.log_value_and_gradient(x, theta)
+    assert (np.isfinite(log_mu) & (log_mu <= 0.0)).all()
+    assert np.isfinite(gradient).all()
 
 
 def test_families_are_given_by_name_or_class_for_all_inputs_or_for_each():

@@ -10,11 +10,6 @@ from skanfis.membership.flanked import PiShaped, Trapezoidal, Triangular
 WITH_FOOT = pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped])
 
 
-def theta_of(*numbers):
-    """One term: a location, and lengths that become logarithms."""
-    return np.array([[numbers[0]], *[[np.log(length)] for length in numbers[1:]]])
-
-
 def strengths_on_a_line(family, theta, x):
     """Normalised strengths of terms on one input."""
     antecedent = GridAntecedent.build([family], [0], [theta])

@@ -68,23 +68,29 @@ class TestRules:
     def test_noise_belongs_to_no_rule(self, rng):
         # Without the far rows that are labelled -1, the rules are those of the rest.
         X, y, _, _ = blobs(rng)
-        rows = StandardisedData.of(X, y)
-        noisy = rules_of(Gaussian, rows, lambda t, w: np.where(t[:, 0] > 0.5, -1, t[:, 1] > 0))
-        assert noisy.n_rules == 2
-        z, _, _ = rows.read(slice(None))
+        rows, seen = StandardisedData.of(X, y), []
+
+        def label(table, weight):
+            seen.append(table)
+            return np.where(table[:, 0] > 0.5, -1, table[:, 1] > 0)
+
+        centers, log_widths = rule_parameters(rules_of(Gaussian, rows, label), 2)
+        z, target, _ = rows.read(slice(None))
+        # Clusters are sought in standardised inputs and target together.
+        assert_allclose(np.sort(seen[0], axis=0), np.sort(np.vstack([z, target]).T, axis=0))
         kept = z[:, z[0] <= 0.5]
-        means = sorted(
-            kept[0, kept[1] > 0].mean() if side else kept[0, kept[1] <= 0].mean() for side in (0, 1)
-        )
-        assert_allclose(np.sort(rule_parameters(noisy, 2)[0, :, 0]), means, rtol=1e-10)
+        own = sorted((kept[:, kept[1] > 0], kept[:, kept[1] <= 0]), key=lambda part: part[0].mean())
+        assert_allclose(centers, [part.mean(axis=1) for part in own], rtol=1e-10)
+        # No narrower than a tenth of the input's deviation.
+        widths = [np.sqrt(2.0) * np.maximum(part.std(axis=1), 0.1) for part in own]
+        assert_allclose(np.exp(log_widths), widths, rtol=1e-10)
 
     def test_cluster_on_one_spot_has_a_term_of_some_width(self, rng):
         X = np.vstack([np.full((30, 2), 5.0), rng.normal(size=(30, 2))])
         rows = StandardisedData.of(X, X[:, :1])
         antecedent = rules_of(Gaussian, rows, lambda t, w: (t[:, 0] < t[:, 0].max()).astype(int))
-        assert_allclose(
-            np.exp(rule_parameters(antecedent, 2)[1, 1]), 0.1 * np.sqrt(2.0), rtol=1e-12
-        )
+        widths = np.exp(rule_parameters(antecedent, 2)[1, 1])
+        assert_allclose(widths, 0.1 * np.sqrt(2.0), rtol=1e-12)
 
     @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
     def test_clusters_of_the_target_alone_leave_one_rule(self):

@@ -38,10 +38,8 @@ class TestDealtRows:
     def test_weights_are_repeats(self, rng):
         X, y = measured(rng)
         times = rng.integers(1, 4, len(y))
-        weighted, repeated = (
-            dealt(X, y, times.astype(float)),
-            dealt(X.repeat(times, 0), y.repeat(times, 0)),
-        )
+        weighted = dealt(X, y, times.astype(float))
+        repeated = dealt(X.repeat(times, 0), y.repeat(times, 0))
         assert_allclose(repeated.X, weighted.X, atol=1e-9)
         assert_array_equal(repeated.sample_weight, weighted.sample_weight)
 

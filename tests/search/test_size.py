@@ -1,7 +1,5 @@
 """How many terms and rules: what is asked for, and errors before memory."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 from sklearn import config_context
@@ -12,20 +10,18 @@ from skanfis.exceptions import ConstantInputWarning
 from skanfis.learning import VariableProjection
 from skanfis.search import size
 
+from ..memory import traced
+
 
 def test_size_of_a_grid_is_not_far_from_what_training_takes(rng):
     X = rng.normal(size=(1000, 3))
     y = np.sin(X[:, 0]) + rng.normal(size=1000)
     solver = VariableProjection(stiffness=1.0, tol=0.5)
     estimator = ANFISRegressor(n_mfs=5, order=1, agreement=0.1, alpha=1e-3, solver=solver)
-    tracemalloc.start()
-    try:
+    with traced() as peak:
         estimator.fit(X, y)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
     expected = size.n_bytes(125, 15, n_basis=4, n_outputs=1)
-    assert 0.3 * peak < expected < 3.0 * peak
+    assert 0.3 * peak[0] < expected < 3.0 * peak[0]
 
 
 def test_limit_is_that_of_scikit_learn(rng):
@@ -40,32 +36,19 @@ def test_clusters_that_are_too_many_are_refused_before_memory_is_asked_for(rng, 
     clusterer = KMeans(200, n_init=1, max_iter=2, random_state=0)
     n_columns = 200 * (5 if order else 1)
     limit = 8 * n_columns**2 / 2**20  # one of the matrices that training takes
-    tracemalloc.start()
-    try:
-        with (
-            config_context(working_memory=limit),
-            pytest.raises(
-                ValueError, match=rf"200 rules with {n_columns:,} consequent .*Use fewer"
-            ),
-        ):
-            ANFISRegressor(partition=clusterer, order=order).fit(X, y)
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
+    refused = pytest.raises(ValueError, match=f"200 rules with {n_columns:,} conseq.*Use fewer")
+    with traced() as peak, config_context(working_memory=limit), refused:
+        ANFISRegressor(partition=clusterer, order=order).fit(X, y)
     # Clustering itself takes distances of all rows to all centres.
-    assert peak < max(8 * n_columns**2, 8e6)
+    assert peak[0] < max(8 * n_columns**2, 8e6)
 
 
 def test_more_columns_than_pairs_have_room_for_are_refused_at_once(rng):
     X = rng.normal(size=(30, 20_000))
-    tracemalloc.start()
-    try:
-        with pytest.raises(ValueError, match=r"X has 20,000 columns: .* 205 GB, and the limit"):
-            ANFISRegressor().fit(X, X[:, 0])
-        _, peak = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert peak < 20 * X.nbytes
+    refused = pytest.raises(ValueError, match=r"X has 20,000 columns: .* 205 GB, and the limit")
+    with traced() as peak, refused:
+        ANFISRegressor().fit(X, X[:, 0])
+    assert peak[0] < 20 * X.nbytes
 
 
 def test_of_many_constant_columns_ten_are_named(rng):

@@ -36,9 +36,8 @@ def test_the_statistic_is_the_formula_at_every_cut(rng, n_outputs):
     residual = tuned.residual
     strengths = tree.strengths(rows.X.T)
     design = np.column_stack([np.ones(rows.n_rows), rows.X])
-    predicted = np.einsum(
-        "rn,nb,rbo->no", strengths, design, tuned.evaluation.coefficients.reshape(2, 4, -1)
-    )
+    coefficients = tuned.evaluation.coefficients.reshape(2, 4, -1)
+    predicted = np.einsum("rn,nb,rbo->no", strengths, design, coefficients)
     assert_allclose(residual, rows.y - predicted, atol=1e-9)
     variance = np.average(residual**2, axis=0, weights=rows.sample_weight)
     best = {}
@@ -65,9 +64,8 @@ def test_the_statistic_is_the_formula_at_every_cut(rng, n_outputs):
 
 
 def test_cuts_are_as_wide_as_half_of_the_leaf_and_crisp_between_two_values(rng):
-    X = np.column_stack(
-        [rng.normal(size=400), rng.integers(0, 2, 400), 1e-3 * rng.normal(size=400)]
-    )
+    columns = rng.normal(size=400), rng.integers(0, 2, 400), 1e-3 * rng.normal(size=400)
+    X = np.column_stack(columns)
     X[::40, 2] = 50.0  # all other values are next to each other
     tuned = model_of(X, X[:, 0] ** 2 + X[:, 1] * X[:, 0], NOTHING.split(0, 0, 1.0, -3.0))
     column = tuned.problem.rows.X.T

@@ -9,28 +9,16 @@ from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
 from skanfis.search import Spacing, grid_antecedent, start
 from skanfis.search.judging import dealt_rows
-from skanfis.search.trials import Plan, Trials
+from skanfis.search.trials import Trials
 
-
-def plan_of(n_all, given=()):
-    """Of one input; the weights that are not given are free."""
-    return Plan(
-        families=[Gaussian],
-        order=1,
-        premise_inputs=np.arange(1),
-        consequent_inputs=np.arange(1),
-        weights=dict(given),
-        seed=0,
-        max_rules=None,
-        n_all=n_all,
-    )
+from .test_trials import plan_of
 
 
 def of_grid(count, truth, rng, noise=0.0, n_rows=300, weights=(), simplicity=0.0):
     x = rng.uniform(-1.0, 1.0, (n_rows, 1))
     rows = StandardisedData.of(x, truth(x) + noise * rng.normal(size=x.shape))
     antecedent = grid_antecedent([Gaussian], [count], Spacing(rows))
-    plan = plan_of(float(n_rows), weights)
+    plan = plan_of(1, float(n_rows), weights)
     return rows, start.tuned_start(antecedent, rows, plan, True, simplicity)
 
 
@@ -75,7 +63,7 @@ def test_a_candidate_begins_where_its_trial_ended(rng, left):
     """With the weights of as many rows as there are; raised agreement holds for any number."""
     X = rng.uniform(-1.0, 1.0, (200, 1))
     rows = dealt_rows(StandardisedData.of(X, sine(X) + 0.3 * rng.normal(size=X.shape)))
-    plan = plan_of(1000.0)
+    plan = plan_of(1, 1000.0)
     trials = Trials(rows, plan)
     tuned = trials.tuned(trials.larger("grid", trials.one_rule))
     found = start.started(tuned, plan, left, ["told"])

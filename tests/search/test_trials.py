@@ -84,10 +84,8 @@ def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order)
     way = np.clip(rest.X - nearest, -0.5, 0.5)
 
     def answer(t):
-        design = oracles.dense_design(
-            antecedent, antecedent.parameters, (nearest + t * way).T, order
-        )
-        return design @ coefficients
+        at = (nearest + t * way).T
+        return oracles.dense_design(antecedent, antecedent.parameters, at, order) @ coefficients
 
     answers = answer(0.0) + oracles.complex_step(lambda t: answer(t[0]), np.zeros(1))[..., 0]
     answers = np.clip(answers, fold.y.min(axis=0) - 0.5, fold.y.max(axis=0) + 0.5)
@@ -201,13 +199,8 @@ class TestSequences:
 def test_a_candidate_sees_as_many_rows_as_its_parameters_need(rng):
     X, y = surface(rng, 9000, 2)
     trials = trials_of(X, y)
-    for n_clusters, n_rows in (
-        (0, FEWEST_ROWS),
-        (3, FEWEST_ROWS),
-        (12, 4000),
-        (20, 8000),
-        (90, 9000),
-    ):
+    few = FEWEST_ROWS
+    for n_clusters, n_rows in ((0, few), (3, few), (12, 4000), (20, 8000), (90, 9000)):
         candidate = Candidate((1, 1), n_clusters, (0, 1) if n_clusters else ())
         assert trials.n_parameters(candidate) == max(n_clusters, 1) * 3 + 4 * n_clusters
         rows = trials.rows_for(candidate)

@@ -69,12 +69,12 @@ def test_clusterer_without_weights_sees_repeated_rows():
     assert_array_equal(Remembers.seen[0], table[[0, 0, 1, 2, 2, 2]])
 
 
-def test_clusterer_itself_is_left_as_it_was():
-    clusterer = KMeans(n_clusters=3, n_init=1, random_state=0)
-    model = quick(partition=clusterer).fit(*data())
-    assert model.partition is clusterer
-    assert not hasattr(clusterer, "labels_")
-    assert model.n_rules_ == 3
+def test_clusterer_that_takes_weights_is_given_them(rng):
+    table, weight = rng.normal(size=(60, 2)), 10.0 ** rng.uniform(0.0, 3.0, 60)
+    kmeans = KMeans(3, n_init=1, random_state=0)
+    expected = kmeans.fit(table, sample_weight=weight).labels_
+    assert_array_equal(_labeller(kmeans, weighted=True)(table, weight), expected)
+    assert (kmeans.fit(table).labels_ != expected).any()
 
 
 def test_pipeline_is_a_clusterer_too():
@@ -109,9 +109,8 @@ def test_weights_given_are_obeyed(settings):
 @pytest.mark.parametrize("n_rows", [11, 12])
 def test_fewer_distinct_rows_than_parameters_are_reported(n_rows, recwarn):
     X, y = data(n_rows)
-    ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.5)).fit(
-        np.tile(X, (3, 1)), np.tile(y, 3)
-    )
+    model = ANFISRegressor(n_mfs=2, solver=VariableProjection(tol=0.5))
+    model.fit(np.tile(X, (3, 1)), np.tile(y, 3))
     caught = [w for w in recwarn if w.category is UnderdeterminedWarning]
     assert len(caught) == (n_rows < 12)
     for warning in caught:

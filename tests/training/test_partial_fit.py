@@ -112,9 +112,6 @@ def test_weights_zeros_and_several_outputs(premises):
     again = ANFISRegressor(**settings).partial_fit(X[repeated], y[repeated])
     assert difference(model, again, X) < EXACT
     assert model.n_samples_seen_ == np.count_nonzero(weight)
-    before = model.predict(X[:5])
-    model.partial_fit(X[:3], 1e9 * y[:3], np.zeros(3))
-    assert np.array_equal(model.predict(X[:5]), before)
 
 
 def test_forgetting_is_a_fit_with_fading_weights(premises):
@@ -235,9 +232,7 @@ def test_rows_far_beyond_the_premises_are_refused_by_name(premises):
     model = chunk(premises).partial_fit(X, y)
     for value in (1e299, -1e150):
         X[7, 1] = value
-        with pytest.raises(
-            ValueError, match=r"Column 'x1' of X holds .*more than 1e\+100 standard"
-        ):
+        with pytest.raises(ValueError, match=r"'x1' of X holds .*more than 1e\+100 standard"):
             model.partial_fit(X, y)
         with pytest.raises(ValueError, match=r"Column 'x1' of X holds"):
             chunk(premises).partial_fit(X, y)
@@ -372,4 +367,4 @@ def test_a_chunk_without_weight_in_any_form_changes_nothing(premises):
     model = chunk(premises).partial_fit(X, y)
     before = model.predict(X)
     for nothing in (0.0, np.zeros(300), [0] * 300):
-        assert np.array_equal(model.partial_fit(X, 2.0 * y, nothing).predict(X), before)
+        assert np.array_equal(model.partial_fit(X, 1e9 * y, nothing).predict(X), before)

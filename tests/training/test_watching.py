@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 import sklearn
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -63,9 +64,8 @@ def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, conseque
     g = np.random.default_rng(4)
     rows, used = oracles.bumpy_rows(g, 200, 2, 2, weighted), np.array(consequent_inputs)
     antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])
-    problem = SeparableProblem(
-        rows, antecedent, 1, Penalty(alpha=1e-3, slope=1e-3), consequent_inputs=used
-    )
+    penalty = Penalty(alpha=1e-3, slope=1e-3)
+    problem = SeparableProblem(rows, antecedent, 1, penalty, consequent_inputs=used)
     evaluation = problem.evaluate(antecedent.parameters)
     # On either side of the box of every input, and in it.
     low, high = rows.inputs.minimum, rows.inputs.maximum
@@ -83,10 +83,8 @@ def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, conseque
 def test_verbose_writes_a_line_per_iteration(capsys):
     model = ANFISRegressor(n_mfs=3, verbose=True).fit(X, Y)
     lines = capsys.readouterr().out.splitlines()
-    weights = [f"{w:.3g}" for w in (model.agreement_, model.alpha_, model.stiffness_)]
-    assert lines[0] == "[ANFISRegressor] 9 rules, agreement {}, alpha {}, stiffness {}".format(
-        *weights
-    )
+    told = "[ANFISRegressor] 9 rules, agreement {:.3g}, alpha {:.3g}, stiffness {:.3g}"
+    assert lines[0] == told.format(model.agreement_, model.alpha_, model.stiffness_)
     assert len(lines) == 1 + model.n_iter_
     assert f"iteration {model.n_iter_}: loss {model.loss_curve_[-1]:.6g}" in lines[-1]
     quick().fit(X, Y)
@@ -244,9 +242,8 @@ def test_whole_groups_are_held_out():
     # Every group has a level of its own: what is held out cannot have been learnt.
     X = (groups + 0.1 * g.normal(size=200)).reshape(-1, 1)
     level = g.normal(size=10)[groups]
-    alone, grouped = (
-        ANFISRegressor(n_mfs=10, **LOOSE).fit(X, level, groups=given) for given in (None, groups)
-    )
+    model = ANFISRegressor(n_mfs=10, **LOOSE)
+    alone, grouped = (clone(model).fit(X, level, groups=given) for given in (None, groups))
     assert grouped.validation_loss_curve_.min() > 1.5 * alone.validation_loss_curve_.min()
 
 
@@ -261,9 +258,8 @@ def test_equal_rows_are_on_one_side():
 @pytest.mark.parametrize(
     ("n_rows", "groups", "fraction", "what"),
     [
-        (3, None, 0.1, "3 rows"),
+        *((3, None, 0.1, "3 rows"), (10, None, 0.95, "10 rows")),
         (20, np.zeros(20), 0.5, "20 rows in 1 groups"),
-        (10, None, 0.95, "10 rows"),
     ],
 )
 def test_too_few_rows_to_hold_out(n_rows, groups, fraction, what):
