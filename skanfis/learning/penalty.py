@@ -152,16 +152,16 @@ class CommonLine:
         if not any(held):
             return None
         if held not in self._free:
-            columns, is_unbounded = np.eye(self.height.size), np.ones(self.height.size, dtype=bool)
+            columns, is_free = np.eye(self.height.size), np.ones(self.height.size, dtype=bool)
             for j, rules in penalty.common:
                 own = self._places(j, rules)
                 # Slopes per unit of z are one: local ones are as the units.
                 shared = 1.0 / self._per_unit[list(rules), self._function[j]]
                 columns[own[0], own] = shared / np.linalg.norm(shared)
-                is_unbounded[own[1:]] = False
+                is_free[own[1:]] = False
             for j, rules in penalty.absent:
-                is_unbounded[self._places(j, rules)] = False
-            self._free[held] = np.ascontiguousarray(columns[is_unbounded].T)
+                is_free[self._places(j, rules)] = False
+            self._free[held] = np.ascontiguousarray(columns[is_free].T)
         return self._free[held]
 
     def _places(self, j, rules):

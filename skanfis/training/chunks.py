@@ -92,8 +92,7 @@ class RowSums:
                 extent[:, j] = np.maximum(extent[:, j], distance.max(axis=1))
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
             marks = fingerprint(np.vstack([numbers, rows.y[part].T]))
-            distinct = np.vstack([distinct, marks[:, None]])
-            distinct = _distinct(distinct, ROWS_EACH * len(slope))
+            distinct = _distinct(np.vstack([distinct, marks[:, None]]), ROWS_EACH * len(slope))
             own_inputs = np.column_stack([best, numbers])
             distinct_inputs = _distinct(np.vstack([distinct_inputs, own_inputs]), 1 + n_inputs)
             rule, row = np.nonzero(strengths >= FIRES * top)
@@ -102,8 +101,7 @@ class RowSums:
             second += np.stack([(own_strength * weighted) @ every.T for own_strength in strengths])
             farthest = np.vstack([farthest, np.column_stack([rule, raw.T[row]])])
             farthest = _far_rows(farthest, second, rows.inputs)
-            basis_rows = basis(Z[own])
-            weighted = basis_rows if weight is None else basis_rows * weight
+            basis_rows, weighted = (one[np.append(0, 1 + own)] for one in (every, weighted))
             design.accumulate(gram, shares, basis_rows, weighted)
             for k, values in enumerate(target):
                 slope[:, k] += (strengths @ (weighted * values).T).ravel()
