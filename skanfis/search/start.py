@@ -33,7 +33,7 @@ from .tuning import (
     with_sparse_slopes,
 )
 
-# Nearer, chance decides.
+# What terms without bounds must leave of the expected squared error: nearer, chance decides.
 _LESS_ERROR = 0.9
 # Of displacements, in spacings of terms: rounding errors stay below.
 _DIGITS = 5

@@ -43,7 +43,7 @@ FIRST_STEPS = 5
 ARRIVING = 50
 # Beyond so many consequent parameters every step costs seconds, and there are fewer.
 MOST_COLUMNS = 512
-# Of these, and of grids (``trials``).
+# Steps and turns of these; so many turns have grids as well (``trials``).
 _FEW_STEPS, FEW_TURNS = 3, 2
 # Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
