@@ -359,19 +359,23 @@ def test_number_of_terms_that_cannot_be(n_mfs, error, said):
         ANFISRegressor(n_mfs=n_mfs).fit(FRAME, Y)
 
 
-LIMIT = "limit is 1.07 GB (sklearn.set_config(working_memory"
+LIMIT = "limit is 1,024 (sklearn.set_config(working_memory"
 
 
 @pytest.mark.parametrize(
     ("n_inputs", "settings", "said"),
     [
         # 3^10 rules, with 11 coefficients each.
-        (10, {"n_mfs": 3}, ["n_mfs=3 on 10 inputs", "59,049 rules", "649,539", "47.3 TB", LIMIT]),
-        (10, {"n_mfs": [9] * 10}, ["on 10 inputs", "3,486,784,401 rules", "10^18 bytes"]),
+        (
+            10,
+            {"n_mfs": 3},
+            ["n_mfs=3 on 10 inputs", "59,049 rules", "649,539", "45,065,222 MiB", LIMIT],
+        ),
+        (10, {"n_mfs": [9] * 10}, ["on 10 inputs", "3,486,784,401 rules", "10^15 MiB"]),
         (8, {"n_mfs": 3}, ["6,561 rules with 59,049", LIMIT, "n_mfs=2 makes 256 rules"]),
-        (40, {"n_mfs": 2}, ["n_mfs=2 on 40", "1,099,511,627,776 rules", "10^18 bytes"]),
-        (400, {"n_mfs": 3}, ["n_mfs=3 on 400 inputs", "10^18 bytes"]),
-        (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "10^18 bytes"]),
+        (40, {"n_mfs": 2}, ["n_mfs=2 on 40", "1,099,511,627,776 rules", "10^15 MiB"]),
+        (400, {"n_mfs": 3}, ["n_mfs=3 on 400 inputs", "10^15 MiB"]),
+        (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "MiB"]),
     ],
 )
 def test_more_rules_than_memory(n_inputs, settings, said):

@@ -80,10 +80,6 @@ def _one_sided(x, p):
     return ((x - p[0]) * p[1]).at_least(0.0), lambda: p[1]
 
 
-def _gaussian_profile(t):
-    return lambda: t * t * -0.5, lambda: -t
-
-
 def _linear(t):
     return -(t - 1.0), lambda: (t > 0.0).where((t < 1.0).where(-1.0, 0.0), 0.0)
 
@@ -167,7 +163,10 @@ _BY_NAME = {
     "bell": (lambda theta: [theta[0], np.exp(-theta[1]), np.exp(theta[2])], _bell),
     "triangular": (_two_sided_constants, _flanked(_two_sided, _with_foot(_linear))),
     "trapezoidal": (_two_sided_constants, _flanked(_two_sided, _with_foot(_linear))),
-    "two_sided_gaussian": (_two_sided_constants, _flanked(_two_sided, _gaussian_profile)),
+    "two_sided_gaussian": (
+        _two_sided_constants,
+        _flanked(_two_sided, lambda t: (lambda: t * t * -0.5, lambda: -t)),
+    ),
     "pi_shaped": (_two_sided_constants, _flanked(_two_sided, _with_foot(_spline))),
     "s_shaped": (_one_sided_constants(-1.0), _flanked(_one_sided, _with_foot(_spline))),
     "z_shaped": (_one_sided_constants(1.0), _flanked(_one_sided, _with_foot(_spline))),

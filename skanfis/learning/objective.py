@@ -39,16 +39,6 @@ from .penalty import CommonLine, Penalty, disagreement_matrix
 _SMALLEST_FREEDOM = 1e-6
 
 
-def _keep_freed_memory():
-    """Have the C library keep what a block frees for the next block.
-
-    glibc hands freed memory back to the operating system beyond limits that grow with the largest
-    piece freed so far; without one of this size, every block gets its arrays page by page again,
-    and a pass takes up to twice as long. Nothing is written to it. Elsewhere this does nothing.
-    """
-    np.empty(2 * BLOCK_BYTES // 8)
-
-
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """The problem at one theta, and at the coefficients solved for there or given."""
@@ -141,7 +131,10 @@ class SeparableProblem:
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
         self._weight = rows.total_weight
-        _keep_freed_memory()
+        # glibc hands back what is freed beyond limits that grow with the largest piece freed so
+        # far; without one of this size, every block gets its arrays page by page again, and a pass
+        # takes up to twice as long. Nothing is written to it.
+        np.empty(2 * BLOCK_BYTES // 8)
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
         self._sums_at_start: tuple | None = self._first_pass(antecedent, no_coefficients)
         gram = self._sums_at_start[0]

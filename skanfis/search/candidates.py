@@ -25,6 +25,7 @@ from .tuning import Tuned
 
 KINDS = ("grid", "tree", "scattered")
 _MORE_CLUSTERS = 1.5
+_RANK = 1e-10  # beside the largest eigenvalue, what is less is rounding
 
 
 @dataclass(frozen=True)
@@ -115,26 +116,39 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
     return clustered_antecedent(families, rows, label, inputs)
 
 
-def term_scores(tuned: Tuned, inputs, counts, spacing: Spacing):
-    """How much the residual of a model asks for so many terms on each input, (n_inputs,).
+def term_scores(tuned: Tuned, asking, spacing: Spacing, told=()):
+    """How much the residual of a model asks for terms, of every pair of input and their number.
 
-    As of the splits of a tree (``splits``), with the shares nu_k of ``counts`` even Gaussian terms
-    on an input, less their means, in the place of h - p.
+    As of the splits of a tree (``splits``), with the shares nu_k of so many even Gaussian terms on
+    an input, less their means, in the place of h - p. What those of pairs ``told`` explain is taken
+    out before, of the residual and of these functions.
     """
     rows = tuned.problem.rows
     weight = counting_weight(rows)
-    residual = tuned.residual - np.average(tuned.residual, axis=0, weights=weight)
-    variance = np.average(residual**2, axis=0, weights=weight)
     varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
-    basis = np.column_stack([np.ones(rows.n_rows), varying])
-    scores = np.zeros(inputs.size)
-    for k, (j, count) in enumerate(zip(inputs, counts, strict=True)):
+    basis = np.sqrt(weight)[:, None] * np.column_stack([np.ones(rows.n_rows), varying])
+
+    def shares_of(j, count):
         shares = _shares(rows.X[:, j], spacing.centers(j, count))
-        shares -= np.average(shares, axis=0, weights=weight)
-        own = weight[:, None] * shares
-        norm = (own * shares).T @ basis**2
-        along = np.einsum("nk,no,nb->kbo", own, residual, basis, optimize=True)
-        squares = along**2 / np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
+        return shares - np.average(shares, axis=0, weights=weight)
+
+    residual = basis[:, :1] * (tuned.residual - np.average(tuned.residual, axis=0, weights=weight))
+    told = [(shares_of(*one)[:, :, None] * basis[:, None]).reshape(rows.n_rows, -1) for one in told]
+    functions = np.hstack([np.empty((rows.n_rows, 0)), *told])
+    sizes, axes = np.linalg.eigh(functions.T @ functions)
+    known = functions @ axes[:, sizes > _RANK * sizes.max(initial=0.0)]
+    known /= np.linalg.norm(known, axis=0)
+    residual -= known @ (known.T @ residual)
+    share_free = max(1.0 - known.shape[1] / rows.n_rows, np.finfo(float).eps)
+    variance = np.sum(residual**2, axis=0) / (share_free * weight.sum())
+    scores = np.zeros(len(asking))
+    for k, (j, count) in enumerate(asking):
+        shares = shares_of(j, count)
+        norm = (shares**2).T @ basis**2
+        taken = [np.sum((known.T @ (share[:, None] * basis)) ** 2, axis=0) for share in shares.T]
+        norm = np.maximum(norm - taken, _RANK * norm)[:, :, None]
+        along = np.einsum("nk,no,nb->kbo", shares, residual, basis, optimize=True)
+        squares = along**2 / np.maximum(norm * variance, np.finfo(float).tiny)
         # One of the shares follows from the others.
         free = 1.0 - 1.0 / count
         scores[k] = in_deviations(free * squares.sum(), free * squares.size)

@@ -190,18 +190,15 @@ def _labeller(clusterer, weighted):
 
 def report_constant(rows, names):
     """Warn of inputs that never change."""
-    scale = rows.inputs
-    if not scale.is_constant.any():
-        return
     flat = [
-        f"{name!r} (always {value + 0.0:.6g})"  # 0, not -0
-        for name, value, is_flat in zip(names, scale.offset, scale.is_constant, strict=True)
-        if is_flat
+        f"{names[j]!r} (always {rows.inputs.offset[j] + 0.0:.6g})"  # 0, not -0
+        for j in np.flatnonzero(rows.inputs.is_constant)
     ]
-    if len(flat) > _MOST_NAMED:
-        flat = [*flat[:_MOST_NAMED], f"and {len(flat) - _MOST_NAMED:,} more"]
-    warn_user(
-        f"Constant in the training data: column {', '.join(flat)}. Nothing can be learnt from "
-        "it: it gets no fuzzy terms and no slope. Drop it, or train on data where it varies.",
-        ConstantInputWarning,
-    )
+    if flat:
+        more = f", and {len(flat) - _MOST_NAMED:,} more" if len(flat) > _MOST_NAMED else ""
+        warn_user(
+            f"Constant in the training data: column {', '.join(flat[:_MOST_NAMED])}{more}. Nothing "
+            "can be learnt from it: it gets no fuzzy terms and no slope. Drop it, or train on data "
+            "where it varies.",
+            ConstantInputWarning,
+        )

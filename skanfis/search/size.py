@@ -68,23 +68,14 @@ def check_grid_fits(n_mfs, counts, n_basis, n_outputs):
 
 def _would_take(needed):
     return (
-        f"would take {_bytes(needed)}, and the limit is {_bytes(memory_limit())} "
-        "(sklearn.set_config(working_memory=...), in MiB)."
+        f"would take {_count(1 + needed // 2**20)} MiB, and the limit is "
+        f"{get_config()['working_memory']:,} (sklearn.set_config(working_memory=...))."
     )
 
 
 def _count(number):
     """A count for people; beyond any hope, its order of magnitude suffices."""
     return f"{number:,}" if number < 10**15 else "more than 10^15"
-
-
-def _bytes(number):
-    if number >= 10**18:
-        return "more than 10^18 bytes"
-    exponent = 0
-    while number >= 1000 ** (exponent + 1):
-        exponent += 1
-    return f"{number / 1000**exponent:.3g} {('bytes', 'kB', 'MB', 'GB', 'TB', 'PB')[exponent]}"
 
 
 def term_counts(n_mfs, names):

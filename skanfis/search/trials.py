@@ -4,8 +4,6 @@ The weights of every candidate's penalty are found by the evidence (``tuning``).
 left out one by one follows from the training on all of them; that ranks the next steps of one kind,
 and no more: it has seen the rows by which the step was chosen. What is expected of new rows is the
 error on rows that had no part in anything (``judging``).
-
-A candidate sees as many rows as its parameters need, and not more.
 """
 
 from collections.abc import Callable, Sequence
@@ -90,23 +88,31 @@ class Trials:
         line = self._train(self._problem(self.one_rule), turns=0, first_steps=ARRIVING)
         self._found[self.one_rule] = line
 
-    def _scores(self, candidate):
+    def _scores(self, candidate, inputs, told=()):
         # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
-        counts = [candidate.counts[j] + 2 for j in self.plan.premise_inputs]
-        return term_scores(self.tuned(candidate), self.plan.premise_inputs, counts, self.spacing)
+        asking, told = ([(j, candidate.counts[j] + 2) for j in of] for of in (inputs, told))
+        return term_scores(self.tuned(candidate), asking, self.spacing, told)
 
     def _asking(self, candidate):
         """Inputs for terms of scattered rules: those that ask by more than chance, at first one.
 
-        None of two values: near which of them a rule stands, no reader can say by a bell.
+        The loudest first; what it asks for, no other does. None of two values: near which of them a
+        rule stands, no reader can say by a bell.
         """
-        scores = self._scores(candidate)
-        n_values = [self.spacing.n_values(j) for j in self.plan.premise_inputs]
-        has_many = np.array(n_values) > 2
-        asked = has_many & (scores > _SIGNIFICANT)
-        if not (candidate.inputs or asked.any()):
-            asked = has_many & (scores == scores.max(initial=0, where=has_many))
-        return self.plan.premise_inputs[asked].tolist()
+        left = [int(j) for j in self.plan.premise_inputs if self.spacing.n_values(j) > 2]
+        asked: list[int] = []
+        n_rows, n_columns = self.tuned(candidate).problem.rows.X.shape
+        work = n_rows * ((candidate.counts[0] + 2) * (1.0 + n_columns)) ** 2
+        # Where that is too much work, all that ask have terms.
+        while left and work * len(asked) * len(left) <= _MOST_OPERATIONS:
+            scores = self._scores(candidate, left, asked)
+            loudest = left[int(np.argmax(scores))]
+            left = [j for j, score in zip(left, scores, strict=True) if score > _SIGNIFICANT]
+            if not left and (asked or candidate.inputs):
+                break
+            asked.append(loudest)
+            left = [j for j in left if j != loudest]
+        return [*asked, *left]
 
     def rows_for(self, candidate):
         """As many as its parameters need, by powers of two: most candidates see the same."""
@@ -125,8 +131,9 @@ class Trials:
             splits = best_splits(self.tuned(candidate), self.plan.premise_inputs, _TRIED)
             grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
         else:
-            asking = np.argsort(-self._scores(candidate), kind="stable")[:_TRIED]
-            grown = [candidate.with_more_terms(j) for j in self.plan.premise_inputs[asking]]
+            inputs = self.plan.premise_inputs
+            asking = np.argsort(-self._scores(candidate, inputs), kind="stable")[:_TRIED]
+            grown = [candidate.with_more_terms(j) for j in inputs[asking]]
         smaller = self.tuned(candidate)
         problems = {one: self._problem(one, smaller) for one in grown if self._is_small(one)}
         # Of rows that are alike but for a few, there are fewer clusters than were asked for.

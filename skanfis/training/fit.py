@@ -10,7 +10,6 @@
 """
 
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -150,7 +149,11 @@ class _Fit:
             validation = ValidationLoss(
                 self.held_out, inputs, stopping.n_iter_no_change, stopping.tol
             )
-        tell = self.callbacks and partial(self._tell, start)
+
+        def tell_callbacks(n_iter, evaluation):
+            return self.callbacks.iteration(lambda: self.builder.model(start, evaluation))
+
+        tell = self.callbacks and tell_callbacks
         watchers = [self.printer, tell] if is_watched else []
         displacement = start.displacement
         if displacement is not None:
@@ -167,10 +170,6 @@ class _Fit:
             return SolverRun(start, problem, premise, result)
         result = validation.restored(result)
         return SolverRun(start, problem, premise, result, tuple(validation.losses))
-
-    def _tell(self, start, n_iter, evaluation):
-        """Tell scikit-learn's callbacks of an iteration."""
-        return self.callbacks.iteration(lambda: self.builder.model(start, evaluation))
 
     def robust_run(self) -> tuple[SolverRun, np.ndarray]:
         """Runs and weights in turns, until the weights settle.

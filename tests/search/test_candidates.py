@@ -1,6 +1,7 @@
 """Kinds of rule bases as sequences, and which input the residual of a model asks terms for."""
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -83,9 +84,11 @@ def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
     assert_allclose(centers[0][order[0]], np.array(expected)[order[1]])
 
 
+@pytest.mark.parametrize("told", [[], [(0, 2)], [(0, 3), (2, 2)]])
 @pytest.mark.parametrize("count", [2, 3])
 @pytest.mark.parametrize("n_outputs", [1, 2])
-def test_term_scores_are_the_formula_term_by_term(rng, count, n_outputs):
+def test_term_scores_are_the_formula_term_by_term(rng, count, n_outputs, told):
+    """Beside what is told: of the residuals of all functions on those that tell it."""
     X = rng.uniform(-1.0, 1.0, (150, 4))
     y = np.sin(3.0 * X[:, [0]]) + X[:, [2]] * X[:, [3]] + 0.3 * rng.normal(size=(150, n_outputs))
     # Weights that go with the inputs: the mean of a share is far from its plain mean.
@@ -93,25 +96,38 @@ def test_term_scores_are_the_formula_term_by_term(rng, count, n_outputs):
     tuned, spacing = line_through(rows), Spacing(rows)
     s, basis = rows.sample_weight, np.column_stack([np.ones(len(rows.X)), rows.X])
     residual = rows.y - basis @ tuned.evaluation.coefficients
-    expected = []
-    for j in range(4):
+
+    def functions(j, count):
         centers = spacing.centers(j, count)
         # Of neighbours that cross at 0.6 where they are equally far apart.
         width = 0.5 * np.mean(np.diff(centers)) / np.sqrt(-2.0 * np.log(0.6))
         mu = np.exp(-0.5 * ((rows.X[:, [j]] - centers) / width) ** 2)
         share = mu / mu.sum(axis=1, keepdims=True)
         share -= np.average(share, axis=0, weights=s)
+        return [share[:, k] * basis[:, b] for k in range(count) for b in range(5)]
+
+    known = np.transpose(
+        [function for one in told for function in functions(*one)] or [[0.0] * 150]
+    )
+    root = np.sqrt(s)
+
+    def left(function):
+        return function - known @ np.linalg.lstsq(root[:, None] * known, root * function)[0]
+
+    n_told = sum(5 * (count - 1) for _, count in told)
+    asking = [j for j in range(4) if j not in dict(told)]
+    expected = []
+    for j in asking:
         total = 0.0
-        for k, b, o in np.ndindex(count, 5, n_outputs):
-            r = residual[:, o] - np.average(residual[:, o], weights=s)
-            function = share[:, k] * basis[:, b]
-            square = (s @ (function * r)) ** 2 / (s @ function**2)
-            total += square / np.average(r**2, weights=s)
+        for function, o in product(functions(j, count), range(n_outputs)):
+            r = left(residual[:, o] - np.average(residual[:, o], weights=s))
+            variance = np.average(r**2, weights=s) * 150 / (150 - n_told)
+            total += (s @ (function * r)) ** 2 / (s @ left(function) ** 2) / variance
         n_free = (count - 1) * 5 * n_outputs
         expected.append((total * (count - 1) / count - n_free) / np.sqrt(2 * n_free))
-    every = np.arange(4)
-    assert_allclose(term_scores(tuned, every, [count] * 4, spacing), expected, rtol=1e-6)
+    pairs = [(j, count) for j in asking]
+    assert_allclose(term_scores(tuned, pairs, spacing, told), expected, rtol=1e-6)
     # A column that never changes has no part in it.
     wide = sample_of(np.column_stack([X, np.ones(150)]), y, np.ceil(np.exp(X.sum(axis=1))))
-    found = term_scores(line_through(wide), every, [count] * 4, Spacing(wide))
+    found = term_scores(line_through(wide), pairs, Spacing(wide), told)
     assert_allclose(found, expected, rtol=1e-6)

@@ -10,7 +10,7 @@ from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE
 from skanfis.membership import Gaussian
-from skanfis.search.candidates import Candidate, rule_base
+from skanfis.search.candidates import Candidate, rule_base, term_scores
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
 from skanfis.search.trials import _ROWS_EACH, FEWEST_ROWS, Plan, Trials
@@ -121,17 +121,31 @@ class TestSequences:
 
     def test_scattered_rules_look_at_inputs_that_smaller_ones_ask_for(self, rng):
         X, y = surface(rng, 400, 4)
-        trials = trials_of(X, y + X[:, 3])
+        trials = trials_of(X, y + X[:, 1] ** 2 + X[:, 3])
         two = trials.larger("scattered", trials.one_rule)
         assert two == Candidate((1, 1, 1, 1), 2, (0, 1))
         groups = trials.tuned(two).problem.antecedent.groups
         assert {int(j) for group in groups for j in group.inputs} == {0, 1}
         assert trials.larger("scattered", two).inputs == (0, 1)
 
+    def test_no_input_asks_for_what_terms_on_others_say(self, rng):
+        """Half of them only go with the others, and ask as loudly of the line's residual."""
+        asked = []
+        for _ in range(5):
+            X = rng.normal(size=(500, 6)) + rng.normal(size=(500, 1))
+            trials = trials_of(X, np.tanh(X[:, :3].sum(axis=1)) + 0.1 * rng.normal(size=500))
+            asked.append(trials.larger("scattered", trials.one_rule).inputs)
+            pairs = [(j, 3) for j in range(6)]
+            scores = term_scores(trials.tuned(trials.one_rule), pairs, trials.spacing)
+            assert scores.min() > 10.0
+        # Noise alone asks by two deviations in one of twenty.
+        assert sum(map(len, asked)) <= 5 * 3 + 2
+        assert all(set(one) >= {0, 1, 2} for one in asked)
+
     def test_rules_are_added_where_those_that_have_learnt_leave_most(self, rng):
         """One rule more: its cluster is all rows, by their squared residuals."""
         X, y = surface(rng, 400, 3)
-        trials = trials_of(X, y)
+        trials = trials_of(X, y + X[:, 1] ** 2)
         two = trials.tuned(trials.larger("scattered", trials.one_rule))
         learnt = two.evaluation.antecedent
         three = Candidate((1, 1, 1), 3, (0, 1, 2), is_grown=True)
