@@ -252,7 +252,7 @@ RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
         ("An iterator can be used once only", {"cv": iter([])}, {}),
         (
             "out_of_bounds='raise' refuses rows held out",
-            {"estimator": make_pipeline(StandardScaler(), ANFISRegressor(out_of_bounds="raise"))},
+            {"estimator": make_pipeline(StandardScaler(), quick(n_mfs=1, out_of_bounds="raise"))},
             {},
         ),
         (

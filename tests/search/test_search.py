@@ -290,7 +290,8 @@ def test_candidates_are_listed_from_the_best(rng, partition):
 
 def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
     X, y = bumps(rng)
-    fitted = {s: ANFISRegressor(simplicity=s).fit(X, y) for s in (0.0, 0.05, 0.5)}
+    model = ANFISRegressor(max_rules=6)
+    fitted = {s: clone(model).set_params(simplicity=s).fit(X, y) for s in (0.0, 0.05, 0.5)}
     told = {s: next(o for o in m.structures_ if o["chosen"]) for s, m in fitted.items()}
     costs = [one["reading_cost"] for one in told.values()]
     assert costs == sorted(costs, reverse=True)
