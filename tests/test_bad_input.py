@@ -359,7 +359,7 @@ def test_number_of_terms_that_cannot_be(n_mfs, error, said):
         ANFISRegressor(n_mfs=n_mfs).fit(FRAME, Y)
 
 
-LIMIT = "limit is 1,024 (sklearn.set_config(working_memory"
+LIMIT = "limit is 1,024 MiB (sklearn.set_config(working_memory"
 
 
 @pytest.mark.parametrize(
@@ -375,7 +375,7 @@ LIMIT = "limit is 1,024 (sklearn.set_config(working_memory"
         (8, {"n_mfs": 3}, ["6,561 rules with 59,049", LIMIT, "n_mfs=2 makes 256 rules"]),
         (40, {"n_mfs": 2}, ["n_mfs=2 on 40", "1,099,511,627,776 rules", "10^15 MiB"]),
         (400, {"n_mfs": 3}, ["n_mfs=3 on 400 inputs", "10^15 MiB"]),
-        (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "MiB"]),
+        (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "10^15 MiB"]),
     ],
 )
 def test_more_rules_than_memory(n_inputs, settings, said):

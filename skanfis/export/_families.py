@@ -18,7 +18,7 @@ import numpy as np
 
 from ..membership import FAMILIES, PRODUCTS
 
-# As in ``membership.profiles`` and ``membership.bell``.
+# As in ``membership.profiles`` and ``membership.bells``.
 _FLOOR, _SMALLEST_LOG_SQUARE = 1e-10, float(np.log(1e-300))
 # What is no larger counts as zero: single precision has hardly any smaller numbers.
 _ZERO = 1e-37
@@ -78,6 +78,10 @@ def _two_sided(x, p):
 
 def _one_sided(x, p):
     return ((x - p[0]) * p[1]).at_least(0.0), lambda: p[1]
+
+
+def _gaussian_profile(t):
+    return lambda: t * t * -0.5, lambda: -t
 
 
 def _linear(t):
@@ -163,10 +167,7 @@ _BY_NAME = {
     "bell": (lambda theta: [theta[0], np.exp(-theta[1]), np.exp(theta[2])], _bell),
     "triangular": (_two_sided_constants, _flanked(_two_sided, _with_foot(_linear))),
     "trapezoidal": (_two_sided_constants, _flanked(_two_sided, _with_foot(_linear))),
-    "two_sided_gaussian": (
-        _two_sided_constants,
-        _flanked(_two_sided, lambda t: (lambda: t * t * -0.5, lambda: -t)),
-    ),
+    "two_sided_gaussian": (_two_sided_constants, _flanked(_two_sided, _gaussian_profile)),
     "pi_shaped": (_two_sided_constants, _flanked(_two_sided, _with_foot(_spline))),
     "s_shaped": (_one_sided_constants(-1.0), _flanked(_one_sided, _with_foot(_spline))),
     "z_shaped": (_one_sided_constants(1.0), _flanked(_one_sided, _with_foot(_spline))),

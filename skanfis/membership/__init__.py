@@ -1,9 +1,8 @@
 """Families of membership functions; ``base`` has the conventions that all of them follow."""
 
 from .base import Membership, Parameter
-from .bell import Bell
+from .bells import Bell, Gaussian
 from .flanked import PiShaped, SShaped, Trapezoidal, Triangular, TwoSidedGaussian, ZShaped
-from .gaussian import Gaussian
 from .sigmoid import (
     BothFalling,
     BothRising,

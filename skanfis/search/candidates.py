@@ -19,13 +19,13 @@ from sklearn.exceptions import ConvergenceWarning
 from ..antecedent import TreeAntecedent
 from .clusters import clustered_antecedent, grown_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
-from .sample import DIGITS, counting_weight, in_deviations
+from .sample import DIGITS, counting_weight, in_deviations, to_six_digits
 from .splits import Split
 from .tuning import Tuned
 
 KINDS = ("grid", "tree", "scattered")
 _MORE_CLUSTERS = 1.5
-_RANK = 1e-10  # beside the largest eigenvalue, what is less is rounding
+_RANK = 1e-10  # of squares: what is less beside the largest is rounding
 
 
 @dataclass(frozen=True)
@@ -116,48 +116,54 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
     return clustered_antecedent(families, rows, label, inputs)
 
 
-def term_scores(tuned: Tuned, asking, spacing: Spacing, told=()):
-    """How much the residual of a model asks for terms, of every pair of input and their number.
+class TermScores:
+    """How much the residual of a model asks for terms, beside those that are told.
 
     As of the splits of a tree (``splits``), with the shares nu_k of so many even Gaussian terms on
-    an input, less their means, in the place of h - p. What those of pairs ``told`` explain is taken
-    out before, of the residual and of these functions.
+    an input, less their means, in the place of h - p.
     """
-    rows = tuned.problem.rows
-    weight = counting_weight(rows)
-    varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
-    basis = np.sqrt(weight)[:, None] * np.column_stack([np.ones(rows.n_rows), varying])
 
-    def shares_of(j, count):
-        shares = _shares(rows.X[:, j], spacing.centers(j, count))
-        return shares - np.average(shares, axis=0, weights=weight)
+    def __init__(self, tuned: Tuned, spacing: Spacing):
+        rows, self.weight = tuned.problem.rows, counting_weight(tuned.problem.rows)
+        self.X, self.spacing, root = rows.X, spacing, np.sqrt(self.weight)[:, None]
+        varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
+        self.basis = np.hstack([root, root * varying])
+        mean = np.average(tuned.residual, axis=0, weights=self.weight)
+        self.residual, self.known = root * (tuned.residual - mean), np.empty((rows.n_rows, 0))
 
-    residual = basis[:, :1] * (tuned.residual - np.average(tuned.residual, axis=0, weights=weight))
-    told = [(shares_of(*one)[:, :, None] * basis[:, None]).reshape(rows.n_rows, -1) for one in told]
-    functions = np.hstack([np.empty((rows.n_rows, 0)), *told])
-    sizes, axes = np.linalg.eigh(functions.T @ functions)
-    known = functions @ axes[:, sizes > _RANK * sizes.max(initial=0.0)]
-    known /= np.linalg.norm(known, axis=0)
-    residual -= known @ (known.T @ residual)
-    share_free = max(1.0 - known.shape[1] / rows.n_rows, np.finfo(float).eps)
-    variance = np.sum(residual**2, axis=0) / (share_free * weight.sum())
-    scores = np.zeros(len(asking))
-    for k, (j, count) in enumerate(asking):
-        shares = shares_of(j, count)
-        norm = (shares**2).T @ basis**2
-        taken = [np.sum((known.T @ (share[:, None] * basis)) ** 2, axis=0) for share in shares.T]
-        norm = np.maximum(norm - taken, _RANK * norm)[:, :, None]
-        along = np.einsum("nk,no,nb->kbo", shares, residual, basis, optimize=True)
-        squares = along**2 / np.maximum(norm * variance, np.finfo(float).tiny)
-        # One of the shares follows from the others.
-        free = 1.0 - 1.0 / count
-        scores[k] = in_deviations(free * squares.sum(), free * squares.size)
-    return scores
+    def tell(self, j, count):
+        """Take out what so many terms on an input explain, of the residual and of functions."""
+        pairs = self._shares(j, count)[:, :, None] * self.basis[:, None]
+        functions = pairs.reshape(len(self.X), -1)
+        least = _RANK * np.sum(functions**2, axis=0).max()
+        functions -= self.known @ (self.known.T @ functions)
+        sizes, axes = np.linalg.eigh(functions.T @ functions)
+        added = functions @ (axes / np.sqrt(np.maximum(sizes, least)))[:, sizes > least]
+        self.known = np.hstack([self.known, added])
+        self.residual -= added @ (added.T @ self.residual)
 
+    def of(self, asking):
+        """Of every pair of an input and a number of terms, in deviations from chance."""
+        scores, squared, n_known = [], self.basis**2, self.known.shape[1]
+        part_free = max(1.0 - n_known / len(self.X), np.finfo(float).eps)
+        variance = np.sum(self.residual**2, axis=0) / (part_free * self.weight.sum())
+        for j, count in asking:
+            shares = self._shares(j, count)
+            norm = (shares**2).T @ squared
+            if n_known:
+                told = [self.known.T @ (own[:, None] * self.basis) for own in shares.T]
+                norm = np.maximum(norm - np.sum(np.square(told), axis=1), _RANK * norm)
+            along = np.einsum("nk,no,nb->kbo", shares, self.residual, self.basis, optimize=True)
+            squares = along**2 / np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
+            free = 1.0 - 1.0 / count  # one of the shares follows from the others
+            scores.append(to_six_digits(in_deviations(free * squares.sum(), free * squares.size)))
+        return np.array(scores)
 
-def _shares(column, centers):
-    """Of Gaussian terms, neighbours of which cross at ``OVERLAP``, (n_rows, n_terms)."""
-    distance = np.mean(np.diff(centers)) or 1.0
-    log_truth = 4.0 * np.log(OVERLAP) * ((column[:, None] - centers) / distance) ** 2
-    shares = np.exp(log_truth - log_truth.max(axis=1, keepdims=True))
-    return shares / shares.sum(axis=1, keepdims=True)
+    def _shares(self, j, count):
+        """Of Gaussian terms, neighbours of which cross at ``OVERLAP``, less their means."""
+        centers = self.spacing.centers(j, count)
+        distance = np.mean(np.diff(centers)) or 1.0
+        log_truth = 4.0 * np.log(OVERLAP) * ((self.X[:, [j]] - centers) / distance) ** 2
+        shares = np.exp(log_truth - log_truth.max(axis=1, keepdims=True))
+        shares /= shares.sum(axis=1, keepdims=True)
+        return shares - np.average(shares, axis=0, weights=self.weight)

@@ -69,7 +69,7 @@ def check_grid_fits(n_mfs, counts, n_basis, n_outputs):
 def _would_take(needed):
     return (
         f"would take {_count(1 + needed // 2**20)} MiB, and the limit is "
-        f"{get_config()['working_memory']:,} (sklearn.set_config(working_memory=...))."
+        f"{get_config()['working_memory']:,} MiB (sklearn.set_config(working_memory=...))."
     )
 
 

@@ -21,7 +21,7 @@ from ..learning.premise import Premise
 from ..membership import Membership
 from ..model import TSKModel
 from ..policies import TargetRange
-from .candidates import Candidate, rule_base, term_scores
+from .candidates import Candidate, TermScores, rule_base
 from .grid import Spacing
 from .sample import effective_weight, to_six_digits, unit_scale
 from .splits import best_splits
@@ -45,6 +45,8 @@ _MOST_OPERATIONS = 1e9
 _TRIED = 4
 # Deviations by which what an input's terms would explain exceeds what they would of noise.
 _SIGNIFICANT = 2.0
+# By which residuals are asked: two do not see an odd curve, as of a saturation, beside a line.
+_TERMS = 3
 
 # The premises and consequents that keep what is known of the outputs. They are what is judged;
 # training is free.
@@ -88,11 +90,6 @@ class Trials:
         line = self._train(self._problem(self.one_rule), turns=0, first_steps=ARRIVING)
         self._found[self.one_rule] = line
 
-    def _scores(self, candidate, inputs, told=()):
-        # Two terms do not see an odd curve, as of a saturation, beside a line: three do.
-        asking, told = ([(j, candidate.counts[j] + 2) for j in of] for of in (inputs, told))
-        return term_scores(self.tuned(candidate), asking, self.spacing, told)
-
     def _asking(self, candidate):
         """Inputs for terms of scattered rules: those that ask by more than chance, at first one.
 
@@ -101,16 +98,17 @@ class Trials:
         """
         left = [int(j) for j in self.plan.premise_inputs if self.spacing.n_values(j) > 2]
         asked: list[int] = []
-        n_rows, n_columns = self.tuned(candidate).problem.rows.X.shape
-        work = n_rows * ((candidate.counts[0] + 2) * (1.0 + n_columns)) ** 2
-        # Where that is too much work, all that ask have terms.
+        scores = TermScores(self.tuned(candidate), self.spacing)
+        work = len(scores.basis) * (_TERMS * scores.basis.shape[1]) ** 2
+        # Where to tell them is too much work, all that ask have terms.
         while left and work * len(asked) * len(left) <= _MOST_OPERATIONS:
-            scores = self._scores(candidate, left, asked)
-            loudest = left[int(np.argmax(scores))]
-            left = [j for j, score in zip(left, scores, strict=True) if score > _SIGNIFICANT]
-            if not left and (asked or candidate.inputs):
-                break
-            asked.append(loudest)
+            if asked:
+                scores.tell(asked[-1], _TERMS)
+            found = scores.of([(j, _TERMS) for j in left])
+            loudest = left[int(np.argmax(found))]
+            left = [left[k] for k in np.flatnonzero(found > _SIGNIFICANT)]
+            if left or not (asked or candidate.inputs):
+                asked.append(loudest)
             left = [j for j in left if j != loudest]
         return [*asked, *left]
 
@@ -132,8 +130,10 @@ class Trials:
             grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
         else:
             inputs = self.plan.premise_inputs
-            asking = np.argsort(-self._scores(candidate, inputs), kind="stable")[:_TRIED]
-            grown = [candidate.with_more_terms(j) for j in inputs[asking]]
+            asking = [(j, candidate.counts[j] + _TERMS - 1) for j in inputs]
+            scores = TermScores(self.tuned(candidate), self.spacing).of(asking)
+            best = np.argsort(-scores, kind="stable")[:_TRIED]
+            grown = [candidate.with_more_terms(j) for j in inputs[best]]
         smaller = self.tuned(candidate)
         problems = {one: self._problem(one, smaller) for one in grown if self._is_small(one)}
         # Of rows that are alike but for a few, there are fewer clusters than were asked for.

@@ -153,8 +153,7 @@ class _Fit:
         def tell_callbacks(n_iter, evaluation):
             return self.callbacks.iteration(lambda: self.builder.model(start, evaluation))
 
-        tell = self.callbacks and tell_callbacks
-        watchers = [self.printer, tell] if is_watched else []
+        watchers = [self.printer, self.callbacks and tell_callbacks] if is_watched else []
         displacement = start.displacement
         if displacement is not None:
             displacement = np.clip(displacement, premise.lower, premise.upper)

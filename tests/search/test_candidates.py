@@ -12,7 +12,7 @@ from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
 from skanfis.search import Spacing, grid_antecedent, tuning
-from skanfis.search.candidates import Candidate, rule_base, term_scores
+from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.sample import search_sample
 
 pytestmark = pytest.mark.theory
@@ -87,7 +87,7 @@ def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
 @pytest.mark.parametrize("told", [[], [(0, 2)], [(0, 3), (2, 2)]])
 @pytest.mark.parametrize("count", [2, 3])
 @pytest.mark.parametrize("n_outputs", [1, 2])
-def test_term_scores_are_the_formula_term_by_term(rng, count, n_outputs, told):
+def test_scores_of_terms_are_the_formula_term_by_term(rng, count, n_outputs, told):
     """Beside what is told: of the residuals of all functions on those that tell it."""
     X = rng.uniform(-1.0, 1.0, (150, 4))
     y = np.sin(3.0 * X[:, [0]]) + X[:, [2]] * X[:, [3]] + 0.3 * rng.normal(size=(150, n_outputs))
@@ -126,8 +126,13 @@ def test_term_scores_are_the_formula_term_by_term(rng, count, n_outputs, told):
         n_free = (count - 1) * 5 * n_outputs
         expected.append((total * (count - 1) / count - n_free) / np.sqrt(2 * n_free))
     pairs = [(j, count) for j in asking]
-    assert_allclose(term_scores(tuned, pairs, spacing, told), expected, rtol=1e-6)
+    scores = TermScores(tuned, spacing)
+    for one in told:
+        scores.tell(*one)
+    assert_allclose(scores.of(pairs), expected, rtol=1e-5)
     # A column that never changes has no part in it.
     wide = sample_of(np.column_stack([X, np.ones(150)]), y, np.ceil(np.exp(X.sum(axis=1))))
-    found = term_scores(line_through(wide), pairs, Spacing(wide), told)
-    assert_allclose(found, expected, rtol=1e-6)
+    scores = TermScores(line_through(wide), Spacing(wide))
+    for one in told:
+        scores.tell(*one)
+    assert_allclose(scores.of(pairs), expected, rtol=1e-5)

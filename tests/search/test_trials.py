@@ -10,7 +10,7 @@ from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE
 from skanfis.membership import Gaussian
-from skanfis.search.candidates import Candidate, rule_base, term_scores
+from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
 from skanfis.search.trials import _ROWS_EACH, FEWEST_ROWS, Plan, Trials
@@ -136,11 +136,17 @@ class TestSequences:
             trials = trials_of(X, np.tanh(X[:, :3].sum(axis=1)) + 0.1 * rng.normal(size=500))
             asked.append(trials.larger("scattered", trials.one_rule).inputs)
             pairs = [(j, 3) for j in range(6)]
-            scores = term_scores(trials.tuned(trials.one_rule), pairs, trials.spacing)
+            scores = TermScores(trials.tuned(trials.one_rule), trials.spacing).of(pairs)
             assert scores.min() > 10.0
         # Noise alone asks by two deviations in one of twenty.
         assert sum(map(len, asked)) <= 5 * 3 + 2
         assert all(set(one) >= {0, 1, 2} for one in asked)
+
+    def test_all_that_ask_get_terms_where_to_tell_is_too_much_work(self, rng, monkeypatch):
+        X = rng.normal(size=(500, 6)) + rng.normal(size=(500, 1))
+        trials = trials_of(X, np.tanh(X[:, :3].sum(axis=1)) + 0.1 * rng.normal(size=500))
+        monkeypatch.setattr("skanfis.search.trials._MOST_OPERATIONS", 1e5)
+        assert sorted(trials._asking(trials.one_rule)) == [0, 1, 2, 3, 4, 5]
 
     def test_rules_are_added_where_those_that_have_learnt_leave_most(self, rng):
         """One rule more: its cluster is all rows, by their squared residuals."""

@@ -91,6 +91,7 @@ def test_any_chunks_equal_one_fit(whole_and_settings, chunking):
     model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS[chunking])
     once = ANFISRegressor(**settings).partial_fit(X, y)
     assert weights_of(model) == pytest.approx(weights_of(once), rel=0.01)
+    assert "alpha" not in settings or weights_of(model) == weights_of(once)
     assert difference(model, once, X) < tolerance(model, once)
     has_slopes = settings.get("order", 1) == 1 and settings.get("alpha") != 0.0
     assert difference(model, whole, X) < (0.05 if has_slopes else tolerance(model, whole))
