@@ -627,6 +627,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         self.redundant_rules_ = solved.redundant_rules
         self._keep_weights(solved.penalty)
 
+    @available_if(chunk_checks.can_learn_from_chunks)
     def merge(self, *others: Any) -> Self:
         """Add up what models trained apart by ``partial_fit`` have seen.
 
@@ -646,6 +647,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ------
         ValueError
             If a model has seen no chunk, or the premises, inputs or outputs differ.
+        AttributeError
+            If a parameter of this one needs all rows again, as for ``partial_fit``.
 
         Examples
         --------

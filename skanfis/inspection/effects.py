@@ -1,6 +1,6 @@
 """What every input, and every pair of inputs, does to the output, and how much of it."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from operator import itemgetter
@@ -38,7 +38,6 @@ def effects(
     X: ArrayLike | None = None,
     *,
     groups: Mapping[str, Sequence[int | str]] | None = None,
-    pairs: str | Iterable[Sequence[int | str]] = "all",
     output: int | str = 0,
 ) -> Effects:
     r"""Tell what part of the output's variance is due to each input, and to each pair of them.
@@ -57,9 +56,6 @@ def effects(
         ``fit`` keeps (JSON, ``partial_fit`` and ``merge`` do not).
     groups : dict of str to sequence of str or int, default=None
         Columns that enter as one, by a name for them; takes X, for how they go together.
-    pairs : "all" or iterable of pairs of names, default="all"
-        Which pairs to list; "all" leaves out those that are zero because no rule has either input
-        in its IF part.
     output : int or str, default=0
         Which output.
 
@@ -67,7 +63,8 @@ def effects(
     -------
     effects : object with attributes
         ``table``: DataFrame with a row per input, category or group, one per pair, the strongest
-        first, and "three or more"; "sobol", shares of the variance where inputs are independent,
+        first, and "three or more"; pairs that are zero because no rule has either input in its IF
+        part are left out; "sobol", shares of the variance where inputs are independent,
         and with X "rows", Cov(component, output) / Var(output) over its rows [1]_, which may be
         negative. Each column sums to one. ``held``: part of the combinations of independent inputs
         where the output would be held within its limits, from 10,000 draws. ``notes``: sentences.
@@ -75,7 +72,7 @@ def effects(
     Raises
     ------
     ValueError
-        If distributions are not known and X is not given; if a column or a pair is not there.
+        If distributions are not known and X is not given; if a column is not there.
 
     References
     ----------
@@ -96,8 +93,8 @@ def effects(
     """
     study = Study.of(estimator, X, groups, output)
     anova, labels = study.anova, study.labels
-    ones, wanted = [(g,) for g in range(len(labels))], study.pairs(pairs)
-    subsets = [*ones, *wanted]
+    ones = [(g,) for g in range(len(labels))]
+    subsets = [*ones, *study.pairs()]
     columns = {"sobol": study.sobol(subsets)}
     if study.rows is not None:
         columns["rows"] = _shares(subsets, *covariances(anova, subsets, study.rows))
@@ -107,11 +104,9 @@ def effects(
     order = {"by": "sobol", "ascending": False, "kind": "stable", "key": lambda own: own.round(9)}
     table = pd.concat([part.sort_values(**order) for part in parts])
     if len(ones) > 2:
-        is_all = set(wanted) >= set(study.pairs())
-        rest = "three or more" if is_all else "other pairs, three or more"
         left = float(anova.variance > 0.0) - table.sum()
         # Not by its label, which an input may have.
-        table = pd.concat([table, left.to_frame(rest).T])
+        table = pd.concat([table, left.to_frame("three or more").T])
     held = study.held
     return Effects(table, held, _notes(table, held, isinstance(anova, DrawnAnova)))
 
@@ -226,22 +221,13 @@ class Study:
         blocks = _known(model, inputs, rows)
         return cls(model, k, labels, blocks, is_drawn, rows, _anova(model, k, blocks))
 
-    def pairs(self, asked="all"):
-        """Pairs of blocks by their positions; all but those that are zero for want of terms."""
-        if isinstance(asked, str) and asked == "all":
-            terms = set(self.model.antecedent.term_inputs.tolist())
-            active = [bool(terms & set(block.inputs)) for block in self.blocks]
-            least = 1 if self.model.order else 2
-            every = combinations(range(len(active)), 2)
-            return [(g, h) for g, h in every if active[g] + active[h] >= least]
-        found: dict[tuple[int, ...], None] = {}
-        for pair in asked:
-            names = [pair] if isinstance(pair, str) else pair
-            own = tuple(sorted({_position(name, self.labels) for name in names}))
-            if len(own) != 2:
-                raise ValueError(f'pairs is "all" or pairs of two inputs; it has {pair!r}.')
-            found[own] = None
-        return list(found)
+    def pairs(self):
+        """Pairs of blocks by their positions, but those that are zero for want of terms."""
+        terms = set(self.model.antecedent.term_inputs.tolist())
+        active = [bool(terms & set(block.inputs)) for block in self.blocks]
+        least = 1 if self.model.order else 2
+        every = combinations(range(len(active)), 2)
+        return [(g, h) for g, h in every if active[g] + active[h] >= least]
 
     def sobol(self, subsets):
         """Shares of inputs and pairs in the variance, where inputs are independent."""

@@ -12,7 +12,7 @@ from .._validation import check_finite, positive_weights
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .measures import Measures, measure
-from .rules import has_training_data, premise_texts, writable
+from .rules import has_training_data, premise_texts
 from .sentences import Sentences
 from .text import counted, number
 
@@ -78,7 +78,7 @@ class Readability:
 
     @property
     def _said(self):
-        return Sentences.of(writable(self.model))
+        return Sentences.of(self.model)
 
     @property
     def rules(self) -> Any:

@@ -80,15 +80,6 @@ def readability_in_training(estimator, model):
     return replace(found, model=model, measures=replace(found.measures, printed_errors=unknown))
 
 
-def writable(model):
-    """The model with names that pandas and files take: lone surrogates become escapes."""
-    written = {}
-    for kind in ("input_names", "output_names", "term_names"):
-        names = [name.encode("utf-8", "backslashreplace") for name in getattr(model, kind)]
-        written[kind] = tuple(name.decode() for name in names)
-    return replace(model, **written)
-
-
 def rename(model, feature_names, output_names):
     """The model with other names of inputs and outputs, where given."""
     for kind, parameter, names in (
@@ -103,7 +94,7 @@ def rename(model, feature_names, output_names):
         if len(names) != count or len(set(names)) != count:
             raise ValueError(f"{parameter}={list(names)!r} must be {count} names, all different.")
         model = replace(model, **{kind: tuple(names)})
-    return writable(model)
+    return model
 
 
 def rules_table(estimator: Any) -> Any:
@@ -139,7 +130,7 @@ def rules_table(estimator: Any) -> Any:
     >>> list(rules["then y"])
     ['value', 'x0', 'x1']
     """
-    model = writable(fold(estimator))
+    model = fold(estimator)
     asked, said = conditions(model), Sentences.of(model, MOST_DIGITS)
     # Pairs: an input may be called "value" too.
     columns: list = [

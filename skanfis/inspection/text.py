@@ -69,17 +69,17 @@ def export_text(
     max_shown : int, default=None
         Most rules to write, first those that are the strongest on most rows; None for all.
     show_terms : bool, default=True
-        Whether to write the terms' parameters, the ranges, the policy outside them, and the noise.
+        Whether to write the terms' parameters, the ranges, and the policy outside them.
     feature_names, output_names : sequence of str, default=None
         Other names of the inputs and the outputs; None for the model's.
 
     Returns
     -------
     text : str
-        Rules by their number, with the part of the training rows on which each is the strongest,
-        and the RMSE of the rule alone there. The last lines say how many numbers there are, what
-        the text as printed errs over the model on the training rows (with the default precision),
-        and what the fit found against reading the rules one by one.
+        First by how much the outputs vary, and about the rules. Then the rules by their number,
+        with the part of the rows on which each is the strongest, and the RMSE of the rule alone
+        there. Last how many numbers there are, what the text as printed errs over the model (with
+        the default precision), and what the fit found against reading the rules one by one.
 
     Raises
     ------
@@ -96,6 +96,7 @@ def export_text(
     >>> model = ANFISRegressor(n_mfs=2, solver="lse", agreement=0.1).fit(hours, drift)
     >>> print(export_text(model, feature_names=["hours"], show_terms=False))
     2 rules, 1 input, 41 rows.
+    y varies by 0.94, about the rules by 0.55 (standard deviation).
     <BLANKLINE>
     Rule 0, strongest on 51 % of the rows, errs by 0.86 there:
       IF hours is low
@@ -110,7 +111,8 @@ def export_text(
     """
     said, found = _said(estimator, precision, feature_names, output_names)
     model, chosen = said.model, shown_rules(said.model, max_shown)
-    parts = [f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."]
+    head = [f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."]
+    parts = ["\n".join([*head, *_deviations(model, precision)])]
     common = _common_lines(said)
     parts += [fill(f"Common to the rules, {line}.", _WIDTH) for line in common]
     if common:
@@ -176,7 +178,8 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
         table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{counted(model.n_rules, 'rule')}</b>, {_inputs_and_rows(model)}"
-    parts = [f"<div>{counts}</div>", table]
+    parts = [f"<div>{line}</div>" for line in [counts, *map(escape, _deviations(model))]]
+    parts.append(table)
     lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
     if len(chosen) < model.n_rules:
         lines.append(f"and {_left_out(model, chosen)}")
@@ -202,6 +205,18 @@ def _inputs_and_rows(model):
     """Say "3 inputs, 506 rows"; rows that were trained on, if they are known."""
     inputs, n_rows = counted(model.n_inputs, "input"), round(model.rule_rows.sum())
     return f"{inputs}, {counted(f'{n_rows:,}', 'row')}" if has_training_data(model) else inputs
+
+
+def _deviations(model, precision=PRECISION):
+    """Say "y varies by 27, about the rules by 11 (standard deviation).", as far as it is known."""
+    lines, target = [], model.target
+    for k, name in enumerate(model.output_names if target else ()):
+        spread = target.spread[k] if target.minimum[k] < target.maximum[k] else 0.0
+        line = f"{name} varies by {number(spread, precision)}"
+        if model.posterior is not None:
+            line += f", about the rules by {number(model.posterior.noise[k], precision)}"
+        lines.append(f"{line} (standard deviation).")
+    return lines
 
 
 def _common_lines(said):
@@ -272,7 +287,6 @@ def _last_lines(said, found, precision=PRECISION):
 
 def _legend(said, precision):
     model, lines = said.model, ["Inputs, as they were trained:"]
-    target = model.target
     named = list(compress(model.memberships(), ~said.says_where))
     categories: dict[str, list[int]] = {}
     for j, name in enumerate(model.input_names):
@@ -294,14 +308,6 @@ def _legend(said, precision):
         if np.isfinite([low, high]).any():
             limits = _range(low, high, precision)
             lines.append(f"Held within the limits of its training: {name}, {limits}.")
-    for what, values in (
-        ("noise about the rules", model.posterior and model.posterior.noise),
-        ("target", target and np.where(target.maximum > target.minimum, target.spread, 0.0)),
-    ):
-        if values is not None:
-            pairs = zip(model.output_names, values, strict=True)
-            told = ", ".join(f"{name} {number(value, precision)}" for name, value in pairs)
-            lines.append(f"Standard deviation of the {what}: {told}.")
     functions = {term["function"] for term in named}
     terms = [_CUTS] if any("±" in name for name in model.term_names) else []
     formulas = {group.family.name: group.family.formula for group in model.antecedent.groups}

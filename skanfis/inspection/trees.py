@@ -12,7 +12,7 @@ from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .displays import _axes, _position, _section
 from .labels import as_label, title_of
-from .rules import condition, parts_led, writable
+from .rules import condition, parts_led
 from .sentences import Sentences
 from .text import counted, percent, plain
 
@@ -81,8 +81,7 @@ class TreeDisplay:
             If the rules are no tree, or the plane is asked of one that cuts more or fewer inputs.
         """
         check_choice("kind", kind, ("tree", "plane"))
-        folded, reader = fold_with_reader(estimator)
-        model = writable(folded)
+        model, reader = fold_with_reader(estimator)
         if not isinstance(model.antecedent, TreeAntecedent):
             raise ValueError(
                 f"The model has {counted(model.n_rules, 'rule')} and is no tree: there are no cuts "

@@ -400,4 +400,5 @@ def _model(sums, problem, evaluation):
         support=sums.support(),
         target=TargetRange(targets.minimum, targets.maximum, targets.scale),
         posterior=posterior,
+        tangent_at=None,  # nothing is known to rise or fall
     )

@@ -173,17 +173,8 @@ def test_what_is_held_is_told():
     assert effects(free, X).held == 0.0
 
 
-def test_pairs_that_are_asked_for():
-    model = MODELS["grid, order 1, 1 outputs"]
-    X = rows_of(model, 1.0, 9)
-    every, found = effects(model, X).table, effects(model, X, pairs=[("rate", "time")]).table
-    assert list(found.index[3:]) == ["time and rate", "other pairs, three or more"]
-    assert_allclose(found[:4], every.loc[found.index[:4]])
-    assert_allclose(found.sum(), 1.0)
-    assert len(effects(model, X, pairs=()).table) == 4
-    with pytest.raises(ValueError, match="pairs of two inputs"):
-        effects(model, X, pairs=[("rate", "rate")])
-    # Inputs without terms do nothing together.
+def test_inputs_without_terms_do_nothing_together():
+    X = rows_of(MODELS["grid, order 1, 1 outputs"], 1.0, 9)
     found = effects(MODELS["grid on two inputs, order 0, 1 outputs"], X).table
     assert list(found.index[3:]) == ["time and rate", "three or more"]
 

@@ -44,10 +44,10 @@ def test_noise_is_told_in_the_units_of_the_target():
     model = ANFISRegressor(n_mfs=3)
     scaled = TransformedTargetRegressor(model, transformer=StandardScaler()).fit(X, y)
     text = export_text(scaled, output_names=["drift"])
-    told = re.search(r"Standard deviation of the noise about the rules: drift (.*)\.", text)
+    told = re.search(r"drift varies by .*, about the rules by (.*) \(", text)
     assert float(told[1]) == pytest.approx(300.0, rel=4.0 / np.sqrt(2 * 2000))
     # A model that was taken as it was given knows of none.
-    assert "noise" not in export_text(replace(model.fit(X, y).model_, posterior=None))
+    assert "about the rules" not in export_text(replace(model.fit(X, y).model_, posterior=None))
 
 
 def predicted(text, rows, names=NAMES):
@@ -377,7 +377,7 @@ def test_what_the_text_errs_is_told_in_the_units_of_the_fit_alone(rng):
 
 def test_a_target_that_is_constant_has_no_deviation(rng):
     text = export_text(ANFISRegressor(n_mfs=2).fit(rng.uniform(size=(60, 2)), np.full(60, 3e99)))
-    assert "Standard deviation of the target: y 0." in text
+    assert "\ny varies by 0, about the rules by 0 (standard deviation)." in text
     assert "Held within the limits of its training: y, 3e+99 to 3e+99." in text
 
 

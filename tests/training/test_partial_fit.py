@@ -1,6 +1,7 @@
 """Rows in chunks make the model that one least-squares fit of all rows makes."""
 
 import pickle
+import warnings
 from copy import deepcopy
 from dataclasses import replace
 
@@ -204,6 +205,21 @@ def test_merged_equals_all_rows(premises):
         assert merged.n_samples_seen_ == 300
         assert merged.noise_std_ == pytest.approx(whole.noise_std_, rel=1e-9)
     assert np.array_equal(models[0].predict(X[:90]), before)
+
+
+def test_chunks_forget_what_the_premises_were_known_to_rise_with():
+    """Beyond the range too they are the fit of all rows to the same premises."""
+    X = np.random.default_rng(0).uniform(-1.0, 1.0, (200, 2))
+    y = X[:, 0] + np.tanh(3.0 * X[:, 0]) * (1.5 + X[:, 1])
+    known = ANFISRegressor(n_mfs=2, monotonic_cst=[1, 0]).fit(X, y)
+    settings = {"partition": known, "solver": "lse", "alpha": 0.0, "agreement": 0.0}
+    whole, chunks = ANFISRegressor(**settings).fit(X, y), ANFISRegressor(**settings)
+    chunks.partial_fit(X[:100], y[:100]).partial_fit(X[100:], y[100:])
+    beyond = X[:50] + np.sign(X[:50])
+    with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
+        assert np.allclose(chunks.predict(beyond), whole.predict(beyond), atol=1e-9)
+    with pytest.raises(AttributeError, match="has no attribute 'merge'"):
+        chunks.set_params(monotonic_cst=[1, 0]).merge(chunks)
 
 
 def test_merge_says_how_premises_differ(premises):
