@@ -136,16 +136,16 @@ class Trials:
             grown = [candidate.with_more_terms(j) for j in inputs[best]]
         smaller = self.tuned(candidate)
         problems = {one: self._problem(one, smaller) for one in grown if self._is_small(one)}
+        # Clusters anew have learnt nothing yet: beside rules that go on they take some turns first.
+        turns = FEW_TURNS if kind == "scattered" else 0
         # Of rows that are alike but for a few, there are fewer clusters than were asked for.
         begun = {
-            one: self._train(problem, turns=0)
+            one: self._train(problem, turns)
             for one, problem in problems.items()
             if problem.antecedent.n_rules == one.n_rules
         }
         self._begun |= begun
-        # Clusters anew have learnt nothing yet: beside rules that go on they are judged trained.
-        seen = self.tuned if kind == "scattered" else begun.__getitem__
-        return min(begun, key=lambda one: to_six_digits(self.expected(seen(one))), default=None)
+        return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
 
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
@@ -176,7 +176,7 @@ class Trials:
                 # one another, and are wild between them.
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 begun = self._begun[candidate]
-                found = self._train(begun.problem, turns, evaluation=begun.evaluation)
+                found = self._train(begun.problem, turns, begun=begun)
             self._found[candidate] = found
         return self._found[candidate]
 
@@ -200,10 +200,10 @@ class Trials:
         inputs = plan.consequent_inputs
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=inputs)
 
-    def _train(self, problem, turns=MOST_TURNS, first_steps=_STEPS_TO_PROMISE, evaluation=None):
+    def _train(self, problem, turns=MOST_TURNS, first_steps=_STEPS_TO_PROMISE, begun=None):
         free, weight = self.plan.free, effective_weight(problem.rows)
         premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
-        return tune(problem, premise, free, weight, turns, first_steps, evaluation)
+        return tune(problem, premise, free, weight, turns, first_steps, begun)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
         """Of rows that were not trained on, as predict answers; summed over outputs."""
