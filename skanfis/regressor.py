@@ -645,10 +645,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
         Raises
         ------
-        ValueError
-            If a model has seen no chunk, or the premises, inputs or outputs differ.
-        AttributeError
-            If a parameter of this one needs all rows again, as for ``partial_fit``.
+        ValueError, AttributeError
+            If a model has seen no chunk, the premises, inputs or outputs differ, or a parameter of
+            this one needs all rows again, as for ``partial_fit``.
 
         Examples
         --------
