@@ -18,6 +18,9 @@ __all__ = ["EarlyStopping", "Huber", "LinearExtrapolation"]
 class Huber(BaseEstimator):
     """Huber's loss (1964): rows far from the model count by their residual, not by its square.
 
+    Where more than half of a target is one value without noise, such as zero, all other rows are
+    taken for outliers, as by any scale that is a median: such targets take squares.
+
     Parameters
     ----------
     epsilon : float, default=1.35

@@ -51,8 +51,6 @@ _MOST_TURNS = 20
 # Weights are settled when they change by less than this on average: a tenth of what the scale of
 # the residuals, a median of some hundred rows, is uncertain by.
 _SETTLED = 1e-3
-# Rows of less weight count for nothing; where they are more than this part of all, it is said.
-_NOTHING, _MANY = 1e-6, 0.05
 
 
 def fit_rules(
@@ -182,16 +180,7 @@ class _Fit:
         if self.held_out is not None:
             self.held_out = replace(self.held_out, targets=self.rows.targets)
         _, weights = self._robust_turns(weights)
-        run, weights = self._robust_turns(weights)
-        lost = float(np.average(weights < _NOTHING, weights=self.rows.weights))
-        if lost > _MANY:
-            warn_user(
-                f"loss='huber': {100.0 * lost:.2g} % of the rows count for nothing: they are a "
-                "million times as far from the rules as half of all rows. If they are no "
-                "outliers, as where most of a target is zero, use loss='squared_error'.",
-                UserWarning,
-            )
-        return run, weights
+        return self._robust_turns(weights)
 
     def _robust_turns(self, weights):
         rows, epsilon = self.rows, self.huber.epsilon
