@@ -197,6 +197,9 @@ class _TextSource:
         except pd.errors.EmptyDataError:
             return
         except pd.errors.ParserError as error:
+            # Of an interrupt pandas says no more.
+            if "Calling read(nbytes) on source failed" in str(error):
+                raise KeyboardInterrupt from error
             raise LogError(f"{self.path}: is no table: {str(error).strip()}") from error
         except UnicodeError as error:
             raise _no_text(self.path) from error

@@ -1,5 +1,6 @@
 """What the command never does: replace what it reads, run a file unasked, hang, leave things."""
 
+import io
 import os
 import platform
 import signal
@@ -16,7 +17,7 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import GyroCompensator, LogError, read_log
+from skanfis.gyro import GyroCompensator, LogError, _source, read_log
 from skanfis.gyro.command import _staged, main
 
 from ..quick import quick
@@ -146,6 +147,27 @@ def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path):
     with _staged(tmp_path) as folder:
         (folder / "done.csv").write_text("")
     assert {path.name for path in tmp_path.iterdir()} == {alive.name, other.name, "done.csv"}
+
+
+class Interrupted(io.StringIO):
+    def read(self, *_):
+        signal.raise_signal(signal.SIGINT)
+        return ""
+
+
+def test_an_interrupt_while_pandas_reads_is_one(tmp_path, monkeypatch):
+    """pandas makes a broken table of it."""
+    path = tmp_path / "log.csv"
+    path.write_text("time,x\n1,2\n3,4\n")
+    source = _source._TextSource(path)
+    monkeypatch.setattr(_source, "open", lambda *_, **__: Interrupted("time,x\n1,2"), raising=False)
+    # What runs in the background is deaf to it.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            list(source.pieces([0, 1], 10))
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of another kind")
