@@ -111,8 +111,8 @@ def export_text(
     """
     said, found = _said(estimator, precision, feature_names, output_names)
     model, chosen = said.model, shown_rules(said.model, max_shown)
-    head = [f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."]
-    parts = ["\n".join([*head, *_deviations(model, precision)])]
+    counts = f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."
+    parts = ["\n".join([counts, *_deviations(model, precision)])]
     common = _common_lines(said)
     parts += [fill(f"Common to the rules, {line}.", _WIDTH) for line in common]
     if common:

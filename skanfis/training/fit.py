@@ -230,6 +230,7 @@ class _Fit:
         learnt = run.premise if self.solver.moves_premises else None
         n_rows = effective_weight(rows)
         if weights is not None:
+            # As many as of copies of the rows, each with the weight by Huber's loss.
             share, square = (np.average(weights**k, weights=rows.weights) for k in (1, 2))
             n_rows *= share**2 / square
         posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
