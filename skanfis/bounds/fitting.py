@@ -14,7 +14,7 @@ import numpy as np
 
 from .._validation import warn_user
 from ..antecedent import TreeAntecedent
-from ..consequent import NormalFactor, in_user_units
+from ..consequent import NormalFactor, in_user_units, with_common_slopes
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..learning.data import Scale
 from ..learning.objective import Evaluation
@@ -351,13 +351,10 @@ class _ConstrainedFit:
     def _with(self, antecedent, local, targets):
         """The model of premises of standardised inputs and local consequents of some targets."""
         problem, inputs = self.problem, self.problem.rows.inputs
-        coefficients = in_user_units(
-            problem.local.to_global(local),
-            inputs,
-            targets,
-            problem.consequent_inputs,
-            problem.order,
-        )
+        common, slopes = problem.penalty.common, problem.consequent_inputs
+        coefficients = problem.local.to_global(local)
+        coefficients = with_common_slopes(coefficients, self.model.rule_weights, common, slopes)
+        coefficients = in_user_units(coefficients, inputs, targets, slopes, problem.order)
         return replace(
             self.model,
             antecedent=antecedent.change_units(inputs.offset, inputs.scale),

@@ -71,6 +71,13 @@ def test_predictions_rise_everywhere(params, rng):
         assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
 
 
+def test_slopes_that_rules_have_in_common_stay_one_to_the_last_bit(rng):
+    X, _, y = planted(rng)
+    y = y - 0.3 * X[:, 1] ** 2 + X[:, 1]
+    held = ANFISRegressor(n_mfs=[3, 1], monotonic_cst=[1, 1]).fit(X, y)
+    assert held.model_.common_slopes[:, 1].all()
+
+
 def test_signs_are_found_by_the_names_of_columns_that_are_numbers(rng):
     X, _, y = planted(rng)
     frame = pd.DataFrame(X, columns=["0", "1"])
