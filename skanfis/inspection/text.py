@@ -307,7 +307,7 @@ def _legend(said, precision):
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         if np.isfinite([low, high]).any():
             limits = _range(low, high, precision)
-            lines.append(f"Held within the limits of its training: {name}, {limits}.")
+            lines.append(f"No prediction leaves these limits: {name}, {limits}.")
     functions = {term["function"] for term in named}
     terms = [_CUTS] if any("±" in name for name in model.term_names) else []
     formulas = {group.family.name: group.family.formula for group in model.antecedent.groups}

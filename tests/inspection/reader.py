@@ -118,5 +118,5 @@ def _terms(text):
 
 
 def _limits(text):
-    pattern = rf"Held within the limits of its training: (.+), ({NUMBER}|-inf) to ({NUMBER}|inf)\."
+    pattern = rf"No prediction leaves these limits: (.+), ({NUMBER}|-inf) to ({NUMBER}|inf)\."
     return {name: (float(low), float(high)) for name, low, high in re.findall(pattern, text)}

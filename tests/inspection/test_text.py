@@ -378,7 +378,15 @@ def test_what_the_text_errs_is_told_in_the_units_of_the_fit_alone(rng):
 def test_a_target_that_is_constant_has_no_deviation(rng):
     text = export_text(ANFISRegressor(n_mfs=2).fit(rng.uniform(size=(60, 2)), np.full(60, 3e99)))
     assert "\ny varies by 0, about the rules by 0 (standard deviation)." in text
-    assert "Held within the limits of its training: y, 3e+99 to 3e+99." in text
+    assert "No prediction leaves these limits: y, 3e+99 to 3e+99." in text
+
+
+def test_limits_are_not_told_as_those_of_the_rows(rng):
+    """They leave half a deviation on either side."""
+    X = rng.uniform(size=(60, 1))
+    model = ANFISRegressor(n_mfs=1).fit(X, np.repeat([0.0, 1.0], 30))
+    assert "No prediction leaves these limits: y, -0.25 to 1.25." in export_text(model)
+    assert np.abs(model.predict([[-1e9], [1e9]]) - 0.5).max() <= 0.75
 
 
 def test_a_rule_that_is_the_strongest_on_no_row_errs_on_none():
