@@ -85,7 +85,7 @@ class StructureDisplay:
         """Draw the candidates on ``ax``, as of :meth:`from_estimator`."""
         ax = self.ax_ = _axes(ax)
         self.figure_ = ax.figure
-        structures = sorted(self.structures, key=lambda one: one["rules"])
+        structures = sorted(self.structures, key=lambda one: one["reading_cost"])
         for kind in dict.fromkeys(one["kind"] for one in structures):
             own = _places([one for one in structures if one["kind"] == kind])
             color, marker = _KINDS[kind]

@@ -68,6 +68,12 @@ def test_every_candidate_is_where_its_cost_and_error_put_it(line):
     assert len({lines[kind].get_marker() for kind in ("one rule", "grid", "scattered")}) == 3
 
 
+def test_the_line_of_a_kind_goes_from_the_cheapest_to_the_dearest(line):
+    sparse = candidate("grid", 6, 12, 0.21)
+    drawn = drawn_lines(shown(line, [*CLEAR, sparse]))["grid"]
+    assert_array_equal(drawn.get_xdata(), [9, 12, 20, 40])
+
+
 @pytest.mark.parametrize(
     ("structures", "simplicity", "squared"),
     [
