@@ -13,6 +13,7 @@ from ..antecedent import TreeAntecedent
 from ..export import fold, fold_with_rows
 from .labels import as_label, title_of
 from .rules import has_training_data
+from .sentences import PRECISION, rounded
 
 # Points of a membership along its input, and bins of the data behind it.
 _N_POINTS, _BINS = 201, 30
@@ -298,12 +299,11 @@ def _position(feature, names, what="input"):
 def _section(model, both, n_points, held=None):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 
-    The others take their value in ``held``, or their mean in training; without training data, the
-    middle of their range.
+    The others take their value in ``held``, or their mean in training, in few digits; without
+    training data, the middle of their range.
     """
-    middle = 0.5 * (model.minimum + model.maximum)
-    mean = model.reference if has_training_data(model) else middle
-    row = np.clip(mean, model.minimum, model.maximum)
+    mean = model.reference if has_training_data(model) else 0.5 * (model.minimum + model.maximum)
+    row = np.clip(rounded(mean, model.spread, PRECISION), model.minimum, model.maximum)
     held = {} if held is None else held
     if not isinstance(held, Mapping):
         raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")

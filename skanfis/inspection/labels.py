@@ -24,7 +24,7 @@ def as_label(name):
 
 def title_of(held, *notes):
     """Inputs and the values at which they are held, a few of them, and notes, over a picture."""
-    values = [f"{as_label(name)} = {value:.4g}" for name, value in held.items()]
+    values = [f"{as_label(name)} = {value:.12g}" for name, value in held.items()]
     more = len(values) - _MOST_HELD
     others = [f"{more} more inputs held"] if more > 0 else []
     return fill("; ".join([*values[:_MOST_HELD], *others, *notes]), _LETTERS)

@@ -209,6 +209,15 @@ def test_every_picture_takes_every_name():
     assert [surface.ax_.get_xlabel(), surface.ax_.get_ylabel()] == labels[:2]
 
 
+def test_means_that_are_held_have_the_digits_of_their_deviation(rng):
+    """No rounding's rest in place of zero, and a time stamp that names a second."""
+    X = rng.uniform(-1.0, 1.0, (60, 4))
+    X -= X.mean(axis=0)
+    X[:, 3] = 1.7e9 + 100.0 * X[:, 3]
+    display = ResponseSurfaceDisplay.from_estimator(ANFISRegressor(n_mfs=1).fit(X, X[:, 0]))
+    assert display.ax_.get_title(loc="left").startswith("x2 = 0; x3 = 1700000000")
+
+
 def test_a_title_names_a_few_of_the_inputs_that_are_held():
     held = {f"x{k}": 0.5 * k for k in range(9)}
     assert title_of(dict(list(held.items())[:2]), "pale") == "x0 = 0; x1 = 0.5; pale"
