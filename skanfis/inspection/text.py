@@ -287,6 +287,8 @@ def _last_lines(said, found, precision=PRECISION):
 
 def _legend(said, precision):
     model, lines = said.model, ["Inputs, as they were trained:"]
+    families = [group.family for group in model.antecedent.groups]
+    at = {one.name for family in families for one in family.parameters if one.kind == "location"}
     named = list(compress(model.memberships(), ~said.says_where))
     categories: dict[str, list[int]] = {}
     for j, name in enumerate(model.input_names):
@@ -297,7 +299,7 @@ def _legend(said, precision):
         range_of = _range(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
         lines.append(f"  {name}: {range_of}")
         width = max((len(term["name"]) for term in terms), default=0)
-        lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term)}" for term in terms]
+        lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
     for name, own in categories.items():
         levels = [said.levels[model.input_names[j]][1] for j in own]
         levels += ["other"] if model.reference[own].sum() < 1.0 - _ROUNDING else []
@@ -310,17 +312,18 @@ def _legend(said, precision):
             lines.append(f"No prediction leaves these limits: {name}, {limits}.")
     functions = {term["function"] for term in named}
     terms = [_CUTS] if any("±" in name for name in model.term_names) else []
-    formulas = {group.family.name: group.family.formula for group in model.antecedent.groups}
+    formulas = {family.name: family.formula for family in families}
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
     how = _HOW.format(terms="".join(terms), line=_LINE if said.common.any() else "")
     return "\n".join([*lines, "", fill(how, _WIDTH)])
 
 
-def _term_text(term):
+def _term_text(term, locations):
     """Write "gaussian, center 21.3, width 4.2" of an entry of TSKModel.memberships."""
     numbers = {k: v for k, v in term.items() if k not in ("input", "name", "function")}
-    # Of a logarithm the last digit is rounding's.
-    return ", ".join([term["function"], *(f"{k} {number(v, 15)}" for k, v in numbers.items())])
+    # Of a logarithm the last digits are rounding's.
+    told = (f"{k} {plain(v) if k in locations else number(v, 14)}" for k, v in numbers.items())
+    return ", ".join([term["function"], *told])
 
 
 def _left_out(model, chosen):

@@ -389,6 +389,21 @@ def test_limits_are_not_told_as_those_of_the_rows(rng):
     assert np.abs(model.predict([[-1e9], [1e9]]) - 0.5).max() <= 0.75
 
 
+@pytest.mark.parametrize(("unit", "start"), [(1e-15, 0.0), (100.0, 1.7e9)])
+def test_terms_are_written_without_rests_of_rounding_and_places_to_the_last_digit(unit, start, rng):
+    z = rng.uniform(size=(80, 1))
+    X, y = start + unit * z, np.tanh(9.0 * (z[:, 0] - 0.5)) + 0.1 * rng.standard_normal(80)
+    model = ANFISRegressor(n_mfs=3).fit(X, y)
+    numbers = re.findall(r"(?:center|width) (\S+?)(?:,|\n)", export_text(model))
+    assert len(numbers) == 6
+    assert max(len(text.partition("e")[0]) for text in numbers) <= len("1700000000.12")
+    read = read_text(export_text(model, precision=17), ["x0"])
+    for term in model.memberships_:
+        _, told = read.terms[term["input"], term["name"]]
+        assert told["center"] == term["center"]
+        assert told["width"] == pytest.approx(term["width"], rel=1e-13)
+
+
 def test_a_rule_that_is_the_strongest_on_no_row_errs_on_none():
     rows = np.ones(12)
     rows[3] = 0.0
