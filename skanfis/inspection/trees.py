@@ -153,7 +153,7 @@ class TreeDisplay:
         ax.set_ylim(-0.6, n_rules - 0.2)
         ax.set_axis_off()
         name = as_label(model.output_names[self.output])
-        ax.set_title(f"{name}: typical value (part of the rows)", fontsize="small", loc="left")
+        ax.set_title(f"{name}: what each rule says (its rows)", fontsize="small", loc="left")
 
     def _draw_plane(self, ax):
         model, both = self.model, np.unique(self.model.antecedent.term_inputs)

@@ -37,7 +37,7 @@ def test_leaves_stand_from_above_every_cut_to_below_it():
         assert int(places[display.leaves[r]][0]) == len(path)
     assert sum("chip temperature" in text for text in places) == 2
     assert display.figure_ is display.ax_.figure
-    assert "y1: typical value" in display.ax_.get_title(loc="left")
+    assert "y1: what each rule says (its rows)" in display.ax_.get_title(loc="left")
 
 
 def test_values_are_those_of_the_rules_where_their_rows_lie():
