@@ -37,7 +37,7 @@ _CUTS = (
     "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; x < c ± h is what "
     "that lacks of 1. "
 )
-_TERM = "A {} term is {} true. "
+_TERM = "The truth of {} terms is {}. "
 _LINE = ", less the common line's part in it, plus the common line"
 _IN_PLACE = (
     "Every value has a part of this line in it; a rule's own slope stands in place of the line's."

@@ -68,7 +68,8 @@ def read_text(text, names):
         for line in re.findall(r"Common to the rules, (.*?)\.(?:\n| Every value|$)", joined):
             output, _, slopes = line.partition(": ")
             common[output] = _slopes(slopes, names)
-    formulas = dict(re.findall(r"A (\w+) term is (.*?) true\. ", " ".join(text.split())))
+    joined = " ".join(text.split())
+    formulas = dict(re.findall(r"The truth of (\w+) terms is (.*?)\. (?=[A-Z])", joined))
     return Read(rules, common, _terms(text), formulas, _limits(text))
 
 
