@@ -343,7 +343,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
                 if isinstance(option, BaseEstimator):
                     check_parameters(option)
             data = self._check_training_data(X, y, sample_weight, groups)
-            request = structure_request(self, data.input_names)
+            request = structure_request(self, data.input_names, sample_weight)
             callbacks = None
             if context is not None:
                 metadata = None if sample_weight is None else {"sample_weight": sample_weight}

@@ -43,8 +43,7 @@ class StructureRequest(Plan):
         """Where to start from, for these rows."""
         self._check_combination()
         check_columns_fit(len(self.names))
-        is_word = isinstance(self.n_mfs, str) and isinstance(self.partition, str)
-        if is_word and self.partition in ("auto", *KINDS):
+        if isinstance(self.n_mfs, str) and isinstance(self.partition, str):
             return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
         if isinstance(self.partition, TSKModel):
             model = self.partition
@@ -72,10 +71,25 @@ class StructureRequest(Plan):
         return replace(self, premise_inputs=varying, n_all=effective_weight(rows))
 
     def _antecedent(self, rows):
-        """The rules that were asked for."""
+        """The rules that were asked for; clusters are counted before any rule is made of them."""
         if isinstance(self.n_mfs, str):
-            label = self._checked(_labeller(self.partition, rows.sample_weight is not None), rows)
-            return clustered_antecedent(self.families, rows, label, self.premise_inputs)
+            label = _labeller(self.partition)
+
+            def checked(table, weight):
+                labels = np.asarray(label(table, weight))
+                n_rules = np.unique(labels[labels >= 0]).size
+                self._check_number(n_rules)
+                check_rules_fit(
+                    f"partition={self.partition!r} makes",
+                    n_rules,
+                    n_rules * self.premise_inputs.size,
+                    1 + self.consequent_inputs.size,
+                    rows.y.shape[1],
+                    "Use fewer clusters, or constants as consequents (order=0).",
+                )
+                return labels
+
+            return clustered_antecedent(self.families, rows, checked, self.premise_inputs)
         counts = self._grid_counts(rows)
         self._check_number(prod(counts))
         check_grid_fits(self.n_mfs, counts, 1 + self.consequent_inputs.size, rows.y.shape[1])
@@ -94,8 +108,7 @@ class StructureRequest(Plan):
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""
-        is_grid = isinstance(self.partition, str) and self.partition in ("auto", "grid")
-        if isinstance(self.n_mfs, str) or is_grid:
+        if isinstance(self.n_mfs, str) or str(self.partition) in ("auto", "grid"):
             return
         what = "the imported rules" if isinstance(self.partition, TSKModel) else "other rules"
         raise ValueError(
@@ -114,25 +127,6 @@ class StructureRequest(Plan):
                 f"{given} makes {n_rules:,} rules, more than max_rules={self.max_rules}: give "
                 "fewer, or leave max_rules at None."
             )
-
-    def _checked(self, label, rows):
-        """A labeller whose clusters are counted before any rule is made of them."""
-
-        def checked(table, weight):
-            labels = np.asarray(label(table, weight))
-            n_rules = np.unique(labels[labels >= 0]).size
-            self._check_number(n_rules)
-            check_rules_fit(
-                f"partition={self.partition!r} makes",
-                n_rules,
-                n_rules * self.premise_inputs.size,
-                1 + self.consequent_inputs.size,
-                rows.y.shape[1],
-                "Use fewer clusters, or constants as consequents (order=0).",
-            )
-            return labels
-
-        return checked
 
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""
@@ -169,17 +163,12 @@ class StructureRequest(Plan):
             )
 
 
-def _labeller(clusterer, weighted):
-    """Labels of weighted rows by a scikit-learn clusterer; ValueError if it takes no weights."""
+def _labeller(clusterer):
+    """Labels of weighted rows by a scikit-learn clusterer."""
 
     def label(table, weight):
         if has_fit_parameter(clusterer, "sample_weight"):
             return clone(clusterer).fit(table, sample_weight=weight).labels_
-        if weighted:
-            raise ValueError(
-                f"partition={clusterer!r} takes no sample_weight, but fit was given one: use a "
-                "clusterer that does, such as KMeans, or partition='grid'."
-            )
         repeated = np.repeat(np.arange(weight.size), weight.astype(int))
         labels = np.empty(weight.size, dtype=int)
         labels[repeated] = clone(clusterer).fit_predict(table[repeated])

@@ -1,6 +1,7 @@
 """What the parameters of an estimator ask for: names of columns, families and solvers resolved."""
 
 from sklearn.utils import check_random_state
+from sklearn.utils.validation import has_fit_parameter
 
 from .._validation import feature_indices
 from ..learning import SOLVERS, Solver
@@ -24,11 +25,10 @@ def given_weights(estimator):
     return weights
 
 
-def structure_request(estimator, names):
+def structure_request(estimator, names, sample_weight=None):
     """What training starts from, with all names of columns and families resolved."""
-    start = _imported(estimator, names)
-    is_default = isinstance(estimator.mf, str) and estimator.mf == "gaussian"
-    if isinstance(start, str) and start == "tree" and not is_default:
+    start = _imported(estimator, names, sample_weight)
+    if isinstance(start, str) and start == "tree" and str(estimator.mf) != "gaussian":
         raise ValueError(
             f"mf={estimator.mf!r} means nothing to partition='tree', whose rules are sides of "
             "cuts: leave mf at 'gaussian', its default, or use another partition."
@@ -57,14 +57,21 @@ def structure_request(estimator, names):
     )
 
 
-def _imported(estimator, names):
+def _imported(estimator, names, sample_weight):
     """``partition``, with the model in place of the estimator that holds it."""
     given = estimator.partition
     if isinstance(given, type):
         raise ValueError(
             f"partition={given!r} is a class: give an object of it, {given.__name__}(...)."
         )
-    if isinstance(given, str) or hasattr(given, "fit_predict"):
+    if isinstance(given, str):
+        return given
+    if hasattr(given, "fit_predict"):
+        if sample_weight is not None and not has_fit_parameter(given, "sample_weight"):
+            raise ValueError(
+                f"partition={given!r} takes no sample_weight, but fit was given one: use a "
+                "clusterer that does, such as KMeans, or partition='grid'."
+            )
         return given
     model = getattr(given, "model_", given)
     if not isinstance(model, TSKModel):

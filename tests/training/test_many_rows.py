@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
+from sklearn.mixture import GaussianMixture
 
 from skanfis import ANFISRegressor
 from skanfis.learning import VariableProjection, sampling
@@ -13,6 +14,7 @@ from skanfis.learning.sampling import with_sample
 from skanfis.membership import Gaussian
 
 from .. import oracles
+from ..quick import quick
 
 N_ROWS, N_SAMPLE = 12_000, 3000
 
@@ -46,6 +48,12 @@ def full_passes(monkeypatch):
 
 def test_threshold_is_where_the_docs_say():
     assert (sampling.MANY_ROWS, sampling.SAMPLE_ROWS) == (100_000, 20_000)
+
+
+def test_repeated_rows_are_no_weights_that_a_clusterer_must_take(few_are_many):
+    X, y = noisy_surface()
+    mixture = GaussianMixture(3, random_state=0)
+    assert quick(partition=mixture).fit(X.round(1), y.round(1)).n_rules_ == 3
 
 
 @pytest.mark.parametrize("settings", [{"n_mfs": 3}, {}])
