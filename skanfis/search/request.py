@@ -73,7 +73,7 @@ class StructureRequest(Plan):
     def _antecedent(self, rows):
         """The rules that were asked for; clusters are counted before any rule is made of them."""
         if isinstance(self.n_mfs, str):
-            label = _labeller(self.partition)
+            label = _labeller(self.partition, self.seed)
 
             def checked(table, weight):
                 labels = np.asarray(label(table, weight))
@@ -163,15 +163,19 @@ class StructureRequest(Plan):
             )
 
 
-def _labeller(clusterer):
-    """Labels of weighted rows by a scikit-learn clusterer."""
+def _labeller(clusterer, seed):
+    """Labels of weighted rows by a scikit-learn clusterer, with the seed where it has none."""
+    seeded = clone(clusterer)
+    for key, value in clusterer.get_params().items():
+        if value is None and key.endswith("random_state"):
+            seeded.set_params(**{key: seed})
 
     def label(table, weight):
         if has_fit_parameter(clusterer, "sample_weight"):
-            return clone(clusterer).fit(table, sample_weight=weight).labels_
+            return seeded.fit(table, sample_weight=weight).labels_
         repeated = np.repeat(np.arange(weight.size), weight.astype(int))
         labels = np.empty(weight.size, dtype=int)
-        labels[repeated] = clone(clusterer).fit_predict(table[repeated])
+        labels[repeated] = seeded.fit_predict(table[repeated])
         return labels
 
     return label

@@ -334,6 +334,26 @@ def test_any_clusterer_gives_a_rule_per_cluster(clusterer):
     assert_allclose(model.predict(X[9:]), y[9:], atol=0.05)
 
 
+@pytest.mark.parametrize(
+    "clusterer", [FuzzyCMeans(5), make_pipeline(StandardScaler(), KMeans(5, n_init=1))], ids=str
+)
+def test_draws_of_a_clusterer_without_a_seed_have_that_of_the_fit(data, clusterer):
+    one, same, other = (
+        quick(partition=clusterer, random_state=seed).fit(*data).predict(data[0])
+        for seed in (None, None, 1)
+    )
+    assert_array_equal(one, same)
+    assert (one != other).any()
+
+
+def test_seed_of_a_clusterer_is_kept(data):
+    kmeans = KMeans(5, n_init=1, random_state=3)
+    one, other = (
+        quick(partition=kmeans, random_state=seed).fit(*data).predict(data[0]) for seed in (0, 1)
+    )
+    assert_array_equal(one, other)
+
+
 def test_groups_may_have_names(data):
     numbers = np.arange(300) // 50
     names = np.array(["a", "b", "c", "d", "e", "f"])[numbers]
