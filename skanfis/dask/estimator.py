@@ -128,7 +128,7 @@ class DaskANFISRegressor(ANFISRegressor):
         if not is_many(data.rows()):
             here = computed(X, y, sample_weight, groups)
             return super()._check_training_data(*here)
-        is_given = self.max_iter == 0 and not isinstance(self.partition, str)
+        is_given = self.max_iter == 0 and hasattr(self.partition, "strengths")
         for name, is_asked in (
             ("Huber's loss", self.loss != "squared_error"),
             ("early_stopping", self.early_stopping),

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.cluster import KMeans
 from sklearn.exceptions import UndefinedMetricWarning
 from sklearn.metrics import r2_score
 
@@ -283,6 +284,16 @@ def test_bad_data_are_refused_by_name(make, error, message):
 def test_what_needs_every_residual_is_refused(few_are_many):
     with pytest.raises(ValueError, match="needs every row's own residual"):
         DaskANFISRegressor(n_mfs=2, loss="huber").fit(*cut(1000, *data()))
+
+
+def test_clusters_taken_as_they_are_need_no_residual(few_are_many):
+    X, y = data()
+    given = {"partition": KMeans(2, n_init=1, random_state=0), "max_iter": 0}
+    single = ANFISRegressor(**given).fit(X, y)
+    spread = DaskANFISRegressor(**given).fit(*cut(1000, X, y))
+    assert_allclose(spread.predict(X), single.predict(X), rtol=0, atol=1e-10 * np.ptp(y))
+    with pytest.raises(ValueError, match="max_iter=0 with a model as partition needs"):
+        DaskANFISRegressor(partition=single, max_iter=0).fit(*cut(1000, X, y))
 
 
 def test_prediction_wants_the_columns_of_training():
