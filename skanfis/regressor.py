@@ -357,7 +357,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             raise
         self.model_ = fitted.model
         self.n_iter_ = max(fitted.result.n_iter, 1)
-        self.loss_curve_ = fitted.result.loss_curve
+        self.loss_curve_ = np.resize(fitted.result.loss_curve, self.n_iter_ + 1)
         self.status_ = fitted.result.message
         self._keep_weights(fitted.start.penalty)
         self.stiffness_ = fitted.start.penalty.stiffness

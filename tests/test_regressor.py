@@ -179,6 +179,14 @@ def test_attributes_reproduce_the_predictions(place, settings):
 FREE = {"agreement": 0.0, "alpha": 1e-12, "solver": VariableProjection(tol=0.01, stiffness=0.0)}
 
 
+@pytest.mark.parametrize("settings", [{"n_mfs": 1}, {"n_mfs": 2, "max_iter": 0}, {"n_mfs": 2}])
+def test_run_that_is_at_its_end_at_once_counts_as_one_iteration(settings):
+    model = ANFISRegressor(**settings).fit(X, X[:, 0])
+    assert model.n_iter_ == 1
+    assert model.loss_curve_.shape == (2,)
+    assert model.loss_curve_[0] == model.loss_curve_[1]
+
+
 def test_loss_curve_goes_from_the_start_to_the_end():
     # Where nothing is searched for, training starts from the initial memberships; and with next to
     # no penalty, the loss is that of least squares. Not so many iterations that it plays a part.
