@@ -22,7 +22,7 @@ from typing import Self
 
 import numpy as np
 
-from .antecedent import Antecedent, RuleTableAntecedent, by_group
+from .antecedent import Antecedent, RuleTableAntecedent, by_group, strongest_rules
 from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names
@@ -37,10 +37,7 @@ from .policies import (
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
 
-__all__ = ["EQUALLY_STRONG", "TSKModel"]
-
-# Strengths that differ by rounding errors only are equal.
-EQUALLY_STRONG = 1.0 - 1e-9
+__all__ = ["TSKModel"]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -187,8 +184,7 @@ class TSKModel:
 
     def apply(self, X) -> np.ndarray:
         """The strongest rule of every row, (n_rows,); of equally strong ones the first."""
-        strengths = self.strengths(X)
-        return (strengths >= EQUALLY_STRONG * strengths.max(axis=1, keepdims=True)).argmax(axis=1)
+        return strongest_rules(self.strengths(X).T)
 
     def predict(self, X, inside=None) -> np.ndarray:
         """Outputs (n_rows, n_outputs) by the policy; ``inside`` is what :meth:`in_bounds` gives."""

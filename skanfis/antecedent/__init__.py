@@ -1,6 +1,6 @@
 """Rule bases: the IF parts of a set of rules, over terms of any families."""
 
-from .base import Antecedent, TermGroup, by_group, by_parameter
+from .base import Antecedent, TermGroup, by_group, by_parameter, strongest_rules
 from .grid import GridAntecedent
 from .rule_table import RuleTableAntecedent
 from .scattered import ScatteredAntecedent
@@ -15,4 +15,5 @@ __all__ = [
     "TreeAntecedent",
     "by_group",
     "by_parameter",
+    "strongest_rules",
 ]

@@ -56,6 +56,12 @@ def by_parameter(gradients, by_term):
     return _stack([(gradient * own).reshape(-1, own.shape[1]) for gradient, own in pairs], by_term)
 
 
+def strongest_rules(strengths):
+    """The strongest rule of every row of (n_rules, n_rows); of equally strong ones the first."""
+    # Strengths that differ by rounding errors only are equal.
+    return (strengths >= (1.0 - 1e-9) * strengths.max(axis=0)).argmax(axis=0)
+
+
 def softmax_in_place(log_values):
     """Softmax along the last axis but one."""
     log_values -= np.maximum.reduce(log_values, axis=-2, keepdims=True)

@@ -5,8 +5,8 @@ of training, and sd the target's standard deviation, the *strongest rule alone* 
 
     sqrt(mean (f_r* - yhat)^2) / sd ,    r* the strongest rule of the row.
 
-The error of a rule is that of its f_r to the target, on the rows on which it is the strongest.
-Rules that are equally strong count in equal parts. Means are by the rows' weights.
+The error of a rule is that of its f_r to the target, on the rows on which it is the strongest; the
+spread is the standard deviation of the target there. Means are by the rows' weights.
 """
 
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ from functools import reduce
 
 import numpy as np
 
+from ..antecedent import strongest_rules
 from ..blocks import LARGE_BLOCK_ROWS, add_each, fitting_rows, row_blocks
 from ..learning.data import column_statistics
-from ..model import EQUALLY_STRONG
 from .sentences import Sentences
 
 # A target that varies by rounding errors only, as the predictions of a constant do, is constant.
@@ -34,6 +34,7 @@ class Measures:
     rule_alone: np.ndarray  # RMS of f_r - yhat on these or NaN, (n_rules, n_outputs)
     alone: np.ndarray  # the same of the strongest rule of every row, (n_outputs,)
     rule_errors: np.ndarray  # RMS of f_r - y on its rows or NaN, (n_rules, n_outputs)
+    rule_spreads: np.ndarray  # standard deviation of y there or NaN, (n_rules, n_outputs)
     errors: np.ndarray  # RMSE of the model, (n_outputs,)
     printed_errors: np.ndarray  # the same of the model as it is printed
 
@@ -71,7 +72,7 @@ def rule_sums(model, printed, target, rows, y, weight):
     rows, y, weight = rows[kept], y[kept], weight[kept]
     by_rule, by_printed = (_standardised(one, target.offset, scale) for one in (model, printed))
     mass, lead = np.zeros((2, model.n_rules))
-    alone, rule_errors = np.zeros((2, model.n_rules, model.n_outputs))
+    alone, rule_errors, first, second = np.zeros((4, model.n_rules, model.n_outputs))
     errors, printed_errors = np.zeros((2, model.n_outputs))
     for part in row_blocks(len(rows), fitting_rows(8 * model.n_rules + model.antecedent.n_terms)):
         Z, s = np.array(rows[part].T, dtype=float, order="C"), weight[part]
@@ -79,31 +80,35 @@ def rule_sums(model, printed, target, rows, y, weight):
         strengths, basis = model.antecedent.strengths(Z), model.basis(Z)
         as_printed = printed.antecedent.strengths(Z)
         mass += strengths @ s
-        strongest = (strengths >= EQUALLY_STRONG * strengths.max(axis=0)).astype(float)
-        strongest *= s / strongest.sum(axis=0)
+        strongest = s * (np.arange(model.n_rules)[:, None] == strongest_rules(strengths))
         lead += strongest.sum(axis=1)
         for k, of_target in enumerate(((y[part] - target.offset) / scale).T):
             values, output = _outputs(by_rule[k], strengths, basis)
             alone[:, k] += np.einsum("rn,rn->r", strongest, (values - output) ** 2)
             rule_errors[:, k] += np.einsum("rn,rn->r", strongest, (values - of_target) ** 2)
+            first[:, k] += strongest @ of_target
+            second[:, k] += strongest @ of_target**2
             errors[k] += s @ (output - of_target) ** 2
             told = _outputs(by_printed[k], as_printed, basis)[1]
             printed_errors[k] += s @ (told - of_target) ** 2
-    return [float(weight.sum()), mass, lead, alone, rule_errors, errors, printed_errors]
+    sums = [mass, lead, alone, rule_errors, first, second, errors, printed_errors]
+    return [float(weight.sum()), *sums]
 
 
 def measures_of(target, sums):
     """What sums over all rows amount to."""
-    weight, mass, lead, alone, rule_errors, errors, printed_errors = sums
+    weight, mass, lead, alone, rule_errors, first, second, errors, printed_errors = sums
+    rows = lead[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         return Measures(
             weight=weight,
             deviation=_scale(target),
             rule_weights=mass / weight,
             rule_rows=lead,
-            rule_alone=np.sqrt(alone / lead[:, None]),
+            rule_alone=np.sqrt(alone / rows),
             alone=np.sqrt(alone.sum(axis=0) / weight),
-            rule_errors=np.sqrt(rule_errors / lead[:, None]),
+            rule_errors=np.sqrt(rule_errors / rows),
+            rule_spreads=np.sqrt(np.maximum(second - first**2 / rows, 0.0) / rows),
             errors=np.sqrt(errors / weight),
             printed_errors=np.sqrt(printed_errors / weight),
         )

@@ -19,7 +19,7 @@ from .text import counted, number
 # In deviations of the target: whoever reads the strongest rule alone is then as wrong as a model
 # that explains three quarters of the variance; beyond, the rule says too little of the model.
 GREATEST_ALONE = 0.5
-# What the text as printed may err, over the model's error.
+# What the text as printed may err, over the model's error; and a rule, over a constant's.
 GREATEST_ERROR = 1.05
 # Errors of no more are rounding's, as of predictions that are the target.
 _ROUNDING = np.sqrt(np.finfo(float).eps)
@@ -100,8 +100,13 @@ class Readability:
     @property
     def rule_errors(self) -> np.ndarray:
         """RMSE of each rule alone where it is the strongest, in units of the target."""
-        target, found = self.model.target, self.measures
-        return found.rule_errors * (found.deviation if target is None else target.spread)
+        return self._unit * self.measures.rule_errors
+
+    @property
+    def _unit(self):
+        """A standard deviation of the target, of each output."""
+        target = self.model.target
+        return self.measures.deviation if target is None else target.spread
 
     @property
     def reading_cost(self) -> int:
@@ -132,7 +137,7 @@ class Readability:
     @property
     def on_rules(self) -> list[str]:
         """The findings that stay, however many digits are printed."""
-        sentences = _on_signs(self._said) + self._on_few_rows()
+        sentences = _on_signs(self._said) + self._on_few_rows() + self._on_constants()
         for output, error in zip(self.model.output_names, self.measures.alone, strict=True):
             of_output = f" of {output!r}" if self.model.n_outputs > 1 else ""
             if error > GREATEST_ALONE:
@@ -151,6 +156,17 @@ class Readability:
             return []
         named = _named([f"{r} (rows: {rows[r]:.3g}, numbers: {numbers[r]})" for r in few])
         return [f"Strongest on fewer rows than its sentence has numbers: rule {named}."]
+
+    def _on_constants(self):
+        """Rules that err more on the rows on which they are the strongest than a constant would."""
+        found, outputs, named = self.measures, self.model.output_names, []
+        is_poor = found.rule_errors > np.maximum(GREATEST_ERROR * found.rule_spreads, _ROUNDING)
+        for r, k in np.argwhere(is_poor):
+            rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
+            errors = (self._unit[k] * one[r, k] for one in (found.rule_errors, found.rule_spreads))
+            named.append("{} (errs by {:.2g}, a constant by {:.2g})".format(rule, *errors))
+        what = "Errs more on its own rows than a constant would: rule"
+        return [f"{what} {_named(named)}."] if named else []
 
     @property
     def line(self) -> str:

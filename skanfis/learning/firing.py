@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from ..antecedent import Antecedent
+from ..antecedent import Antecedent, strongest_rules
 from ..blocks import add_each, fitting_rows, row_blocks
 from ..consequent import basis
 from ..support import RuleSupport
@@ -74,7 +74,7 @@ def _sums(rows, antecedent, enough):
     for part in _blocks(rows, antecedent):
         Z, _, weight = rows.read(part)
         strengths = antecedent.strengths(Z)
-        best, numbers = strengths.argmax(axis=0), fingerprint(Z)
+        best, numbers = strongest_rules(strengths), fingerprint(Z)
         for r in np.unique(best):
             if len(distinct[r]) < enough:
                 distinct[r] = np.union1d(distinct[r], numbers[best == r])[:enough]

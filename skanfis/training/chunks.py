@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..antecedent import strongest_rules
 from ..blocks import fitting_rows, row_blocks
 from ..consequent import LocalBasis, basis, in_user_units, with_common_slopes
 from ..learning.covariance import posterior_of
@@ -83,7 +84,7 @@ class RowSums:
             raw = np.array(rows.X[part].T, dtype=float, order="C")
             Z, target, weight = rows.read(part)
             strengths, shares = antecedent.strengths_and_shares(raw)
-            best, top = strengths.argmax(axis=0), strengths.max(axis=0)
+            best, top = strongest_rules(strengths), strengths.max(axis=0)
             strongest += np.bincount(best, weights=weight, minlength=n_rules)
             peak = np.maximum(peak, strengths.max(axis=1))
             root = np.sqrt(strengths)

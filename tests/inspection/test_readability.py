@@ -27,6 +27,7 @@ def found_of(model, **changes):
     found = readability_of_rows(model, X, y)
     ones, rows = np.ones(model.n_outputs), changes.pop("rule_rows", np.full(model.n_rules, 50.0))
     passing = {"alone": 0.5 * ones, "errors": ones, "printed_errors": ones}
+    passing["rule_spreads"] = found.measures.rule_errors / 1.05
     measures = replace(found.measures, **(passing | changes))
     return replace(found, model=replace(model, rule_rows=rows), measures=measures)
 
@@ -69,6 +70,19 @@ def test_what_is_beyond_a_limit_is_said():
     assert sentence == (
         "Strongest on fewer rows than its sentence has numbers: rule 11 (rows: 6, numbers: 7)."
     )
+
+
+def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
+    X = np.concatenate([np.linspace(0.0, 0.1, 50), np.linspace(0.9, 1.0, 50)])[:, None]
+    y = 10.0 * np.round(X) + np.tile([[-1.0], [1.0]], (50, 1))
+    model = ANFISRegressor(n_mfs=2, order=0, agreement=1.0).fit(X, y.ravel()).model_
+    assert readability(model, X, y).findings == []
+    coefficients = model.coefficients.copy()
+    coefficients[1] += 3.0
+    poor = readability(replace(model, coefficients=coefficients), X, y)
+    errs = np.sqrt(np.mean((coefficients[1] - y[50:]) ** 2))
+    assert f"rule 1 (errs by {errs:.2g}, a constant by 1)." in str(poor)
+    assert "constant would: rule 1" in str(poor)
 
 
 def test_rows_are_counted_whatever_the_unit_of_the_weights():
