@@ -88,7 +88,10 @@ def _read_as(kind, path):
     """LogError where a library finds that a file is none of its kind."""
     try:
         yield
-    except (ValueError, TypeError, NotImplementedError, OSError, KeyError) as error:
+    except (ImportError, MemoryError):
+        raise
+    except Exception as error:
+        # Of a damaged archive, XML or compression, by many names.
         reason = str(error).strip().partition("\n")[0].removesuffix(".")
         raise LogError(f"{path}: is no {kind} that can be read: {reason}.") from error
 
@@ -115,11 +118,8 @@ def excel_source(path, header_place):
     """The first sheet that holds a table; ``header_place`` finds the header in its first rows."""
     told = f"{path}: Excel needs openpyxl: pip install 'skanfis[logs]'; or save it as CSV"
     _needed("openpyxl", told)
-    try:
+    with _read_as("Excel file", path):
         sheets = pd.read_excel(path, sheet_name=None, header=None, engine="openpyxl")
-    except Exception as error:
-        # Of a damaged archive or XML, by many names.
-        raise LogError(f"{path}: is no Excel file that can be read: {error}") from error
     name, sheet = next(((k, s) for k, s in sheets.items() if s.size), (None, None))
     if sheet is None:
         raise LogError(f"{path}: is empty.")

@@ -261,6 +261,15 @@ def test_a_damaged_file_is_refused(tmp_path, kind):
         found(path)
 
 
+@pytest.mark.parametrize(("length", "end"), [(4, b""), (-9, b""), (-9, bytes(9))])
+def test_a_file_of_matlab_that_was_cut_or_damaged_is_refused(tmp_path, truth, length, end):
+    path = tmp_path / "log.mat"
+    savemat(path, {"output": truth["output"].to_numpy()}, do_compression=True)
+    path.write_bytes(path.read_bytes()[:length] + end)
+    with pytest.raises(LogError, match=r"is no MATLAB file that can be read"):
+        found(path)
+
+
 @pytest.mark.parametrize("form", ["%Y-%m-%d", "%d.%m.%Y"])
 def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
     """Runs a day apart, by whose hours alone each would go on from the one before."""
