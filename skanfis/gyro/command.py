@@ -140,7 +140,9 @@ def _read(options, paths, tell):
     try:
         at_rest = _settle_rest(reading, tell)
         recipe = _recipe(options, reading, at_rest)
-        check_log(reading.log, units=reading.units, inputs=recipe.inputs)
+        # Whatever the inputs, the rates tell a scale factor that is not given.
+        told = ("output",) if recipe.output_unit in SIGNALS and not options.scale_factor else ()
+        check_log(reading.log, units=reading.units, inputs=recipe.inputs + told)
     except LogError as error:
         raise reading.located(error) from error
     return reading, recipe
@@ -174,20 +176,20 @@ def _recipe(options, reading, at_rest):
     """What the options ask for; UsageError where the log does not go with them."""
     unit = reading.units["output"]
     inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
-    named = ", ".join(inputs)
     if options.physics and "output" not in inputs:
         raise UsageError("--physics: the arcsine law needs the output among the inputs.")
     if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
         raise UsageError(
             f"--terms has {counted(len(options.terms), 'number')} for "
-            f"{counted(len(inputs), 'input')}: {named}."
+            f"{counted(len(inputs), 'input')}: {', '.join(inputs)}."
         )
-    if options.scale_factor is not None and not (at_rest and unit in SIGNALS):
-        raise UsageError("--scale-factor is for a raw signal at rest: else the rate tells it.")
-    if at_rest and unit in SIGNALS and options.scale_factor is None:
+    is_open = unit in SIGNALS and reading.log["rate"].nunique() == 1
+    if options.scale_factor is not None and not is_open:
+        raise UsageError("--scale-factor is for a raw signal at one rate: else the rates tell it.")
+    if is_open and options.scale_factor is None:
         raise LogError(
-            f"is in {unit}, and a gyro at rest does not tell its scale factor. Give that of the "
-            f"data sheet (--scale-factor, {unit} per deg/s), or another unit (--units output=...).",
+            f"is in {unit}, and one rate, as at rest, does not tell its scale factor. Give that of "
+            f"the data sheet (--scale-factor, {unit} per deg/s), or a unit (--units output=...).",
             "output",
         )
     return Recipe(
@@ -242,14 +244,13 @@ def _write(calibration, options, files, folder):
 
 
 def _summary(calibration, folder, notes):
-    lines = errors_and_verdict(calibration)
-    lines += [
+    return [
+        *errors_and_verdict(calibration),
         f"check          {calibration.split.sentence}",
         f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
         *(f"note           {note}" for note in notes),
         *(f"WARNING        {sentence}" for sentence in calibration.cautions()),
     ]
-    return lines
 
 
 def _apply(options, tell):

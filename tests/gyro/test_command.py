@@ -276,7 +276,7 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, message, cap
         (["--terms", "99999999,1,1,1"], "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
         (["--terms", "9" * 9000], "must be search, or numbers"),
         (["--inputs", "time", "time"], "--inputs: time is given twice"),
-        (["--scale-factor", "131"], "is for a raw signal at rest"),
+        (["--scale-factor", "131"], "is for a raw signal at one rate"),
         (["--target", "px4"], "'px4' must be one of: in C table"),
         (["--target", "ardupilot:x:0"], "(1 to 3)"),
         (["--target", "table", "table:q15"], "--target: table is given twice"),
@@ -473,6 +473,27 @@ def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_p
     compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
     assert compensator.estimator.model.n_rules == 1
     assert (compensator.scale_factor, compensator.output_unit) == (131.0, "counts")
+
+
+@pytest.mark.usefixtures("no_report")
+def test_a_scale_factor_needs_rates_that_the_output_follows_whatever_the_inputs(
+    tmp_path, log, capsys
+):
+    steady, jitter = log.assign(rate=50.0), 1e-3 * np.random.default_rng(0).normal(size=len(log))
+    steady["output"] = 131.0 * (50.0 + 0.01 * log["temperature"])
+    options = ["--inputs", "temperature", "--units", "output=counts", "--terms", "2"]
+    options += ["--output", str(tmp_path / "out")]
+    path = write_log(tmp_path / "log.csv", steady.assign(rate=50.0 + jitter))
+    assert main([path, *options]) == 3
+    assert "'output': does not follow the rate" in capsys.readouterr().err
+    path = write_log(tmp_path / "log.csv", steady)
+    assert main([path, *options]) == 3
+    assert "one rate, as at rest, does not tell its scale factor" in capsys.readouterr().err
+    assert main([path, *options, "--scale-factor", "131"]) == 0
+    compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
+    assert compensator.scale_factor == 131.0
+    rates = compensator.apply(steady)["rate_compensated"]
+    assert (rates - 50.0).abs().max() < 0.5
 
 
 @pytest.mark.usefixtures("no_report")
