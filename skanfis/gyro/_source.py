@@ -24,8 +24,8 @@ _END_OF_PREAMBLE = "***End_of_Header***"
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "", " ": "blanks"}
 _NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
 # A number or a moment, in full; a number with a fraction.
-_VALUE = re.compile(r"[+-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
-_FRACTION = re.compile(r"[+-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
+_VALUE = re.compile(r"[+\u2212-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
+_FRACTION = re.compile(r"[+\u2212-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
 
 CLOCK = "hours:minutes:seconds"
 _FORMATS = [
@@ -278,7 +278,7 @@ def as_numbers(column, decimal="."):
         return _in_seconds(column)
     if column.dtype.kind in "iuf":
         return column.to_numpy(dtype=float, na_value=np.nan)
-    plain = _texts(column).str.replace(decimal, ".")
+    plain = _texts(column).str.replace(decimal, ".").str.replace("\u2212", "-")  # a true minus
     return pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
 
 

@@ -152,6 +152,13 @@ def test_the_rate_of_a_temperature_is_no_rate_of_the_table(tmp_path, truth, name
         found_in(tmp_path, table.assign(rate=commas))
 
 
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_numbers_with_a_true_minus_sign(tmp_path, truth, decimal):
+    text = truth[PARTS].to_csv(index=False, sep=";", decimal=decimal)
+    (tmp_path / "log.csv").write_text(text.replace("-", "\u2212"), encoding="utf-8")
+    same(found(tmp_path / "log.csv"), truth)
+
+
 def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
     table = pd.DataFrame({"a": truth["temperature"], "b": truth["output"], "d": truth["rate"]})
     with pytest.raises(LogError, match=r"Say which it is .such as --columns temperature=a"):
