@@ -144,8 +144,8 @@ def _check_time(log, unit, runs):
     if bad.size:
         place = bad[order[bad].argmin()]
         raise LogError(
-            f"time does not increase within a run: {time[place]:.10g} s after "
-            f"{time[place - 1]:.10g} s ({bad.size} such rows). Rows must be in the order of time; "
+            f"time does not increase within a run: {time[place]:.13g} s after "
+            f"{time[place - 1]:.13g} s ({bad.size} such rows). Rows must be in the order of time; "
             "if several runs follow each other, say which column tells them apart (run=NAME).",
             "time",
             int(order[place]),

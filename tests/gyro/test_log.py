@@ -187,6 +187,13 @@ def test_logs_that_are_refused(log, spoil, column, row, message):
     assert (caught.value.column, caught.value.row) == (column, row)
 
 
+def test_stamps_of_today_that_fall_by_little_are_told_apart(log):
+    times = 1_767_225_600.0 + log["time"] + 3600.0 * log["run"]
+    times[11] = times[10] - 0.05
+    with pytest.raises(LogError, match=rf"{times[11]:.2f} s after {times[10]:.0f} s"):
+        check_log(log.assign(time=times))
+
+
 @pytest.mark.parametrize(
     ("part", "inputs"),
     [
