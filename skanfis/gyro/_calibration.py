@@ -42,7 +42,7 @@ class Recipe:
 
     inputs: tuple[str, ...]
     output_unit: str = "deg/s"
-    scale_factor: float = 1.0  # of a raw signal at rest, which does not tell it
+    scale_factor: float = 1.0  # of a raw signal at one rate, which does not tell it
     write: str = "recommended"  # or "rules", or one of NAMES in _simpler
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
@@ -165,10 +165,9 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     ``tell`` is called with a line of text for every step; ``name_row`` says where a row is found.
     ``n_rows`` is of how many rows these are some.
     """
-    factor = 1.0
-    if recipe.output_unit in SIGNALS:
-        at_rest = np.ptp(log["rate"]) == 0.0
-        factor = recipe.scale_factor if at_rest else scale_factor(log["rate"], log["output"])
+    factor = recipe.scale_factor
+    if recipe.output_unit in SIGNALS and np.ptp(log["rate"]) > 0.0:
+        factor = scale_factor(log["rate"], log["output"])
     X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
     glitches = _glitches(log, before - rate, name_row, tell)

@@ -253,21 +253,23 @@ def _check_plausible(values, part, unit):
 
 def _check_output_follows_rate(log, units):
     output, rate = log["output"].to_numpy(), log["rate"].to_numpy()
-    for part, values in (("rate", rate), ("output", output)):
+    several = "Log at several rates, or learn the bias: leave output out of the inputs."
+    other = "Is another column the gyro's (--columns output=NAME)?"
+    for part, values, advice in (("rate", rate, several), ("output", output, other)):
         if values.max() == values.min():
-            advice = "Is another column the gyro's (--columns output=NAME)?"
-            if part == "rate":
-                advice = "Log at several rates, or learn the bias: leave output out of the inputs."
             told = f"all values are {values[0]:g}, which tells no scale factor. {advice}"
             raise LogError(told, part)
     if np.array_equal(output, rate):
         raise LogError(f"equals the {RATE_COLUMN}: one of them is the wrong one.", "output")
     correlation = np.corrcoef(output, rate)[0, 1]
     if abs(correlation) < _LEAST_CORRELATION:
+        glitches = dict(find_glitches(log, output)) if "temperature" in log else {}
+        alone = f" No other row supports {', '.join(glitches.values())}." if glitches else ""
         raise LogError(
             f"does not follow the rate (correlation {correlation:.3f}); is it, or the "
-            f"{RATE_COLUMN}, the wrong one?",
+            f"{RATE_COLUMN}, the wrong one?{alone}",
             "output",
+            next(iter(glitches), None),
         )
     slope = np.polyfit(rate, output, 1)[0]
     if units["output"] in SIGNALS or 0.5 < slope < 2.0:

@@ -66,10 +66,8 @@ def main(arguments=None):
         return (_apply if options.apply else _calibrate)(options, tell)
     except UsageError as error:
         parser.error(printable(error))  # exits
-    except LogError as error:
-        return _say_error(error, REFUSED)
-    except ExistsError as error:
-        return _say_error(error, EXISTS)
+    except (LogError, ExistsError) as error:
+        return _say_error(error, REFUSED if isinstance(error, LogError) else EXISTS)
     except (OSError, ImportError, ValueError, ArithmeticError, MemoryError) as error:
         # Of what the log made of the arithmetic: one sentence too.
         return _say_error(error, FAILED)

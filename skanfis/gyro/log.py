@@ -125,8 +125,8 @@ class Reading:
 
     def located(self, error):
         """An error of a check of the whole log in the words of the files."""
-        where = None if len(self.files) == 1 else "the log"
-        return self.files[0].located(error, where=where)
+        file = self.files[0 if error.row is None else self.file[error.row]]
+        return file.located(error, self.row, None if len(self.files) == 1 else "the log")
 
 
 def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):

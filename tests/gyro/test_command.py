@@ -402,6 +402,15 @@ def test_a_glitch_is_named_by_its_line(tmp_path, log, capsys):
     assert page.index("line 102") < page.index("<section>")
 
 
+def test_a_glitch_that_hides_all_else_is_named_by_its_line(tmp_path, log, capsys):
+    counts = (1e4 * log["output"]).where(log.index != 100, 2**31 - 1)
+    path = write_log(tmp_path / "log.csv", log.assign(output=counts))
+    assert main([path, "--units", "output=counts", "--quiet"]) == 3
+    said = capsys.readouterr().err
+    assert "log.csv, line 102, column 'output': does not follow the rate" in said
+    assert "the wrong one? No other row supports the output of 2.147e+09 at a rate of" in said
+
+
 def thermal_cycle(*turns, n_rows=300, lag=0.05):
     """A MEMS log: a bias that is a parabola of the temperature, and lags behind by its rate."""
     legs = [np.linspace(a, b, n_rows, endpoint=False) for a, b in pairwise(turns)]
