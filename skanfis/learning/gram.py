@@ -13,18 +13,14 @@ pairs alone, of shares of each factor and of basis functions,
 for 3 x 3 x 3 rules on three inputs 2,160 moments, where the symmetric product of the design, dsyrk,
 takes 5,886. The pairs are split into two groups of about equal size, each group's products are
 formed row by row, and one general matrix product gives all moments. The matrix is put together from
-the moments once per pass, by indexing.
+the moments once per pass, factor by factor.
 """
 
-from functools import cache, lru_cache
+from functools import cache
 from math import prod
 
 import numpy as np
 from scipy.linalg import blas
-
-# Columns up to which the places of moments are kept, 4 MB each; of more, they are soon worked out
-# beside a pass, and would hold memory after the fit.
-_MOST_KEPT = 1024
 
 
 def pairs(rows, others):
@@ -45,22 +41,6 @@ def pair_index(n):
     index = np.zeros((n, n), dtype=np.int32)
     index[np.triu_indices(n)] = np.arange(n * (n + 1) // 2)
     return np.maximum(index, index.T)
-
-
-@lru_cache(maxsize=4)
-def _moment_of_pair(lengths):
-    """Which moment is the entry of two columns, (n_columns, n_columns); not to be changed.
-
-    Half the size of the matrix itself. It is looked up once per pass, and a search goes to and fro
-    between few structures; no part of the object, which travels to the workers of a cluster.
-    """
-    place = np.zeros((1, 1), dtype=np.int32)
-    for length in lengths:
-        # Digits of a mixed radix: of the two columns, and of the moments.
-        size = length * (length + 1) // 2
-        place = place[:, None, :, None] * np.int32(size) + pair_index(length)[None, :, None, :]
-        place = place.reshape(place.shape[0] * length, -1)
-    return place
 
 
 def _products(groups, n_rows):
@@ -107,6 +87,10 @@ class DesignMoments:
 
     def gram(self, sums):
         """Phi' S Phi out of the sums, (n_columns, n_columns)."""
-        is_kept = prod(self._lengths) <= _MOST_KEPT
-        place = _moment_of_pair if is_kept else _moment_of_pair.__wrapped__
-        return np.ascontiguousarray(sums).ravel()[place(self._lengths)]
+        moments = np.ascontiguousarray(sums).reshape(self._sizes)
+        n_columns, axes = prod(self._lengths), range(0, 2 * len(self._lengths), 2)
+        # From the last on, so that pairs in front are still one axis each.
+        for axis, length in reversed([*enumerate(self._lengths)]):
+            moments = moments.take(pair_index(length), axis=axis)
+        by_column = moments.transpose(*axes, *(axis + 1 for axis in axes))
+        return by_column.reshape(n_columns, n_columns)
