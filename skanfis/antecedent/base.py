@@ -91,6 +91,11 @@ class Antecedent(ABC):
         return np.concatenate(every) if every else np.empty(0, dtype=int)
 
     @property
+    def inputs_with_terms(self) -> tuple[int, ...]:
+        """In the order of the terms; of a grid, each has a factor of the strengths."""
+        return tuple(dict.fromkeys(self.term_inputs.tolist()))
+
+    @property
     def term_places(self):
         """Location of every term, its first parameter, shape (n_terms,)."""
         return np.concatenate([group.theta[0] for group in self.groups] or [np.empty(0)])
@@ -190,12 +195,7 @@ class Antecedent(ABC):
     @property
     def share_counts(self) -> tuple[int, ...]:
         """How many shares each factor of the strengths has: w is a product of one of each."""
-        return (self.n_rules,)
-
-    @property
-    def share_inputs(self):
-        """The input that each factor's shares depend on; None of a factor of several inputs."""
-        return (None,) * len(self.share_counts)
+        return (self.n_rules,) if self.grid_counts is None else self.grid_counts
 
     def factors(self, Z):
         """A function per term, (n_terms, n_rows), whose products over rules' terms are strengths.

@@ -12,7 +12,7 @@ from .base import Antecedent, TermGroup, softmax_in_place
 
 def _grid_rule_terms(counts):
     """The terms of every rule of a full grid, shape (n_rules, n_inputs with terms)."""
-    combinations = np.indices(counts).reshape(len(counts), -1).T
+    combinations = np.indices(counts).reshape(len(counts), prod(counts)).T
     return combinations + np.cumsum([0, *counts[:-1]])
 
 
@@ -56,16 +56,12 @@ class GridAntecedent(Antecedent):
         return prod(self.counts)
 
     @property
-    def share_counts(self):
-        return self.counts
-
-    @property
     def grid_counts(self):
         return self.counts
 
     def factor_terms(self):
         terms, inputs = np.arange(self.n_terms)[:, None], self.term_inputs
-        return [{j: terms[inputs == j]} for j in self.share_inputs]
+        return [{j: terms[inputs == j]} for j in self.inputs_with_terms]
 
     def without_rules(self, rules):
         """As of every rule base; a grid stays a grid where whole terms go.
@@ -83,12 +79,8 @@ class GridAntecedent(Antecedent):
         return replace(self, groups=self._groups_with(terms), counts=counts), terms
 
     @property
-    def share_inputs(self):
-        return tuple(dict.fromkeys(self.term_inputs.tolist()))
-
-    @property
     def rule_terms(self):
-        return _grid_rule_terms(self.counts) if self.counts else np.empty((1, 0), dtype=int)
+        return _grid_rule_terms(self.counts)
 
     def factors(self, Z):
         return self.strengths_and_shares(Z)[1]
@@ -111,8 +103,6 @@ class GridAntecedent(Antecedent):
         return strengths, log_mu
 
     def sum_over_rules(self, values):
-        if not self.counts:
-            return np.empty((0, values.shape[1]))
         return _grid_indicator(self.counts).astype(values.dtype, copy=False) @ values
 
     def term_sensitivity(self, rule_outputs, output, shares):

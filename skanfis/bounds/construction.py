@@ -178,7 +178,7 @@ def _pairs_along(antecedent, j):
     if np.ptp(widths) > 0.0:
         return None
     if antecedent.grid_counts is not None:
-        axis = antecedent.share_inputs.index(j)
+        axis = antecedent.inputs_with_terms.index(j)
         lines = np.moveaxis(lines.reshape(antecedent.grid_counts), axis, -1)
         lines = lines.reshape(-1, antecedent.grid_counts[axis])
         shared = 1.0 / max(lines.shape[1] - 1, 1)

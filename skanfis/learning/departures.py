@@ -34,7 +34,7 @@ def departures(matrix, antecedent: Antecedent, slopes):
     basis but the first are slopes by, None where one is constant, and there is nothing to learn.
     A component is the inputs that it concerns, () for the rest.
     """
-    counts, axes = antecedent.grid_counts, antecedent.share_inputs
+    counts, axes = antecedent.grid_counts, antecedent.inputs_with_terms
     components, component = _components(counts, axes, antecedent.n_rules, tuple(slopes))
     if counts is None:
         return matrix, components, component
