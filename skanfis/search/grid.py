@@ -72,7 +72,7 @@ def grid_antecedent(families, counts, spacing: Spacing, known=None):
 
     Inputs with a count of one have no terms: they take part in the consequents alone. ``families``
     and ``counts`` have one entry per input. Where a ``known`` rule base has as many terms on an
-    input, it has these.
+    input, it has these; where it has terms, one more is asked for at most.
     """
     terms = {} if known is None else terms_by_input(known)
     inputs = [j for j, count in enumerate(counts) if count > 1]
@@ -82,7 +82,7 @@ def grid_antecedent(families, counts, spacing: Spacing, known=None):
             thetas.append(terms[j])
             continue
         if j in terms:
-            centers = _with_more(np.sort(terms[j][0]), counts[j])
+            centers = _with_one_more(np.sort(terms[j][0]))
         else:
             centers = spacing.centers(j, counts[j])
         thetas.append(families[j].start(centers, _distance(np.diff(centers)), OVERLAP))
@@ -104,9 +104,7 @@ def terms_by_input(antecedent):
     }
 
 
-def _with_more(places, count):
-    """So many places: those that there are, and the middles of the widest gaps."""
-    while places.size < count:
-        widest = int(np.argmax(np.diff(places)))
-        places = np.insert(places, widest + 1, 0.5 * (places[widest] + places[widest + 1]))
-    return places
+def _with_one_more(places):
+    """Places, and the middle of the widest gap."""
+    widest = int(np.argmax(np.diff(places)))
+    return np.insert(places, widest + 1, 0.5 * (places[widest] + places[widest + 1]))
