@@ -31,7 +31,7 @@ def make_problem():
     np.sin(y, out=y)
     y *= X[:, 1:2]
     rows = StandardisedData.of(X, y)
-    antecedent = grid_antecedent([Gaussian] * 3, [3, 3, 3], Spacing(rows), overlap=0.6)
+    antecedent = grid_antecedent([Gaussian] * 3, [3, 3, 3], Spacing(rows))
     return SeparableProblem(rows, antecedent, order=1, penalty=Penalty(alpha=1e-12, slope=1e-12))
 
 
