@@ -175,10 +175,6 @@ class CommonLine:
         found[np.arange(rules.size), self._places(j, rules)] = per_unit
         return found
 
-    def contrasts(self, j, rules):
-        """What they differ by, in orthonormal contrasts."""
-        return linalg.helmert(rules.size) @ self.of_slopes(j, rules)
-
     def weights(self, penalty: Penalty):
         """All weights in a row, of these ``kinds``: of ``WEIGHTS``, every slope and component."""
         rho, alpha = penalty.slope, penalty.alpha

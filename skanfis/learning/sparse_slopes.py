@@ -33,10 +33,11 @@ def sparse_slopes(posterior: Laplace, coefficients):
     for k in np.argsort(whole, kind="stable"):
         j, rules = line.slopes[k], every
         while rules.size > 1:
-            contrasts = line.contrasts(j, rules)
+            slopes = line.of_slopes(j, rules)
+            contrasts = linalg.helmert(rules.size) @ slopes
             if _loss(state, contrasts) < WORTH * contrasts.shape[0] * n_outputs:
                 break
-            rules = np.delete(rules, _farthest(state, line.of_slopes(j, rules)))
+            rules = np.delete(rules, _farthest(state, slopes))
         if rules.size > 1:
             state = _given(state, contrasts)
         else:
