@@ -44,12 +44,9 @@ class Spacing:
         """Places of ``count`` terms on input ``j``, standardised."""
         values, levels = self._columns[j]
         places = np.interp(np.linspace(0.0, 1.0, count), levels, values)
-        gaps = np.diff(places)
-        for this, before in (
-            *((k, k - 1) for k in range(1, gaps.size)),
-            *((k, k + 1) for k in range(gaps.size - 2, -1, -1)),
-        ):
-            gaps[this] = max(gaps[this], gaps[before] / _RATIO)
+        gaps, k = np.diff(places), np.arange(count - 1)
+        # Next to any other gap, however far: a factor for every step on the way.
+        gaps = np.max(gaps / _RATIO ** np.abs(k[:, None] - k), axis=1, initial=0.0)
         if not gaps.any():
             return places
         gaps *= (places[-1] - places[0]) / gaps.sum()
