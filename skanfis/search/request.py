@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import prod
 from typing import Any
 
@@ -71,25 +72,10 @@ class StructureRequest(Plan):
         return replace(self, premise_inputs=varying, n_all=effective_weight(rows))
 
     def _antecedent(self, rows):
-        """The rules that were asked for; clusters are counted before any rule is made of them."""
+        """The rules that were asked for."""
         if isinstance(self.n_mfs, str):
-            label = _labeller(self.partition, self.seed)
-
-            def checked(table, weight):
-                labels = np.asarray(label(table, weight))
-                n_rules = np.unique(labels[labels >= 0]).size
-                self._check_number(n_rules)
-                check_rules_fit(
-                    f"partition={self.partition!r} makes",
-                    n_rules,
-                    n_rules * self.premise_inputs.size,
-                    1 + self.consequent_inputs.size,
-                    rows.y.shape[1],
-                    "Use fewer clusters, or constants as consequents (order=0).",
-                )
-                return labels
-
-            return clustered_antecedent(self.families, rows, checked, self.premise_inputs)
+            label = partial(self._label, rows.y.shape[1])
+            return clustered_antecedent(self.families, rows, label, self.premise_inputs)
         counts = self._grid_counts(rows)
         self._check_number(prod(counts))
         check_grid_fits(self.n_mfs, counts, 1 + self.consequent_inputs.size, rows.y.shape[1])
@@ -128,6 +114,21 @@ class StructureRequest(Plan):
                 "fewer, or leave max_rules at None."
             )
 
+    def _label(self, n_outputs, table, weight):
+        """Labels by the clusterer; the clusters are counted before any rule is made of them."""
+        labels = np.asarray(_labels(self.partition, self.seed, table, weight))
+        n_rules = np.unique(labels[labels >= 0]).size
+        self._check_number(n_rules)
+        check_rules_fit(
+            f"partition={self.partition!r} makes",
+            n_rules,
+            n_rules * self.premise_inputs.size,
+            1 + self.consequent_inputs.size,
+            n_outputs,
+            "Use fewer clusters, or constants as consequents (order=0).",
+        )
+        return labels
+
     def _grid_counts(self, rows):
         """Terms per input; none on an input that never changes or has no part in the premises."""
         has_terms = ~rows.inputs.is_constant
@@ -163,22 +164,18 @@ class StructureRequest(Plan):
             )
 
 
-def _labeller(clusterer, seed):
+def _labels(clusterer, seed, table, weight):
     """Labels of weighted rows by a scikit-learn clusterer, with the seed where it has none."""
     seeded = clone(clusterer)
     for key, value in clusterer.get_params().items():
         if value is None and key.endswith("random_state"):
             seeded.set_params(**{key: seed})
-
-    def label(table, weight):
-        if has_fit_parameter(clusterer, "sample_weight"):
-            return seeded.fit(table, sample_weight=weight).labels_
-        repeated = np.repeat(np.arange(weight.size), weight.astype(int))
-        labels = np.empty(weight.size, dtype=int)
-        labels[repeated] = seeded.fit_predict(table[repeated])
-        return labels
-
-    return label
+    if has_fit_parameter(clusterer, "sample_weight"):
+        return seeded.fit(table, sample_weight=weight).labels_
+    repeated = np.repeat(np.arange(weight.size), weight.astype(int))
+    labels = np.empty(weight.size, dtype=int)
+    labels[repeated] = seeded.fit_predict(table[repeated])
+    return labels
 
 
 def report_constant(rows, names):

@@ -11,7 +11,7 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.learning import VariableProjection
-from skanfis.search.request import _labeller
+from skanfis.search.request import _labels
 
 from ..quick import quick
 
@@ -64,7 +64,7 @@ class Remembers(ClusterMixin, BaseEstimator):
 def test_clusterer_without_weights_sees_repeated_rows():
     Remembers.seen = ()
     table, weight = np.array([[1.0, 5.0], [-1.0, 6.0], [2.0, 7.0]]), np.array([2.0, 1.0, 3.0])
-    labels = _labeller(Remembers(), seed=0)(table, weight)
+    labels = _labels(Remembers(), 0, table, weight)
     assert_array_equal(labels, [1, 0, 1])
     assert_array_equal(Remembers.seen[0], table[[0, 0, 1, 2, 2, 2]])
 
@@ -73,7 +73,7 @@ def test_clusterer_that_takes_weights_is_given_them(rng):
     table, weight = rng.normal(size=(60, 2)), 10.0 ** rng.uniform(0.0, 3.0, 60)
     kmeans = KMeans(3, n_init=1, random_state=0)
     expected = kmeans.fit(table, sample_weight=weight).labels_
-    assert_array_equal(_labeller(kmeans, seed=0)(table, weight), expected)
+    assert_array_equal(_labels(kmeans, 0, table, weight), expected)
     assert (kmeans.fit(table).labels_ != expected).any()
 
 
