@@ -120,7 +120,6 @@ class SeparableProblem:
         self._design = Design(
             self.consequent_inputs,
             self.n_basis,
-            self.n_outputs,
             DesignMoments(antecedent.share_counts, self.n_basis),
             own_parameters(antecedent),
         )

@@ -24,7 +24,6 @@ class Design:
 
     consequent_inputs: np.ndarray  # that the consequents are linear in
     n_basis: int
-    n_outputs: int
     moments: DesignMoments
     own_parameters: np.ndarray  # of the premises, see the function of this name
 
@@ -34,7 +33,7 @@ class Design:
 
     def by_rule(self, coefficients):
         """Coefficients (n_columns, n_outputs) as (n_rules, n_basis, n_outputs)."""
-        return coefficients.reshape(-1, self.n_basis, self.n_outputs)
+        return coefficients.reshape(-1, self.n_basis, coefficients.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +47,7 @@ class FirstPass:
     @property
     def shapes(self):
         """Of the sums."""
-        return [self.design.moments.shape, self.reference.shape, (self.design.n_outputs,)]
+        return [self.design.moments.shape, self.reference.shape, self.reference.shape[1:]]
 
     def __call__(self, Z, target, weight, sums):
         moments, slope, square = sums
@@ -57,7 +56,7 @@ class FirstPass:
         weighted_basis = basis_rows if weight is None else basis_rows * weight
         strengths, shares = self.antecedent.strengths_and_shares(Z)
         design.moments.accumulate(moments, shares, basis_rows, weighted_basis)
-        for k in range(design.n_outputs):
+        for k in range(len(target)):
             residual = target[k] - rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
             slope[:, k] += (strengths @ (weighted_basis * residual).T).ravel()
             square[k] += weighted_basis[0] @ residual**2  # the basis begins with 1
@@ -76,7 +75,8 @@ class SecondPass:
     def shapes(self):
         """Of the sums."""
         n_raw = self.antecedent.parameters.size
-        cross = [(n_raw, self.coefficients.shape[0])] * self.design.n_outputs
+        n_columns, n_outputs = self.coefficients.shape
+        cross = [(n_raw, n_columns)] * n_outputs
         return [(n_raw, n_raw), (n_raw,), *cross]
 
     def __call__(self, Z, target, weight, sums):
@@ -88,7 +88,7 @@ class SecondPass:
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
         columns = (strengths[:, None] * weighted_basis).reshape(-1, Z.shape[1])  # Phi' S
-        for k in range(design.n_outputs):
+        for k in range(len(target)):
             by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
             by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
             sensitivity = by_parameter(gradients, by_term)
@@ -152,7 +152,7 @@ class JointPass:
     @property
     def shapes(self):
         """Of the sums."""
-        by_output = (self.design.n_outputs,)
+        by_output = self.coefficients.shape[1:]
         n_raw, n_rules = self.antecedent.parameters.size, self.antecedent.n_rules
         return [(n_raw,), self.coefficients.shape, by_output, by_output, (n_rules,)]
 
@@ -165,7 +165,7 @@ class JointPass:
         strengths, shares = antecedent.normalise(log_mu)
         weight = np.ones(Z.shape[1]) if weight is None else weight
         masses += strengths @ weight
-        for k in range(design.n_outputs):
+        for k in range(len(target)):
             by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
             residual = target[k] - output
             weighted = residual * weight
