@@ -177,7 +177,7 @@ class ProductAnova:
 
     def conditionals(self, subsets, X):
         """E[y | x_v] at rows X in the box, less the mean, (n_subsets, n_rows)."""
-        Z = self.scale.apply(X.T, np.empty(X.T.shape))
+        Z = self.scale.apply(X.T)
         factors, parts = self.antecedent.factors(Z), {}
         for g in {g for subset in subsets for g in subset}:
             inputs, sets, by = self.parts[g]

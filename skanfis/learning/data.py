@@ -61,9 +61,9 @@ class Scale:
         """Lowest and highest values, standardised."""
         return (self.minimum - self.offset) / self.scale, (self.maximum - self.offset) / self.scale
 
-    def apply(self, columns, out):
-        """Standardise columns (n_columns, n_rows) into ``out``."""
-        np.subtract(columns, self.offset[:, None], out=out)
+    def apply(self, columns):
+        """Columns (n_columns, n_rows), standardised, in C order."""
+        out = np.subtract(columns, self.offset[:, None], order="C")
         out /= self.scale[:, None]
         return out
 
@@ -225,7 +225,5 @@ class StandardisedData:
 
     def read(self, part):
         """Z, standardised target, and weights or None, of one block."""
-        X, y = self.X[part], self.y[part]
-        Z = self.inputs.apply(X.T, np.empty((X.shape[1], X.shape[0])))
-        target = self.targets.apply(y.T, np.empty((y.shape[1], y.shape[0])))
-        return Z, target, None if self.sample_weight is None else self.sample_weight[part]
+        weight = None if self.sample_weight is None else self.sample_weight[part]
+        return self.inputs.apply(self.X[part].T), self.targets.apply(self.y[part].T), weight

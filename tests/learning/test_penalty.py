@@ -25,7 +25,7 @@ class Model:
         g = np.random.default_rng(3)
         self.antecedent, self.order = BUILD[kind](g), order
         self.rows = oracles.bumpy_rows(g, 200, 2, n_outputs, weighted=True)
-        self.Z = self.rows.inputs.apply(self.rows.X.T, np.empty((2, 200)))
+        self.Z = self.rows.inputs.apply(self.rows.X.T)
         self.y = (self.rows.y - self.rows.targets.offset) / self.rows.targets.scale
         self.share = self.rows.sample_weight / self.rows.sample_weight.sum()
         self.basis = np.vstack([np.ones((1, 200)), self.Z]) if order else np.ones((1, 200))

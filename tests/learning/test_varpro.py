@@ -185,7 +185,7 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
     # A truth that is displaced at random lies in the box of free terms, whatever the start.
     premise = Premise.of(antecedent, *oracles.box(rows), is_unbounded=True)
     truth = premise.parameters(displaced * g.uniform(-1.0, 1.0, premise.size))
-    Z = rows.inputs.apply(rows.X.T, np.empty(rows.X.T.shape))
+    Z = rows.inputs.apply(rows.X.T)
     phi = oracles.dense_design(antecedent, truth, Z, 1)
     beta = g.normal(size=(phi.shape[1], n_outputs))
     y = phi @ beta + noise * g.normal(size=(len(phi), n_outputs))

@@ -29,7 +29,7 @@ def test_terms_have_no_bounds_where_data_are_next_to_exact(rng):
     premise = Premise.of(antecedent, *rows.inputs.box, is_unbounded=True)
     low, high = antecedent.with_parameters(premise.parameters(found.displacement)).groups[0].theta.T
     # They cross where the step is, and the one gives way to the other within a twentieth.
-    z = rows.inputs.apply(np.array([[0.15, 0.25]]), np.empty((1, 2)))[0]
+    z = rows.inputs.apply(np.array([[0.15, 0.25]]))[0]
     difference = [-0.5 * ((z - c) / np.exp(w)) ** 2 for c, w in (low, high)]
     assert (np.sign(difference[0] - difference[1]) == [1.0, -1.0]).all()
 

@@ -72,7 +72,7 @@ def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, conseque
     X_rest = low + (high - low) * g.uniform(-0.5, 1.5, (100, 2))
     weight = g.uniform(0.5, 2.0, 100) if weighted else None
     rest = StandardisedData(X_rest, g.normal(size=(100, 2)), weight, rows.inputs, rows.targets)
-    at_edge = rest.inputs.apply(np.clip(X_rest, low, high).T, np.empty((2, 100)))
+    at_edge = rest.inputs.apply(np.clip(X_rest, low, high).T)
     design = oracles.dense_design(antecedent, antecedent.parameters, at_edge, 1, used)
     target = (rest.y - rows.targets.offset) / rows.targets.scale
     squares = ((target - design @ evaluation.coefficients) ** 2).sum(axis=1)
