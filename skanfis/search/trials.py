@@ -153,17 +153,13 @@ class Trials:
         return candidate.n_rules * n_basis + 2 * candidate.n_terms
 
     def _is_small(self, candidate):
-        most = self.plan.max_rules or np.inf
-        if candidate.n_rules > most or self.n_parameters(candidate) > self.rows.n_rows:
+        most, n = self.plan.max_rules or np.inf, self.n_parameters(candidate)
+        if candidate.n_rules > most or n > self.rows.n_rows:
             return False
         if any(count > self.spacing.n_values(j) for j, count in enumerate(candidate.counts)):
             return False
-        return self.operations(candidate) <= _MOST_OPERATIONS
-
-    def operations(self, candidate):
-        """Of a pass over its rows and of a solution, about."""
-        n_rows, n = self.rows_for(candidate).n_rows, self.n_parameters(candidate)
-        return (n_rows + 10.0 * n) * n**2
+        # Operations of a pass over its rows and of a solution, about.
+        return (self.rows_for(candidate).n_rows + 10.0 * n) * n**2 <= _MOST_OPERATIONS
 
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
@@ -200,7 +196,7 @@ class Trials:
         inputs = plan.consequent_inputs
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=inputs)
 
-    def _train(self, problem, turns=MOST_TURNS, first_steps=_STEPS_TO_PROMISE, begun=None):
+    def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE, begun=None):
         free, weight = self.plan.free, effective_weight(problem.rows)
         premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
         return tune(problem, premise, free, weight, turns, first_steps, begun)
