@@ -158,8 +158,8 @@ def laplace(
     penalty: Penalty,
     n_rows: float,
     n_outputs: int,
-    displacement=None,
-    curvature=None,
+    displacement=(),
+    curvature=(),
 ):
     """The posterior at fixed premises, for a penalty of any weights.
 
@@ -178,10 +178,9 @@ def laplace(
     factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), free)
-    has_premises = curvature is not None and curvature.size
     paid = line.weights(penalty)
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
-    paid[_STIFFNESS] *= displacement @ displacement if has_premises else 0.0
+    paid[_STIFFNESS] *= np.dot(displacement, displacement)
     paid[_OTHERS] *= line.squares(solved)
     return Laplace(
         penalty,
@@ -194,7 +193,7 @@ def laplace(
         line,
         prior,
         factor,
-        curvature if has_premises else np.empty(0),
+        np.asarray(curvature, dtype=float),
     )
 
 

@@ -196,7 +196,7 @@ def _turned(
 
 
 def _improved(
-    problem, evaluation, x, penalty, steps, free, n_rows, curvature=None, has_least=True
+    problem, evaluation, x, penalty, steps, free, n_rows, curvature=(), has_least=True
 ) -> Tuned:
     """The point after so many steps of the free weights, or when they stand still.
 
