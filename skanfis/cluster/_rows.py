@@ -46,10 +46,8 @@ def distance_blocks(points, centers):
 
 def nearest(points, centers):
     """Which centre is nearest to each point; the first of several."""
-    labels = np.empty(points.shape[0], dtype=np.intp)
-    for part, distances in distance_blocks(points, centers):
-        distances.argmin(axis=0, out=labels[part])
-    return labels
+    found = [distances.argmin(axis=0) for _, distances in distance_blocks(points, centers)]
+    return np.concatenate(found)
 
 
 class Clusterer(ClusterMixin, BaseEstimator):

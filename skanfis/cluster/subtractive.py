@@ -16,10 +16,8 @@ _TIE = 1e-9
 
 def potentials(points, weight):
     """Potentials of points in units of the radius."""
-    total = np.empty(points.shape[0])
-    for part, squared in distance_blocks(points, points):
-        total[part] = weight @ np.exp(-4.0 * squared)
-    return total
+    blocks = distance_blocks(points, points)
+    return np.concatenate([weight @ np.exp(-4.0 * squared) for _, squared in blocks])
 
 
 class SubtractiveClustering(Clusterer):
