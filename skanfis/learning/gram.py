@@ -74,12 +74,9 @@ class DesignMoments:
 
     def accumulate(self, sums, shares, basis_rows, weighted_basis):
         """Add a block of rows: shares (n_shares, n_rows); basis functions, plain and weighted."""
-        groups, start = [], 0
-        for count in self._lengths[:-1]:
-            factor = shares[start : start + count]
-            groups.append(pairs(factor, factor))
-            start += count
-        groups.append(pairs(weighted_basis, basis_rows))
+        # Behind the last factor there is nothing.
+        factors = np.split(shares, np.cumsum(self._lengths[:-1]))[:-1]
+        groups = [*(pairs(own, own) for own in factors), pairs(weighted_basis, basis_rows)]
         n_rows = basis_rows.shape[1]
         left = _products(groups[: self._split], n_rows)
         right = _products(groups[self._split :], n_rows)
