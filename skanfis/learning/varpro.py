@@ -29,7 +29,7 @@ _LENGTH_SLACK = 1.01
 # Added to every curvature: this part of the largest, far above what rounding leaves where there is
 # none and far below what data give; and this part of the cost, which a step of one must pay for.
 _SMALLEST_CURVATURE = 1e-6
-_WORTH = 0.1
+_COST_PART = 0.1
 # The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.
 GRADIENT_FACTOR = 1e-2
 TOLERANCE = 1e-3
@@ -93,7 +93,7 @@ def varpro(
             break
         while True:
             step, own = np.zeros_like(x), hessian[np.ix_(free, free)]
-            step[free] = trust_region_step(gradient[free], own, radius, _WORTH * cost)
+            step[free] = trust_region_step(gradient[free], own, radius, _COST_PART * cost)
             # The point and not the step is what meets an edge of the box to the last bit.
             trial_x = np.clip(x + step, premise.lower, premise.upper)
             step = trial_x - x
