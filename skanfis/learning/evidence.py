@@ -45,6 +45,8 @@ _LIKENESS = 1.0 / np.log(3.0) ** 2
 # count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
 # noise is fitted.
 ROWS_EACH = 2
+# Least weights where there are fewer distinct rows than this per consequent.
+_UNDERDETERMINED = ((1.0, 1e-4), (ROWS_EACH, 1e-6))
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
@@ -195,17 +197,22 @@ def laplace(
     )
 
 
-def least_weights(posterior: Laplace):
+def least_weights(posterior: Laplace, n_distinct):
     """The penalty below whose weights the prior expects what no rule that can be read does.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
     from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the square
-    of what is far for a target.
+    of what is far for a target. Where there are hardly more distinct rows than consequents, a model
+    that passes through every row explains them without noise, and rounding errors grow by 1 / alpha
+    along what the data leave open: there the weights are never next to nothing.
     """
+    rows_each = n_distinct / posterior.n_columns
+    least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)
     if posterior.line.n_rules == 1:
-        return Penalty()
-    alpha = posterior.noise_variance / posterior.n_rows / _FAR**2
-    return Penalty(posterior.n_columns * alpha, alpha)
+        return Penalty(least, least, least)
+    noise = posterior.noise_variance / posterior.n_rows
+    agreement = max(least, posterior.n_columns * noise / _FAR**2)
+    return Penalty(agreement, max(least, noise / _FAR**2), least)
 
 
 def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):

@@ -212,7 +212,7 @@ def _improved(
 
     posterior, before = posterior_at(penalty), None
     for left in reversed(range(steps)):
-        least = least_weights(posterior) if has_least else None
+        least = least_weights(posterior, n_distinct) if has_least else None
         plain = reestimated(posterior, free, least, n_distinct)
         far = extrapolated(line, before, posterior.penalty, plain, free, least)
         if before is not None and is_settled(line, posterior.penalty, far):
