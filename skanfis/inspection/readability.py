@@ -163,8 +163,11 @@ class Readability:
         is_poor = found.rule_errors > np.maximum(GREATEST_ERROR * found.rule_spreads, _ROUNDING)
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
-            errors = (self._unit[k] * one[r, k] for one in (found.rule_errors, found.rule_spreads))
-            named.append("{} (errs by {:.2g}, a constant by {:.2g})".format(rule, *errors))
+            errs, spread = (
+                number(self._unit[k] * one[r, k], 2)
+                for one in (found.rule_errors, found.rule_spreads)
+            )
+            named.append(f"{rule} (errs by {errs}, a constant by {spread})")
         what = "Errs more on its own rows than a constant would: rule"
         return [f"{what} {_named(named)}."] if named else []
 

@@ -12,6 +12,7 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.inspection import export_text, measures, readability, rules_html
 from skanfis.inspection.readability import readability_of_rows
+from skanfis.inspection.text import number
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
@@ -81,7 +82,7 @@ def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
     coefficients[1] += 3.0
     poor = readability(replace(model, coefficients=coefficients), X, y)
     errs = np.sqrt(np.mean((coefficients[1] - y[50:]) ** 2))
-    assert f"rule 1 (errs by {errs:.2g}, a constant by 1)." in str(poor)
+    assert f"rule 1 (errs by {number(errs, 2)}, a constant by 1)." in str(poor)
     assert "constant would: rule 1" in str(poor)
 
 
