@@ -34,11 +34,12 @@ class GyroDisplay:
     # The first is that of from_predictions unless another is given.
     _UNITS: ClassVar[tuple[str, ...]] = ("deg/s", "deg/h")
     _PANELS: ClassVar[dict[str, Any]] = {}
-    _SIZE: ClassVar[tuple[float, float]] = (6.2, 4.4)
+    _size: tuple[float, float] = (6.2, 4.4)
 
     # Tables of what is drawn, from the errors of all rows in the unit, and options.
-    _computed: ClassVar[Callable[..., dict[str, pd.DataFrame]]]
+    _computed: Callable[..., dict[str, pd.DataFrame]]
     _tables: dict[str, pd.DataFrame]
+    _unit: str
     _draw: Callable[..., None]
 
     def tables(self) -> dict[str, pd.DataFrame]:
@@ -58,7 +59,7 @@ class GyroDisplay:
 
             ax = pyplot.figure(layout="constrained")
         if hasattr(ax, "set_size_inches"):
-            ax.set_size_inches(self._size())
+            ax.set_size_inches(self._size)
             ax = ax.subplots(**self._PANELS)
         self.axes_ = np.atleast_1d(np.asarray(ax, dtype=object)).ravel()
         n_axes = self._PANELS.get("nrows", 1) * self._PANELS.get("ncols", 1)
@@ -106,17 +107,9 @@ class GyroDisplay:
                 raise ValueError(f"{side} is NaN in all rows: there is nothing to draw.")
             rows[side] = RATE_UNITS.get(unit, 1.0) * (rows[side] - rows["rate"])
         display = cls()
-        display._tables = cls._computed(rows, unit, **options)
+        display._unit = unit
+        display._tables = display._computed(rows, **options)
         return display.plot(ax)
-
-    @property
-    def _unit(self):
-        """That of the errors, which stand in the last column."""
-        *_, table = self._tables.values()
-        return table.columns[-1].rpartition("[")[2].rstrip("]")
-
-    def _size(self):
-        return self._SIZE
 
 
 class ErrorDisplay(GyroDisplay):
@@ -138,9 +131,8 @@ class ErrorDisplay(GyroDisplay):
     _PER_ROW = ("position",)
     _PANELS: ClassVar = TWO_ROWS
 
-    @classmethod
-    def _computed(cls, rows, unit, position_label="time [s]"):
-        errors = rows[[*SIDES]]
+    def _computed(self, rows, position_label="time [s]"):
+        errors, unit = rows[[*SIDES]], self._unit
         bins, edges = bins_of(rows["position"], _N_BANDS)
         ends = errors.groupby(bins).agg(["min", "max"]).reindex(range(_N_BANDS))
         ends.columns = [
@@ -190,16 +182,13 @@ class GroupResidualDisplay(GyroDisplay):
 
     _PER_ROW = ("groups",)
 
-    @classmethod
-    def _computed(cls, rows, unit):
+    def _computed(self, rows):
         squares = rows[[*SIDES]].pow(2).groupby(rows["groups"]).mean()
         # Groups without an answer last, at the top: nothing is worse.
         table = np.sqrt(squares).sort_values("after", kind="stable").reset_index()
-        table.columns = ["group", f"RMS error before [{unit}]", f"RMS error after [{unit}]"]
+        table.columns = ["group", *(f"RMS error {side} [{self._unit}]" for side in SIDES)]
+        self._size = 6.2, 1.4 + 0.2 * min(len(table), _MOST_GROUPS)
         return {"groups": table}
-
-    def _size(self):
-        return 6.2, 1.4 + 0.2 * min(len(self._tables["groups"]), _MOST_GROUPS)
 
     def _draw(self, axes, groups):
         (panel,), shown = axes, groups.iloc[-_MOST_GROUPS:]
@@ -235,8 +224,7 @@ class AllanDisplay(GyroDisplay):
     _OPTIONAL = ("run",)
     _UNITS = ("deg/h", "deg/s")
 
-    @classmethod
-    def _computed(cls, rows, unit, sampling_interval):
+    def _computed(self, rows, sampling_interval):
         parts = []
         for side in SIDES:
             if rows[side].isna().any():
@@ -246,8 +234,8 @@ class AllanDisplay(GyroDisplay):
             columns = {
                 "curve": side,
                 "averaging time [s]": curve["averaging_time"],
-                f"Allan deviation [{unit}]": curve["deviation"] / PER_HOUR,
-                f"error [{unit}]": curve["error"] / PER_HOUR,
+                f"Allan deviation [{self._unit}]": curve["deviation"] / PER_HOUR,
+                f"error [{self._unit}]": curve["error"] / PER_HOUR,
             }
             parts.append(pd.DataFrame(columns))
         return {"allan": pd.concat(parts, ignore_index=True)}

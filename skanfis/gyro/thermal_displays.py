@@ -55,8 +55,7 @@ class ScaleFactorErrorDisplay(GyroDisplay):
     _UNITS = ("ppm",)
     _PANELS: ClassVar = TWO_ROWS
 
-    @classmethod
-    def _computed(cls, rows, unit):
+    def _computed(self, rows):
         if np.ptp(rows["rate"]) == 0:
             raise ValueError(f"rate is {rows['rate'][0]:g} in all rows: there is no scale factor.")
         bands, edges = bins_of(rows["temperature"], _N_BANDS)
@@ -119,8 +118,7 @@ class HysteresisDisplay(GyroDisplay):
     _UNITS = ("deg/h", "deg/s")
     _PANELS: ClassVar = TWO_ROWS
 
-    @classmethod
-    def _computed(cls, rows, unit):
+    def _computed(self, rows):
         bins, edges = bins_of(rows["temperature"], HYSTERESIS_BINS)
         branch = np.where(rows["temperature_rate"] > 0, *_BRANCHES)
         rows = rows.assign(bin=bins, branch=branch)
@@ -129,7 +127,7 @@ class HysteresisDisplay(GyroDisplay):
         for side in SIDES:
             biases = _bias_of_branches(moving.dropna(subset=side), side)
             for name in _BRANCHES:
-                table[f"bias {side}, {name} [{unit}]"] = biases[name]
+                table[f"bias {side}, {name} [{self._unit}]"] = biases[name]
         return {"bias": table}
 
     def _draw(self, axes, bias):
@@ -176,16 +174,15 @@ class ResidualSurfaceDisplay(GyroDisplay):
     """
 
     _PER_ROW = ("temperature",)
-    _SIZE = (7.0, 3.3)
+    _size = (7.0, 3.3)
     _PANELS: ClassVar = {"ncols": 2, "sharey": True}
 
-    @classmethod
-    def _computed(cls, rows, unit):
+    def _computed(self, rows):
         columns = {"temperature [degC]": rows["temperature"], "true rate [deg/s]": rows["rate"]}
         cells, numbers = _cells(columns)
         found = rows["after"].groupby(numbers).agg(["count", "mean"]).reindex(cells.index)
         cells["rows"] = found["count"].fillna(0).astype(int)
-        cells[f"mean error after [{unit}]"] = found["mean"]
+        cells[f"mean error after [{self._unit}]"] = found["mean"]
         return {"cells": cells}
 
     def _draw(self, axes, cells):
@@ -225,7 +222,7 @@ class CoverageDisplay(GyroDisplay):
     9216
     """
 
-    _SIZE = (6.2, 4.0)
+    _size = (6.2, 4.0)
     min_coverage: float
 
     @classmethod
