@@ -260,14 +260,3 @@ def check_limit(limit, lines):
     is_sure = math.isnan(low) or all(limit.keeps(end) == is_kept for end in ends)
     remark = "" if is_sure else "its interval reaches over the limit"
     return Check(limit, value, "pass" if is_kept else "fail", remark)
-
-
-class ReportOptions(NamedTuple):
-    """All may be missing: the command line as typed; of files name, size [bytes] and SHA-256."""
-
-    made: str = ""
-    serial: str = ""
-    operator: str = ""
-    files: tuple[tuple[str, int, str], ...] = ()
-    typed: str = ""
-    limits: tuple[Limit, ...] = ()

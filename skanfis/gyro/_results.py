@@ -102,11 +102,15 @@ class Picture(NamedTuple):
 
 
 class Results:
-    """What the sections of the report need; rates are NaN where a row was out of range."""
+    """What the sections of the report need; rates are NaN where a row was out of range.
 
-    def __init__(self, calibration, options):
-        self.calibration = calibration
-        self.options = options
+    What was asked for may all be missing: limits, the command line as typed, name, size [bytes] and
+    SHA-256 of files, and entries of the page's own table.
+    """
+
+    def __init__(self, calibration, *, limits=(), typed="", files=(), **entries):
+        self.calibration, self.limits = calibration, limits
+        self.typed, self.files, self.entries = typed, files, entries
         self.log, self.rate = calibration.log, calibration.rate
         self.in_range = calibration.in_range
         self.before = np.where(self.in_range, calibration.before, np.nan)
@@ -163,7 +167,7 @@ class Results:
     @cached_property
     def checks(self):
         lines = self.merit.set_index("figure")
-        return [check_limit(limit, lines) for limit in self.options.limits]
+        return [check_limit(limit, lines) for limit in self.limits]
 
     @cached_property
     def pictures(self):

@@ -26,7 +26,7 @@ from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log
 from ._columns import SIGNALS
 from ._headline import errors_and_verdict, of_rates, rules_text
-from ._options import PROGRAM, ReportOptions, check_kind, check_once, make_parser, request_of
+from ._options import PROGRAM, check_kind, check_once, make_parser, request_of
 from ._results import Results
 from ._source import open_source
 from ._split import choose_split
@@ -216,15 +216,15 @@ def _default_inputs(log, at_rest):
 def _write(calibration, options, files, folder):
     """Write all but the targets; what became of the limits is returned."""
     more = f" and {len(files) - 1} more" if len(files) > 1 else ""
-    told = ReportOptions(
+    results = Results(
+        calibration,
         made=datetime.now().astimezone().strftime("%Y-%m-%d %H:%M:%S %z"),
         serial=options.serial,
         operator=options.operator,
         files=files,
         typed=options.typed,
-        limits=tuple(options.limits),
+        limits=options.limits,
     )
-    results = Results(calibration, told)
     page = report_page(results, printable(f"{files[0][0]}{more}"))
     compensator = calibration.compensator
     (folder / "report.html").write_text(page, encoding="utf-8")

@@ -165,17 +165,15 @@ def _summary(results):
 
 def _identity(results):
     """What is needed to find this calibration again, and to repeat it."""
-    options = results.options
-    entries = {"device, serial number": options.serial, "operator": options.operator}
-    entries |= {"made": options.made}
-    lines = [(name, entry or "not given") for name, entry in entries.items()]
+    names = {"serial": "device, serial number", "operator": "operator", "made": "made"}
+    lines = [(name, results.entries.get(key) or "not given") for key, name in names.items()]
     blocks = [_table(["what", "entry"], lines)]
-    if options.files:
-        blocks.append(_table(["file of the log", "bytes", "SHA-256"], options.files))
+    if results.files:
+        blocks.append(_table(["file of the log", "bytes", "SHA-256"], results.files))
     text = f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s."
     blocks.append(Block("soft", text))
-    if options.typed:
-        blocks.append(Block("details", options.typed, "Options of the command"))
+    if results.typed:
+        blocks.append(Block("details", results.typed, "Options of the command"))
     return "This calibration", blocks
 
 

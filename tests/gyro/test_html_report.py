@@ -16,7 +16,7 @@ pytest.importorskip("jinja2")
 from skanfis.datasets import make_ofog
 from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._headline import formula_of, proven_bounds, rules_text
-from skanfis.gyro._options import ReportOptions, parse_limit
+from skanfis.gyro._options import parse_limit
 from skanfis.gyro._results import Picture, Results
 from skanfis.gyro._split import choose_split
 from skanfis.gyro.displays import three_digits
@@ -47,25 +47,25 @@ TITLE = "<gyro> & co.csv"
 @pytest.fixture(scope="module")
 def options(calibration):
     """All in it is text from outside; the limits lie on both sides of what was found."""
-    merit = Results(calibration, ReportOptions()).merit.set_index("figure")
+    merit = Results(calibration).merit.set_index("figure")
     value = merit.loc["residual_rms", "after"]
     typed = [f"residual_rms={factor * value:.9f}deg/s" for factor in (1.001, 0.999)]
-    return ReportOptions(
-        serial=SCRIPT,
-        operator=SCRIPT,
-        files=((SCRIPT, 12, "0" * 64),),
-        typed=SCRIPT,
-        limits=tuple(map(parse_limit, [*typed, "bias_instability=1deg/h"])),
-    )
+    return {
+        "serial": SCRIPT,
+        "operator": SCRIPT,
+        "files": ((SCRIPT, 12, "0" * 64),),
+        "typed": SCRIPT,
+        "limits": tuple(map(parse_limit, [*typed, "bias_instability=1deg/h"])),
+    }
 
 
 @pytest.fixture(scope="module")
 def page(calibration, options, coarse_report):
-    return report_page(Results(calibration, options), TITLE)
+    return report_page(Results(calibration, **options), TITLE)
 
 
 def text_of(calibration):
-    return Outline(report_page(Results(calibration, ReportOptions()), TITLE)).text
+    return Outline(report_page(Results(calibration), TITLE)).text
 
 
 @pytest.fixture
@@ -98,7 +98,7 @@ def test_needs_nothing_from_elsewhere(page):
 
 
 def test_says_what_is_proven(calibration, page):
-    results = Results(calibration, ReportOptions())
+    results = Results(calibration)
     text = Outline(page).text
     told = text[text.rindex("What is proven") : text.rindex("Can the rules be read?")]
     assert f"{results.shown(proven_bounds(calibration).largest)} °/s" in told
@@ -177,7 +177,7 @@ def test_the_verdict_comes_first(page, calibration):
 def test_one_unit_throughout(page, calibration, no_drawing, monkeypatch):
     """Of errors; rates, and the formula of what to use instead, are in deg/s."""
     monkeypatch.setattr("skanfis.gyro._results._SMALL", np.inf)
-    hourly = report_page(Results(calibration, ReportOptions()), TITLE)
+    hourly = report_page(Results(calibration), TITLE)
     rms = np.sqrt(np.mean((calibration.after - calibration.rate)[calibration.in_range] ** 2))
     for text, unit, factor, other in ((page, "°/s", 1.0, "°/h"), (hourly, "°/h", 3600.0, "°/s")):
         text = Outline(text).text
@@ -246,6 +246,6 @@ def test_a_pdf_of_one_run_has_five_pages_at_most():
                     rates=np.arange(-90.0, 91.0, 15.0))  # fmt: skip
     inputs = ("temperature", "temperature_rate", "output")
     calibration = calibration_of(log, inputs, terms=(1, 1, 2))
-    page = report_page(Results(calibration, ReportOptions()), TITLE)
+    page = report_page(Results(calibration), TITLE)
     assert weasyprint.HTML(string=page).write_pdf().startswith(b"%PDF")
     assert 2 <= len(weasyprint.HTML(string=page).render().pages) <= 5
