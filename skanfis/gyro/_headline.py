@@ -1,7 +1,5 @@
 """What is told of a calibration: which compensation to use, what is proven, and formulas."""
 
-from typing import NamedTuple
-
 import numpy as np
 import pandas as pd
 
@@ -176,33 +174,27 @@ def against_reading(calibration):
     return readability(calibration.rules, X[known], left[known]).on_rules
 
 
-class Proven(NamedTuple):
-    """What is proven in the range of the calibration, of what the rules, or a cubic, give [deg/s].
-
-    No compensation is larger in size than ``largest``. ``rate_rises`` is whether the compensated
-    rate is proven to go with the output, in the sense of the scale factor; None where the output is
-    no input, or what is beside the rules is not bounded.
-    """
-
-    largest: float
-    rate_rises: bool | None = None
-
-
 def proven_bounds(calibration):
+    """What is proven in the range of the calibration, of what the rules, or a cubic, give.
+
+    The size that no compensation exceeds [deg/s]; and whether the compensated rate goes with the
+    output, in the sense of the scale factor: None where the output is no input, or what is beside
+    the rules is not bounded.
+    """
     compensator, X = calibration.compensator, calibration.X
     own, rules = 1.0 / compensator.scale_factor, compensator.estimator
     if isinstance(getattr(rules, "base_", None), Polynomial):
         error = ErrorModel(compensator, rules, X)
-        return Proven(float(np.abs(error.ranges(*error.ends.T[:, :, None])[0]).max()))
+        return float(np.abs(error.ranges(*error.ends.T[:, :, None])[0]).max()), None
     rules = rules_of(rules).model
     found = bounds(rules, max_boxes=_MOST_BOXES)
     largest = float(np.abs([found.lower, found.upper]).max())
     if compensator.predicts == "rate" or "output" not in X:
-        return Proven(largest)
+        return largest, None
     # rate = output / factor - error: its slope has the factor's sign where the error's is less.
     slope = gradient_bounds(rules, "output", max_boxes=_MOST_BOXES)
     rises = slope.upper[0] < own if own > 0.0 else slope.lower[0] > own
-    return Proven(largest, bool(np.all(rises)))
+    return largest, bool(np.all(rises))
 
 
 def formula_of(calibration, name):

@@ -274,12 +274,12 @@ def _use(results):
 
 def _sure(results):
     calibration = results.calibration
-    certain = proven_bounds(calibration)
+    largest, rate_rises = proven_bounds(calibration)
     added = calibration.compensator.predicts == "rate"
     what = "addition to the arcsine law" if added else "compensation"
-    proven = [(f"largest {what}, proven", f"{results.shown(certain.largest)} {results.symbol}")]
-    if certain.rate_rises is not None:
-        told = "proven" if certain.rate_rises else "not proven"
+    proven = [(f"largest {what}, proven", f"{results.shown(largest)} {results.symbol}")]
+    if rate_rises is not None:
+        told = "proven" if rate_rises else "not proven"
         proven.append(("the compensated rate follows the output, never against it", told))
     table = _table(["in the range of the calibration", "result"], proven)
     return "What is proven", [table, Block("soft", _PROOF)]
