@@ -5,26 +5,35 @@ squares would be decided by a group ten times larger than the others.
 """
 
 import warnings
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from scipy.stats import t as student
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
+from .. import ANFISRegressor
 from ..exceptions import OutOfBoundsWarning
 from ._checks import find_glitches
 from ._columns import SIGNALS, ask
-from ._models import fit_model, some_rows
-from ._simpler import NAMES, Simpler, simpler_compensations
+from ._simpler import NAMES, ROUNDS, Simpler, make_law, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, as_written, features
-from .compose import rules_of
+from .compose import ResidualRegressor, rules_of
 from .errors import LogError
 from .metrics import rms, scale_factor
 
 _TIME_CONSTANT = 30.0  # of the rate of the temperature [s]
 _MOST_FIT_ROWS = 10_000
+# Of the law beside rules, in temperature: of degree 1 rules would have to bend for it.
+_DEGREE = 2
+# Terms are looked for among so many rows, and fitted to all. More rules than three terms of three
+# inputs make were taken on no log that was tried, and looking at them takes half of the time.
+_ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 27
+_FEWEST_GROUPS = 4  # whose range is that of the others when one is left out
 # Of a verdict: the name of the model in it, and what a gain must be above to be worth having.
 _MODEL, _LEAST_GAIN = "this model", 1.02
 _CONFIDENCE = 0.95
@@ -217,6 +226,61 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         n_rows=len(log) if n_rows is None else n_rows,
         fold_models=chosen.fold_models,
     )
+
+
+def fit_model(X, target, groups, recipe):
+    """The fitted estimator of a recipe, and its numbers of terms; groups tell what is not given."""
+    terms, rules, rows = recipe.terms, None, np.arange(len(X))
+    if isinstance(terms, str):
+        rows = some_rows(_shared_rows(X, groups), _ROWS_FOR_SEARCH, X, np.random.default_rng(0))
+        left = target
+        if recipe.physics:
+            left = target - make_law(recipe.inputs, _DEGREE, "linear").fit(X, target).predict(X)
+        rules = _make_rules(recipe, terms)
+        rules.fit(X.iloc[rows], left[rows], anfisregressor__groups=groups[rows])
+        counts = Counter(term["input"] for term in rules[-1].memberships_)
+        terms = tuple(max(counts[name], 1) for name in rules[-1].model_.input_names)
+    if not recipe.physics:
+        # What was found in all rows is fitted to them.
+        is_done = rules is not None and rows.size == len(X)
+        return rules if is_done else _make_rules(recipe, terms).fit(X, target), terms
+    # In every round the same terms: looked for once, in what the law leaves.
+    law, rules = make_law(recipe.inputs, _DEGREE, recipe.outside), _make_rules(recipe, terms)
+    return ResidualRegressor(law, rules, n_rounds=ROUNDS).fit(X, target), terms
+
+
+def _shared_rows(X, groups):
+    """Rows in the range that two groups or more reach, of every input; all rows where few are.
+
+    What a model makes of other rows while their group is held out is its tangent, and no figure of
+    a calibration is of such rows: they shall not choose its terms.
+    """
+    by_group = X.groupby(groups)
+    if by_group.ngroups < _FEWEST_GROUPS:
+        return np.arange(len(X))
+    low, high = np.sort(by_group.min(), axis=0)[1], np.sort(by_group.max(), axis=0)[-2]
+    rows = np.flatnonzero(((low <= X) & (high >= X)).all(axis=1))
+    return rows if 2 * rows.size >= len(X) else np.arange(len(X))
+
+
+def _make_rules(recipe, terms):
+    """A scaler and rules, of a grid of given numbers of terms or such as the recipe looks for."""
+    structure: dict[str, Any] = {"partition": "grid", "max_rules": _MOST_RULES, "simplicity": 0.0}
+    if isinstance(terms, tuple):
+        structure = {"n_mfs": list(terms), "simplicity": 0.0}
+    return make_pipeline(
+        StandardScaler(), ANFISRegressor(**structure, out_of_bounds=recipe.outside)
+    )
+
+
+def some_rows(rows, n_rows, X, rng):
+    """At most so many of the rows in their order, with those at the ends of every input's range."""
+    if rows.size <= n_rows:
+        return rows
+    values = X.to_numpy()[rows]
+    ends = np.concatenate([values.argmin(axis=0), values.argmax(axis=0)])
+    chosen = rng.choice(rows.size, n_rows, replace=False)
+    return rows[np.unique(np.concatenate([chosen, ends]))]
 
 
 def _held_out(X, target, groups, split, recipe, tell, rng):

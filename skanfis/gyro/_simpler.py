@@ -16,9 +16,11 @@ from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
-from ._models import ROUNDS, make_law
 from .compose import FrozenRules, Polynomial, ResidualRegressor, joined, law_and_rules
+from .physics import OpenLoopArcsineRegressor
 
+# Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
+ROUNDS = 2
 NOTHING = "no compensation"
 LAW_AND_LINE = "arcsine law and a line"
 # By what the command's --write calls them.
@@ -109,6 +111,20 @@ def kinds(inputs, policy):
         yield "arcsine law", "rate", law
         yield LAW_AND_LINE, "rate", law_and_line
     yield "cubic polynomial", "error", cubic
+
+
+def make_law(inputs, degree, outside):
+    """The arcsine law on the inputs that it can use."""
+    knows_lag = {"temperature", "temperature_rate"} <= set(inputs)
+    return OpenLoopArcsineRegressor(
+        "output",
+        "temperature" if "temperature" in inputs else None,
+        # The lag of the thermometer is part of the law where it can be known.
+        temperature_rate="temperature_rate" if knows_lag else None,
+        amplitude_degree=degree,
+        bias_degree=degree,
+        out_of_bounds=outside,
+    )
 
 
 def _unfitted_rule(order, policy):

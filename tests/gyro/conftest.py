@@ -5,7 +5,7 @@ from itertools import islice
 
 import pytest
 
-from skanfis.gyro import _models, _results, _simpler
+from skanfis.gyro import _calibration, _results, _simpler
 
 from ..quick import quick
 
@@ -14,7 +14,7 @@ from ..quick import quick
 def given_weights():
     """Rules whose weights are given: where it matters that they are fitted, and not how well."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(_models, "ANFISRegressor", partial(quick, agreement=1e-8, alpha=1e-9))
+        patch.setattr(_calibration, "ANFISRegressor", partial(quick, agreement=1e-8, alpha=1e-9))
         yield
 
 

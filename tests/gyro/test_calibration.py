@@ -9,9 +9,8 @@ import pytest
 from sklearn.model_selection import GroupKFold
 
 from skanfis.gyro import _calibration, _simpler
-from skanfis.gyro._calibration import Recipe, calibrate
+from skanfis.gyro._calibration import Recipe, _shared_rows, calibrate, fit_model
 from skanfis.gyro._headline import errors_and_verdict, formula_of, headline
-from skanfis.gyro._models import _shared_rows, fit_model
 from skanfis.gyro._split import Split
 
 pytestmark = pytest.mark.theory

@@ -10,8 +10,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
-from skanfis.gyro._models import make_law
-from skanfis.gyro._simpler import fitted_rule, kinds
+from skanfis.gyro._simpler import fitted_rule, kinds, make_law
 from skanfis.gyro.c_code import export_c_compensator
 from skanfis.gyro.compensator import as_written
 
