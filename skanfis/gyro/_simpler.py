@@ -61,15 +61,10 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
         # What it is worth is measured.
         for category in (ConvergenceWarning, ConstantInputWarning, OutOfBoundsWarning):
             warnings.simplefilter("ignore", category)
-        # Each has the box, coverage and policy of its rows.
-        zeros = [fitted_rule(X.iloc[part], np.zeros(part.size), 0, policy) for part in parts]
         for name, predicts, fit in kinds(list(X), policy):
             target, predicted = rate if predicts == "rate" else before - rate, np.full(len(X), 0.0)
             try:
-                *made, whole = (
-                    fit(X.iloc[part], target[part], zero)
-                    for part, zero in zip(parts, zeros, strict=True)
-                )
+                *made, whole = (fit(X.iloc[part], target[part]) for part in parts)
                 for estimator, (_, test) in zip(made, folds, strict=True):
                     predicted[test] = estimator.predict(X.iloc[test])
                     is_lost = estimator.in_bounds(X.iloc[test]) & ~np.isfinite(predicted[test])
@@ -85,28 +80,28 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
 
 
 def kinds(inputs, policy):
-    """Name, what it predicts, and what fits it to rows: to X, y, and a rule that gives zero."""
+    """Name, what it predicts, and what fits it to X and y."""
 
-    def law(X, y, zero):
+    def zero(X, y):
+        return fitted_rule(X, np.zeros(len(X)), 0, policy)
+
+    def law(X, y):
         fitted = make_law(inputs, 1, policy).fit(X, y)
         places = np.sort(fitted.columns_)  # the inputs that it is asked for, and flagged by
-        rule = fitted_rule(X.iloc[:, places], 0.0 * y, 0, policy)
-        return joined(fitted, replace(rule, positions=places))
+        return joined(fitted, replace(zero(X.iloc[:, places], y), positions=places))
 
-    def law_and_line(X, y, zero):
+    def law_and_line(X, y):
         both = make_law(inputs, 1, policy), _unfitted_rule(1, policy)
         return joined(*law_and_rules(ResidualRegressor(*both, n_rounds=ROUNDS).fit(X, y)))
 
-    def cubic(X, y, zero):
+    def cubic(X, y):
         # Beyond the box it is held: there the tangent of a cubic leads far away soon.
-        model = zero.model.with_out_of_bounds("clip" if policy == "linear" else policy)
-        return joined(
-            Polynomial.fitted(X, y, (model.minimum, model.maximum)), replace(zero, model=model)
-        )
+        rule = fitted_rule(X, np.zeros(len(X)), 0, "clip" if policy == "linear" else policy)
+        return joined(Polynomial.fitted(X, y, (rule.model.minimum, rule.model.maximum)), rule)
 
-    yield NOTHING, "error", lambda X, y, zero: zero
-    yield "constant", "error", lambda X, y, zero: fitted_rule(X, y, 0, policy)
-    yield "straight line", "error", lambda X, y, zero: fitted_rule(X, y, 1, policy)
+    yield NOTHING, "error", zero
+    yield "constant", "error", lambda X, y: fitted_rule(X, y, 0, policy)
+    yield "straight line", "error", lambda X, y: fitted_rule(X, y, 1, policy)
     if "output" in inputs:
         yield "arcsine law", "rate", law
         yield LAW_AND_LINE, "rate", law_and_line

@@ -10,7 +10,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
-from skanfis.gyro._simpler import fitted_rule, kinds, make_law
+from skanfis.gyro._simpler import kinds, make_law
 from skanfis.gyro.c_code import export_c_compensator
 from skanfis.gyro.compensator import as_written
 
@@ -29,7 +29,7 @@ def fitted(kind, log, policy="linear"):
     every = {name: (predicts, fit) for name, predicts, fit in kinds(INPUTS, policy)}
     predicts, fit = every[kind]
     target = rate if predicts == "rate" else log["output"].to_numpy() - rate
-    return fit(X, target, fitted_rule(X, np.zeros(len(X)), 0, policy)), predicts
+    return fit(X, target), predicts
 
 
 @pytest.fixture(scope="module", params=[name for name, *_ in kinds(INPUTS, "linear")])

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
-from skanfis.gyro._simpler import fitted_rule, kinds
+from skanfis.gyro._simpler import kinds
 from skanfis.gyro.targets.error_model import ErrorModel
 
 from ...quick import quick
@@ -35,7 +35,7 @@ def framed():
 def polynomial(X, error, policy="clip"):
     """The cubic nearest to an error, as it is written."""
     every = {name: fit for name, _, fit in kinds(list(X), policy)}
-    return every["cubic polynomial"](X, error, fitted_rule(X, np.zeros(len(X)), 0, policy))
+    return every["cubic polynomial"](X, error)
 
 
 def law_and_line():
