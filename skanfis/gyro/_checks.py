@@ -138,20 +138,19 @@ def check_rows(log, units, runs):
 
 
 def _check_time(log, unit, runs):
-    order = np.argsort(runs, kind="stable")
-    time, is_first = log["time"].to_numpy()[order], np.diff(runs[order], prepend=-1) != 0
-    bad = np.flatnonzero((np.diff(time, prepend=-np.inf) <= 0.0) & ~is_first)
+    by_run = log.groupby(runs)
+    time, before = log["time"].to_numpy(), by_run["time"].shift().to_numpy()
+    bad = np.flatnonzero(time <= before)
     if bad.size:
-        place = bad[order[bad].argmin()]
+        row = int(bad[0])
         raise LogError(
-            f"time does not increase within a run: {time[place]:.13g} s after "
-            f"{time[place - 1]:.13g} s ({bad.size} such rows). Rows must be in the order of time; "
-            "if several runs follow each other, say which column tells them apart (run=NAME).",
+            f"time does not increase within a run: {time[row]:.13g} s after {before[row]:.13g} s "
+            f"({bad.size} such rows). Rows must be in the order of time; if several runs follow "
+            "each other, say which column tells them apart (run=NAME).",
             "time",
-            int(order[place]),
+            row,
         )
-    starts = np.flatnonzero(is_first)
-    duration = time[np.append(starts[1:], time.size) - 1] - time[starts]
+    duration = by_run["time"].last() - by_run["time"].first()
     if duration.max() > _LONGEST_RUN:
         raise LogError(
             f"a run of {duration.max() / 86_400:.3g} days is not plausible; is time in a "
@@ -160,11 +159,10 @@ def _check_time(log, unit, runs):
         )
     if "temperature" not in log:
         return
-    heat = log["temperature"].to_numpy()[order]
-    heating = np.maximum.reduceat(heat, starts) - np.minimum.reduceat(heat, starts)
+    heating = by_run["temperature"].max() - by_run["temperature"].min()
     fast = (heating > _FASTEST_CHANGE * duration) & (heating > _NOISE)
     if fast.any():
-        first = int(np.argmax(fast))
+        first = fast.idxmax()
         raise LogError(
             f"the temperature changes by {heating[first]:.3g} degC within "
             f"{duration[first]:.3g} s, which is not plausible; is time in a larger unit than "
