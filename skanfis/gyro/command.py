@@ -91,7 +91,11 @@ def _calibrate(options, tell):
         targets = list(write_targets(calibration, options.target, written))
     for message in calibration.warnings:
         tell(f"warning: {message}")
-    _say(_summary(calibration, folder, reading.notes))
+    _say(errors_and_verdict(calibration))
+    names = ", ".join(sorted(path.name for path in folder.iterdir()))
+    _say([f"check          {split.sentence}", f"written to     {folder}: {names}"])
+    _say(f"note           {note}" for note in reading.notes)
+    _say(f"WARNING        {sentence}" for sentence in calibration.cautions())
     if checks:
         _say([f"specification  {specification(checks)}"])
     _say(
@@ -239,16 +243,6 @@ def _write(calibration, options, files, folder):
         std, _, dtype = options.c.partition(":")
         export_c_compensator(compensator, folder / "compensator", std=std, dtype=dtype or "double")
     return results.checks
-
-
-def _summary(calibration, folder, notes):
-    return [
-        *errors_and_verdict(calibration),
-        f"check          {calibration.split.sentence}",
-        f"written to     {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}",
-        *(f"note           {note}" for note in notes),
-        *(f"WARNING        {sentence}" for sentence in calibration.cautions()),
-    ]
 
 
 def _apply(options, tell):
