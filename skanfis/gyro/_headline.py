@@ -7,6 +7,7 @@ from ..bounds import bounds, gradient_bounds
 from ..export import fold
 from ..export.c.dialect import STATUS
 from ..inspection import export_text, readability
+from ..inspection.text import counted
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NAMES, NOTHING
 from .compensator import features
@@ -144,11 +145,11 @@ def of_rates(compensator, log, rates):
         X = features(log, compensator.inputs, compensator.time_constant)[is_out]
         parts = [(X.iloc[:, rules.positions], rules.model.minimum, rules.model.maximum)]
         blame["OUT_OF_RANGE"] = beyond(parts)
-    yield f"flagged        {(status != 0).sum():,} rows"
+    yield f"flagged        {counted(f'{(status != 0).sum():,}', 'row')}"
     for name, bit in STATUS.items():
         if count := ((status & bit) != 0).sum():
-            told = name.lower().replace("_", " ")
-            yield f"status {bit}       {count:,} rows {told}{blame.get(name, '')}"
+            told = f"{counted(f'{count:,}', 'row')} {name.lower().replace('_', ' ')}"
+            yield f"status {bit}       {told}{blame.get(name, '')}"
     errors = rates[["rate_indicated", "rate_compensated"]].sub(log.get("rate", np.nan), axis=0)
     kinds = np.where(status == 0, "rows with status 0", "the flagged rows")
     for where, part in errors.dropna().groupby(pd.Series(kinds, errors.index)):

@@ -87,7 +87,7 @@ def make_parser():
     add("--columns", told, metavar="PART=NAME", **several)
     told = f"by default those in the names, or s, degC and deg/s. {units}"
     add("--units", told, metavar="PART=UNIT", **several)
-    told = "of a raw signal at rest, which does not tell it: counts per deg/s"
+    told = "of a raw signal at one rate, which does not tell it: counts per deg/s"
     add("--scale-factor", told, type=_scale_factor)
     group = parser.add_argument_group("the model")
     told = "all that the log has; time, since power-on, with three runs or more"

@@ -260,7 +260,8 @@ def _find_encoding(path):
 
 def _no_text(path):
     return LogError(
-        f"{path}: is not text in UTF-8, UTF-16 or Windows-1252; export it as CSV in one of these."
+        f"{path}: is not text in UTF-8, UTF-16 or Windows-1252; export it as CSV in one of these, "
+        "or unpack it."
     )
 
 

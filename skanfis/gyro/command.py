@@ -271,7 +271,8 @@ def _apply(options, tell):
     for note in [*reading.notes, *assumed]:
         tell(f"note: {note}")
     log = reading.log
-    tell(f"{len(log):,} rows")
+    n_rows = counted(f"{len(log):,}", "row")
+    tell(n_rows)
     # Run by run, for the memory that this takes.
     runs = log.groupby("run", sort=False, observed=True) if "run" in log else [("", log)]
     rates = pd.concat([compensator.apply(part) for _, part in runs]).sort_index()
@@ -280,7 +281,7 @@ def _apply(options, tell):
     with _staged(target.parent) as folder:
         # Twelve digits are beyond any gyro, and short beside the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
-    _say([f"written        {target}: {len(rates):,} rows", *of_rates(compensator, log, rates)])
+    _say([f"written        {target}: {n_rows}", *of_rates(compensator, log, rates)])
     tell("done")
     return DONE
 
