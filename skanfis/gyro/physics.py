@@ -158,17 +158,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
-        """Predict the rate.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        rate : ndarray of shape (n_samples,)
-            In the unit of the target.
-        """
+        """Predict the rate, in the unit of the target."""
         check_parameters(self)
         used = self._used(X)
         sine, limit = self._sine(used), np.sin(self.max_phase)
@@ -227,7 +217,8 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
     def _keep(self, log, law):
         """Coefficients in the units of X and y, in powers of T minus the reference."""
         self.reference_temperature_ = float(log.mean)
-        tau = Polynomial([0.0, 1.0 / log.std])
+        output_unit, rate_unit, std, thermal_unit = log.units
+        tau = Polynomial([0.0, 1.0 / std])
 
         def in_units(coefficients, unit, degree):
             by_degree = np.zeros(1 + (degree if self.temperature is not None else 0))
@@ -235,10 +226,10 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
             by_degree[: found.size] = found
             return by_degree
 
-        self.amplitude_ = in_units(law.a, log.output_unit, self.amplitude_degree)
-        self.sagnac_factor_ = in_units(law.k, 1.0 / log.rate_unit, self.sagnac_degree)
-        self.bias_ = in_units(law.b, log.rate_unit, self.bias_degree)
-        self.thermometer_lag_ = float(law.lag * log.std / log.thermal_unit)
+        self.amplitude_ = in_units(law.a, output_unit, self.amplitude_degree)
+        self.sagnac_factor_ = in_units(law.k, 1.0 / rate_unit, self.sagnac_degree)
+        self.bias_ = in_units(law.b, rate_unit, self.bias_degree)
+        self.thermometer_lag_ = float(law.lag * std / thermal_unit)
 
     def _used(self, X):
         check_is_fitted(self)
@@ -294,24 +285,11 @@ def _standardised(used, rate):
     mean, std = temperature.mean(), temperature.std()
     if np.ptp(temperature) == 0:
         mean, std = temperature[0], 1.0
-    output_unit = np.sqrt(np.mean(output**2)) or 1.0
-    rate_unit = np.abs(rate).max() or 1.0
-    thermal_unit = np.abs(thermal_rate).max() or 1.0
-    columns = (
-        output / output_unit,
-        rate / rate_unit,
-        (temperature - mean) / std,
-        thermal_rate / thermal_unit,
-    )
-    return SimpleNamespace(
-        columns=np.stack(columns),
-        output_unit=output_unit,
-        rate_unit=rate_unit,
-        thermal_unit=thermal_unit,
-        mean=mean,
-        std=std,
-        has_lag=used.shape[1] == len(ROLES),
-    )
+    root = np.sqrt(np.mean(output**2))
+    units = root or 1.0, np.abs(rate).max() or 1.0, std, np.abs(thermal_rate).max() or 1.0
+    columns = np.stack([output, rate, temperature - mean, thermal_rate]) / np.array(units)[:, None]
+    has_lag = used.shape[1] == len(ROLES)
+    return SimpleNamespace(columns=columns, units=units, mean=mean, has_lag=has_lag)
 
 
 def _check_log(log):
