@@ -287,10 +287,16 @@ def _source_of(dialect, whole, silent):
         tables |= {"powers": law.powers}
         words |= {"n_terms": len(law.powers)}
     else:
-        policy = law.out_of_bounds
+        policy, inputs, number = law.out_of_bounds, law.columns_, dialect.number
         facts = {"law", *(["silent"] if policy in SILENT else ["answer", policy])}
-        tables |= {"law_input": law.columns_}
-        words |= _words_of_law(dialect, whole)
+        tables |= {"law_input": inputs}
+        words |= {f"n_{key}": values.size for key, values in whole.tables.items()}
+        words |= {"n_law": inputs.size, "output": inputs[0], "temperature": number(0.0)}
+        if inputs.size > 1:
+            lag = f" + {number(law.thermometer_lag_)} * x[{inputs[2]}]" if inputs.size > 2 else ""
+            words["temperature"] = f"x[{inputs[1]}]{lag} - {number(whole.reference)}"
+        words |= {"limit": number(np.sin(law.max_phase)), "max_phase": number(law.max_phase)}
+        words |= {"slope": number(1.0 / np.cos(law.max_phase))}
         called = dialect.write("$ASIN(")
         asin = next(line for line in dialect.functions().splitlines() if called in line) + "\n\n"
     tables |= {"rules_input": places}
@@ -303,24 +309,6 @@ def _source_of(dialect, whole, silent):
         f"\n{dialect.write(code, **words)}\n",
     ]
     return "".join(parts)
-
-
-def _words_of_law(dialect, whole):
-    """What its code is filled in with."""
-    law, number, inputs = whole.law, dialect.number, whole.law.columns_
-    temperature = number(0.0)
-    if inputs.size > 1:
-        lag = f" + {number(law.thermometer_lag_)} * x[{inputs[2]}]" if inputs.size > 2 else ""
-        temperature = f"x[{inputs[1]}]{lag} - {number(whole.reference)}"
-    return {
-        "temperature": temperature,
-        "n_law": inputs.size,
-        "output": inputs[0],
-        "limit": number(np.sin(law.max_phase)),
-        "max_phase": number(law.max_phase),
-        "slope": number(1.0 / np.cos(law.max_phase)),
-        **{f"n_{key}": values.size for key, values in whole.tables.items()},
-    }
 
 
 def _header(whole, dialect, price, units, notes):
