@@ -132,10 +132,6 @@ class GyroCompensator:
     def write_json(self, path: str | PathLike[str]) -> None:
         """Write it as text that runs nothing when it is read.
 
-        Parameters
-        ----------
-        path : str or path-like
-
         Raises
         ------
         ValueError, TypeError
@@ -151,14 +147,7 @@ class GyroCompensator:
     def read_json(cls, path: str | PathLike[str]) -> Self:
         """Read one that :meth:`write_json` has written.
 
-        Parameters
-        ----------
-        path : str or path-like
-
-        Returns
-        -------
-        compensator : GyroCompensator
-            It does what that did which was written. Its estimator can predict, not be fitted.
+        It does what that did which was written. Its estimator can predict, not be fitted.
 
         Raises
         ------

@@ -61,15 +61,7 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         self.run = run
 
     def fit(self, X: ArrayLike, y: Any = None) -> Self:
-        """Take note of the columns, and check them; nothing is learnt.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            A log.
-        y : None
-            Not used; here for scikit-learn.
-        """
+        """Take note of the columns of a log, and check them; nothing is learnt, y is not used."""
         constant = self.time_constant
         if not (isinstance(constant, int | float | np.number) and 0.0 < constant < np.inf):
             raise ValueError(f"time_constant={constant!r} must be a positive number.")
@@ -89,14 +81,7 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     def transform(self, X: ArrayLike) -> np.ndarray:
         """Compute the rates of the columns filtered, those columns alone.
 
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            A log: the rows of a run in time's order, whole runs. Runs may be mixed.
-
-        Returns
-        -------
-        rates : ndarray of shape (n_samples, n_features_out)
+        The rows of a run must be in time's order, and runs whole; they may be mixed.
         """
         check_is_fitted(self)
         return self._rates(*self._columns_of(X, reset=False))
