@@ -296,7 +296,7 @@ def _compensator_of(options):
             return GyroCompensator.read_json(path)
         except ValueError as error:
             raise UsageError(str(error)) from error
-    _write_to(sys.stderr, f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
+    sys.stderr.write(f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
     if not options.trust:
         raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
     try:
@@ -315,29 +315,26 @@ def _progress(quiet):
     def tell(text):
         if not quiet:
             seconds = time.monotonic() - start
-            _write_to(sys.stderr, f"{seconds:7.1f} s  {printable(text)}\n")
+            sys.stderr.write(f"{seconds:7.1f} s  {printable(text)}\n")
             sys.stderr.flush()
 
     return tell
 
 
 def _say(lines):
+    """Lines to stdout, with escapes for what its encoding lacks, as stderr has them by itself."""
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     for line in lines:
-        _write_to(sys.stdout, f"{printable(line)}\n")
+        told = printable(line).encode(encoding, "backslashreplace").decode(encoding)
+        sys.stdout.write(f"{told}\n")
 
 
 def _say_error(error, code):
     told = str(error) or type(error).__name__
     if isinstance(error, OSError) and error.filename is not None and error.strerror is not None:
         told = f"{error.filename}: {error.strerror}."
-    _write_to(sys.stderr, f"{PROGRAM}: {printable(told)}\n")
+    sys.stderr.write(f"{PROGRAM}: {printable(told)}\n")
     return code
-
-
-def _write_to(stream, text):
-    """Text to a stream, with escapes for what its encoding lacks."""
-    encoding = getattr(stream, "encoding", None) or "utf-8"
-    stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
 
 
 def _refuse_existing(paths, force, read=()):
