@@ -2,7 +2,7 @@
 
 import difflib
 import re
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import pandas as pd
@@ -74,7 +74,7 @@ _AXIS = re.compile("(?:gyro|gyr|omega|rate|imu|g|w)([xyz])(?![a-z])", re.IGNOREC
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a reading.
+    """What is asked of a reading; ValueError where it names a part or unit that is unknown.
 
     With ``guess``, as the command reads: columns are guessed, the clock tells runs, rows that lack
     a value are left out, and every row is checked.
@@ -86,15 +86,13 @@ class Request:
     guess: bool = False
     assumed: dict | None = None  # units of columns that name none; else by the values
 
-
-def checked_request(request):
-    """The request with the usual names of units; ValueError where it names what is unknown."""
-    for name, parts in (("columns", request.columns), ("require", request.require)):
-        for part in parts:
-            if part not in PARTS:
-                known = ", ".join(PARTS)
-                raise ValueError(f"{name}: there is no {part!r}; it may be one of {known}.")
-    return replace(request, units=declared_units(request.units))
+    def __post_init__(self):
+        for name, parts in (("columns", self.columns), ("require", self.require)):
+            for part in parts:
+                if part not in PARTS:
+                    known = ", ".join(PARTS)
+                    raise ValueError(f"{name}: there is no {part!r}; it may be one of {known}.")
+        object.__setattr__(self, "units", declared_units(self.units))
 
 
 @dataclass

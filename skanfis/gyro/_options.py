@@ -14,7 +14,7 @@ from .. import __version__
 from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
-from ._guess import Request, checked_request
+from ._guess import Request
 from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
@@ -140,7 +140,7 @@ def request_of(options, require, assumed=None):
     """
     columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
     try:
-        return checked_request(Request(columns, units, tuple(require), True, assumed))
+        return Request(columns, units, tuple(require), True, assumed)
     except ValueError as error:
         raise UsageError(str(error)) from error
 

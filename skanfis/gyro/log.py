@@ -19,7 +19,7 @@ import pandas as pd
 from ..export.fis.reader import distinct
 from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
 from ._columns import SIGNALS, convert
-from ._guess import Request, checked_request, settle
+from ._guess import Request, settle
 from ._source import NO_VALUE, Clock, as_numbers, dated, open_source
 from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
@@ -91,7 +91,7 @@ def read_log(
     0   0.0         20.0  -190.0  10.0
     1   1.0         20.1  -380.0  20.0
     """
-    request = checked_request(Request(columns or {}, units or {}, tuple(require)))
+    request = Request(columns or {}, units or {}, tuple(require))
     return read([paths] if isinstance(paths, str | Path) else list(paths), request).log
 
 
