@@ -10,7 +10,7 @@ import textwrap
 import numpy as np
 from scipy.optimize import linprog
 
-from .piecewise import Piecewise
+from .error_model import Piecewise
 
 _ARDUPILOT_REFERENCE, _ARDUPILOT_SCALE = 35.0, 1e6
 NOTES = {

@@ -11,7 +11,7 @@ from ...export.c.builder import header_of, input_lines
 from ...export.c.dialect import STATUS, Dialect, kept_lines, remark
 from ...export.c.self_test import ROWS, self_test
 from ...export.c.templates import FINITE_INPUT, rejection
-from .piecewise import Piecewise, spread
+from .error_model import Piecewise, spread
 
 # Of every type what C calls it, what it computes in, and the bits of a number behind its sign.
 TYPES = {

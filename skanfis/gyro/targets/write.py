@@ -9,8 +9,7 @@ from ...export.c.dialect import write_files
 from ..c_code import SUBTRACT, input_units, raw_rate_of
 from ..metrics import rms
 from .autopilots import NOTES, Cubic
-from .error_model import ErrorModel
-from .piecewise import difference
+from .error_model import ErrorModel, difference
 from .tables import Spline, Table
 
 FILES = {

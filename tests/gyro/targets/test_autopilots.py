@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from skanfis.gyro.targets.autopilots import Cubic
-from skanfis.gyro.targets.piecewise import difference
+from skanfis.gyro.targets.error_model import difference
 
 from .models import ENDS, error_over_temperature
 

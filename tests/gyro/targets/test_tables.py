@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import RegularGridInterpolator
 
-from skanfis.gyro.targets.piecewise import difference
+from skanfis.gyro.targets.error_model import difference
 from skanfis.gyro.targets.tables import TYPES, Spline, Table
 
 from ...export.c_compiler import UNTOUCHED, evaluate_all, needs_compiler
