@@ -180,7 +180,13 @@ def _text_of(compensator):
         if isinstance(fitted, Polynomial):
             polynomial = {key: getattr(fitted, key).tolist() for key in _OF_POLYNOMIAL}
         else:
-            law = _law_document(fitted, compensator.inputs)
+            law = {
+                "columns": [compensator.inputs[j] for j in fitted.columns_],
+                **{key: getattr(fitted, f"{key}_").tolist() for key in (*_POLYNOMIALS, *_RANGE)},
+                **{key: getattr(fitted, f"{key}_") for key in _NUMBERS},
+                "max_phase": float(fitted.max_phase),
+                "out_of_bounds": fitted.out_of_bounds,
+            }
     else:
         rules = FrozenRules.of(found, len(compensator.inputs))
     columns = [compensator.inputs[j] for j in rules.positions]
@@ -258,17 +264,6 @@ def _settings(document):
         estimator = joined(_read_polynomial(document["polynomial"], estimator, inputs), estimator)
     settings = {key: document[key] for key in _KEYS} | numbers
     return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
-
-
-def _law_document(law, inputs):
-    """Content of a file for a fitted law; ``inputs`` are the names of all columns of X."""
-    return {
-        "columns": [inputs[j] for j in law.columns_],
-        **{key: getattr(law, f"{key}_").tolist() for key in (*_POLYNOMIALS, *_RANGE)},
-        **{key: getattr(law, f"{key}_") for key in _NUMBERS},
-        "max_phase": float(law.max_phase),
-        "out_of_bounds": law.out_of_bounds,
-    }
 
 
 def _read_law(document, inputs):
