@@ -147,7 +147,15 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         used = inputs[:, columns]
         log = _standardised(used, rate.astype(float))
         log.degrees = self._degrees(used)
-        _check_log(log)
+        n_coefficients = sum(log.degrees) + 3 + log.has_lag
+        if rate.size < n_coefficients:
+            raise ValueError(
+                f"The law has {n_coefficients} coefficients; n_samples = {rate.size} rows cannot "
+                "tell them. Give more rows, or lower the degrees."
+            )
+        for name, values in (("the output", used[:, 0]), ("the rate (y)", rate)):
+            if np.ptp(values) == 0:
+                raise ValueError(f"No scale factor can be found: {name} never changes.")
         parameters, self.n_iter_, has_settled = _fit_law(log)
         if not has_settled:
             message = f"The law did not settle within {_MAX_EVALUATIONS} evaluations."
@@ -290,19 +298,6 @@ def _standardised(used, rate):
     columns = np.stack([output, rate, temperature - mean, thermal_rate]) / np.array(units)[:, None]
     has_lag = used.shape[1] == len(ROLES)
     return SimpleNamespace(columns=columns, units=units, mean=mean, has_lag=has_lag)
-
-
-def _check_log(log):
-    n_coefficients = sum(log.degrees) + 3 + log.has_lag
-    output, rate = log.columns[:2]
-    if rate.size < n_coefficients:
-        raise ValueError(
-            f"The law has {n_coefficients} coefficients; n_samples = {rate.size} rows cannot tell "
-            "them. Give more rows, or lower the degrees."
-        )
-    for name, values in (("the output", output), ("the rate (y)", rate)):
-        if np.ptp(values) == 0:
-            raise ValueError(f"No scale factor can be found: {name} never changes.")
 
 
 def _law_of(parameters, log):
