@@ -179,7 +179,13 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         factor = scale_factor(log["rate"], log["output"])
     X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
-    glitches = _glitches(log, before - rate, name_row, tell)
+    glitches = [
+        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
+        "and calibrate again."
+        for row, reason in find_glitches(log, before - rate)
+    ]
+    for sentence in glitches:
+        tell(f"warning: {sentence}")
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
     predicted, inside, folds, fold_models = _held_out(X, target, groups, split, recipe, tell, rng)
@@ -315,18 +321,6 @@ def _fit(X, target, groups, recipe, tell):
         estimator, terms = fit_model(X, target, groups, recipe)
     tell(f"terms {','.join(map(str, terms))}")
     return estimator, terms, sorted({str(warning.message) for warning in caught})
-
-
-def _glitches(log, error, name_row, tell):
-    """Sentences on rows that no other supports, told as well."""
-    found = [
-        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
-        "and calibrate again."
-        for row, reason in find_glitches(log, error)
-    ]
-    for sentence in found:
-        tell(f"warning: {sentence}")
-    return found
 
 
 def _to_write(recipe, verdict, simpler):
