@@ -2,12 +2,11 @@
 
 from collections.abc import Mapping
 from contextlib import contextmanager, nullcontext
-from importlib import import_module
 
 import numpy as np
 import pandas as pd
 
-from .errors import LogError
+from .errors import LogError, needed
 
 PARQUET, MATLAB, EXCEL = (".parquet", ".pq"), (".mat",), (".xlsx", ".xlsm")
 _HDF5 = b"\x89HDF"
@@ -38,7 +37,7 @@ class ParquetSource(TableSource):
 
     def __init__(self, path):
         told = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
-        parquet = _needed("pyarrow.parquet", told)
+        parquet = needed("pyarrow.parquet", told)
         with open(path, "rb"):
             pass  # what cannot be opened is told as of any other file
         with _read_as("Parquet", path):
@@ -77,7 +76,7 @@ def matlab_source(path):
 def _tree(path, is_hdf5):
     if is_hdf5:
         told = "MATLAB 7.3 needs h5py: pip install 'skanfis[logs]'; or save it with -v7"
-        return _needed("h5py", f"{path}: {told}").File(path)
+        return needed("h5py", f"{path}: {told}").File(path)
     from scipy.io import loadmat
 
     return nullcontext(loadmat(path, simplify_cells=True))
@@ -96,14 +95,6 @@ def _read_as(kind, path):
         raise LogError(f"{path}: is no {kind} that can be read: {reason}.") from error
 
 
-def _needed(module, told):
-    """A module that may not be installed; ``told`` then says what to do."""
-    try:
-        return import_module(module)
-    except ImportError as error:
-        raise ImportError(told) from error
-
-
 def _vectors(tree):
     for name, value in tree.items():
         if isinstance(value, Mapping):
@@ -117,7 +108,7 @@ def _vectors(tree):
 def excel_source(path, header_place):
     """The first sheet that holds a table; ``header_place`` finds the header in its first rows."""
     told = f"{path}: Excel needs openpyxl: pip install 'skanfis[logs]'; or save it as CSV"
-    _needed("openpyxl", told)
+    needed("openpyxl", told)
     with _read_as("Excel file", path):
         sheets = pd.read_excel(path, sheet_name=None, header=None, engine="openpyxl")
     name, sheet = next(((k, s) for k, s in sheets.items() if s.size), (None, None))

@@ -1,4 +1,6 @@
-"""Errors: of a log, of options, of files that exist."""
+"""Errors: of a log, of options, of files that exist, of packages that are not installed."""
+
+from importlib import import_module
 
 _LONGEST_SHOWN = 60  # of a value in a message
 
@@ -40,6 +42,14 @@ class UsageError(ValueError):
 
 class ExistsError(Exception):
     """A file that would be replaced."""
+
+
+def needed(module, told):
+    """A module that may not be installed; ``told`` then says what to do."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise ImportError(told) from error
 
 
 def shortened(value, show=repr):

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from ._columns import PER_HOUR, check_column, check_labels
+from .errors import needed
 
 _PPM = 1e6
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
@@ -183,12 +184,8 @@ def allan_deviation(error, sampling_interval, run=None):
     Of an error that is evenly sampled within each run [deg/s]; the variances of runs are averaged.
     A table: averaging_time [s], deviation and its standard error [deg/h], n, the differences.
     """
-    try:
-        from allantools import oadev
-    except ImportError as reason:
-        raise ImportError(
-            "The Allan deviation needs allantools: pip install allantools."
-        ) from reason
+    told = "The Allan deviation needs allantools: pip install allantools."
+    oadev = needed("allantools", told).oadev
     error = check_column(error, "error")
     if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
         raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
