@@ -1,7 +1,7 @@
 """Tables in files of Parquet, MATLAB and Excel, in the form of a source of a log."""
 
 from collections.abc import Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 
 import numpy as np
 import pandas as pd
@@ -60,9 +60,15 @@ def matlab_source(path):
     """The vectors of one length in a .mat file, of variables or of the fields of structs."""
     with open(path, "rb") as file:
         head = file.read(516)
-    is_hdf5 = _HDF5 in (head[:4], head[512:])
-    with _read_as("MATLAB file", path), _tree(path, is_hdf5) as tree:
-        found = dict(_vectors(tree))
+    with _read_as("MATLAB file", path):
+        if _HDF5 in (head[:4], head[512:]):
+            told = "MATLAB 7.3 needs h5py: pip install 'skanfis[logs]'; or save it with -v7"
+            with needed("h5py", f"{path}: {told}").File(path) as tree:
+                found = dict(_vectors(tree))
+        else:
+            from scipy.io import loadmat
+
+            found = dict(_vectors(loadmat(path, simplify_cells=True)))
     lengths = [len(values) for values in found.values() if len(values) > 1]
     if not lengths:
         raise LogError(f"{path}: has no vectors of numbers; save them as variables or a struct.")
@@ -71,15 +77,6 @@ def matlab_source(path):
     others = sorted(set(found) - set(columns))
     notes = [f"variables of another length are passed over: {', '.join(others)}"] if others else []
     return TableSource(path, pd.DataFrame(columns), notes)
-
-
-def _tree(path, is_hdf5):
-    if is_hdf5:
-        told = "MATLAB 7.3 needs h5py: pip install 'skanfis[logs]'; or save it with -v7"
-        return needed("h5py", f"{path}: {told}").File(path)
-    from scipy.io import loadmat
-
-    return nullcontext(loadmat(path, simplify_cells=True))
 
 
 @contextmanager
