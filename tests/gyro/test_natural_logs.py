@@ -247,7 +247,7 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
         (b"", "is empty"),
         (b"\n\n  \n", "is empty"),
         (b"1,2,3\n4,5,6\n", "line 1: has numbers where the names of the columns are due"),
-        (bytes(range(256)), "is not text"),
+        (bytes(range(256)), "is not text .* or unpack it"),
         (b"temp,gyro\n20,1\n21,\x81\n", "is not text"),
         (b"time,temp,gyro\n10:00:00,20,2\nnoon,21,2\n10:00:02,22,3\n", "line 3, column 'time': 'n"),
         (b"temp,gyro\n20,1\n21,1e999\n22,3\n", "line 3, column 'gyro' .output.: .* (inf|not a n)"),
