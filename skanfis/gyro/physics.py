@@ -126,14 +126,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         return tags
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit the law.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Output and temperature, among other columns.
-        y : array-like of shape (n_samples,)
-            True rate.
+        """Fit the law to the columns of X that it takes, and to the true rate.
 
         Raises
         ------
