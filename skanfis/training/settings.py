@@ -84,6 +84,8 @@ def _imported(estimator, names, sample_weight):
     if estimator.max_iter == 0:
         why = "where imported rules are taken as they are (max_iter=0): use solver='lse', or"
         refused |= dict.fromkeys(("monotonic_cst", "constraints", "consequent_features"), why)
+        if estimator.order < model.order:
+            raise ValueError(f"order={estimator.order} means nothing {why} leave it at 1.")
     for name, why in refused.items():
         if getattr(estimator, name) is not None:
             given = f"{name}={getattr(estimator, name)!r}"

@@ -126,11 +126,21 @@ class TestImported:
 
     @pytest.mark.parametrize(
         "settings",
-        [{"premise_features": ["rate"]}, {"consequent_features": ["rate"], "max_iter": 0}],
+        [
+            {"premise_features": ["rate"]},
+            {"consequent_features": ["rate"], "max_iter": 0},
+            {"order": 0, "max_iter": 0},
+        ],
     )
     def test_what_imported_rules_cannot_heed_is_refused(self, data, known, settings):
-        with pytest.raises(ValueError, match=r"features=.* means nothing"):
+        with pytest.raises(ValueError, match=rf"{next(iter(settings))}=.* means nothing"):
             ANFISRegressor(partition=known, **settings).fit(*data)
+
+    def test_constants_taken_as_they_are_stay_constants(self, data):
+        constants = ANFISRegressor(n_mfs=[2, 1, 1], order=0, solver="lse").fit(*data)
+        for order in (0, 1):
+            given = ANFISRegressor(partition=constants, order=order, max_iter=0).fit(*data)
+            assert given.model_.order == 0
 
     def test_a_number_of_terms_contradicts_it(self, data, known):
         with pytest.raises(ValueError, match=r"n_mfs=3 .* for the imported rules"):
