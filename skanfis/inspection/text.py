@@ -115,7 +115,7 @@ def export_text(
     counts = f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."
     parts = ["\n".join([counts, *_deviations(model, precision)])]
     common = _common_lines(said)
-    parts += [fill(f"Common to the rules, {line}.", _WIDTH) for line in common]
+    parts += [_wrapped(f"Common to the rules, {line}.") for line in common]
     if common:
         parts[-1] += f"\n{_IN_PLACE}"
     premises, words = premise_texts(model, said.levels), ["THEN", *[" AND"] * model.n_outputs]
@@ -124,13 +124,12 @@ def export_text(
         lines = [f"IF {premises[r]}"]
         for k, (word, name) in enumerate(zip(words, model.output_names, strict=False)):
             lines.append(f"{word} {name} is {_conclusion(said, r, k)}")
-        lines = [fill(one, _WIDTH, initial_indent="  ", subsequent_indent=7 * " ") for one in lines]
-        parts.append("\n".join([f"{heading}:", *lines]))
+        parts.append("\n".join([f"{heading}:", *(_wrapped(one, "  ", 7 * " ") for one in lines)]))
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
     if show_terms:
         parts.append(_legend(said, precision))
-    parts.append("\n".join(fill(one, _WIDTH) for one in _last_lines(said, found, precision)))
+    parts.append("\n".join(_wrapped(one) for one in _last_lines(said, found, precision)))
     return "\n\n".join(parts)
 
 
@@ -304,9 +303,9 @@ def _legend(said, precision):
     for name, own in categories.items():
         levels = [said.levels[model.input_names[j]][1] for j in own]
         levels += ["other"] if model.reference[own].sum() < 1.0 - _ROUNDING else []
-        lines.append(fill(f"  {name}: {', '.join(levels)}", _WIDTH, subsequent_indent=6 * " "))
+        lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
-    lines.append(fill(f"Outside these ranges {words}: {model.policy}.", _WIDTH))
+    lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         if np.isfinite([low, high]).any():
             limits = _range(low, high, precision)
@@ -316,7 +315,7 @@ def _legend(said, precision):
     formulas = {family.name: family.formula for family in families}
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
     how = _HOW.format(terms="".join(terms), line=_LINE if said.common.any() else "")
-    return "\n".join([*lines, "", fill(how, _WIDTH)])
+    return "\n".join([*lines, "", _wrapped(how)])
 
 
 def _term_text(term, locations):
@@ -333,6 +332,13 @@ def _left_out(model, chosen):
         return text
     weight = max(1.0 - model.rule_weights[chosen].sum(), 0.0)
     return f"{text} with {100.0 * weight:.3g} % of the weight"
+
+
+def _wrapped(text, first="", later=""):
+    """The text in lines, the first and the later ones indented; no ± ends a line."""
+    text = text.replace("± ", "±\N{NO-BREAK SPACE}")
+    lines = fill(text, _WIDTH, initial_indent=first, subsequent_indent=later)
+    return lines.replace("±\N{NO-BREAK SPACE}", "± ")
 
 
 def _range(low, high, precision):

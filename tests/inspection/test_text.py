@@ -287,6 +287,15 @@ def test_long_sentences_are_wrapped_and_read_as_ever(rng):
     assert_allclose(predicted(text, X, names), said, atol=1e-9)
 
 
+@pytest.mark.parametrize("length", range(25, 35))
+def test_no_line_ends_between_a_sign_and_its_number(length):
+    text = export_text(
+        MODELS["tree, order 1, 1 outputs"], feature_names=["a", length * "b" + "c", "d"]
+    )
+    assert re.search(r"± \d", text)
+    assert "±\n" not in text
+
+
 def test_rules_that_matter_and_a_line_for_the_rest():
     weights = A_GRID.rule_weights
     text = export_text(A_GRID, max_shown=3)
