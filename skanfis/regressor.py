@@ -597,7 +597,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         is_fitted = not (after_fit or is_imported)
         chunk_checks.check_begin(self, data.X.shape[0], finds_structure=is_fitted)
         if is_fitted:
-            self.fit(X, y, data.spread_weights(weight))
+            self.fit(X, y, data.over_all(weight, 0.0))
         elif after_fit:
             chunk_checks.check_outputs(self.model_, data.y.shape[1], data.output_names)
             warnings.warn(

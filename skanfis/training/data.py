@@ -51,22 +51,12 @@ class ValidatedData:
         numbers = np.arange(len(self.X)) if self.kept is None else np.flatnonzero(self.kept)
         return self.X[indices], self.y[indices], numbers[indices]
 
-    def spread_weights(self, weights):
-        """Weights of these rows as weights of all rows given, zero elsewhere."""
+    def over_all(self, values, elsewhere):
+        """Values of these rows as values of all rows given, with another one elsewhere."""
         if self.kept is None:
-            return weights
-        given = np.zeros(self.kept.size)
-        given[self.kept] = 1.0 if weights is None else weights
-        return given
-
-    def spread_over_rows(self, values, indices):
-        """Values of some rows as values of all rows given, NaN elsewhere."""
-        every = np.full(self.X.shape[0], np.nan)
-        every[indices] = values
-        if self.kept is None:
-            return every
-        given = np.full(self.kept.size, np.nan)
-        given[self.kept] = every
+            return values
+        given = np.full(self.kept.size, elsewhere)
+        given[self.kept] = values
         return given
 
 

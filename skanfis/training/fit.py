@@ -240,12 +240,16 @@ class _Fit:
         model = replace(model, support=replace(model.support, marginals=marginals))
         model = replace(model, rows_extrapolation=extrapolation_distance(model, rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
+        if weights is not None:
+            every = np.full(len(self.data.X), np.nan)
+            every[self.trained_on] = weights
+            weights = self.data.over_all(every, np.nan)
         return Fitted(
             model,
             run.result,
             run.start,
             redundant_rules(firing.overlap / rows.total_weight, firing.peak),
-            None if weights is None else self.data.spread_over_rows(weights, self.trained_on),
+            weights,
             run.validation_losses,
         )
 
