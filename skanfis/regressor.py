@@ -29,7 +29,7 @@ from .bounds import FixedPoint, OutputLimits
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
 from .inspection.effects import importances
 from .inspection.readability import readability_of_rows
-from .learning import MESSAGES, SOLVERS, Solver, VariableProjection
+from .learning import SOLVERS, Solver, VariableProjection
 from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, Membership
 from .model import TSKModel
 from .naming import given_term_names
@@ -37,6 +37,7 @@ from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .policies import OUT_OF_BOUNDS
 from .training import Callbacks, chunk_checks, fit_rules, model_without_rules, validated
 from .training.chunks import RowSums, fitted_weights, solve
+from .training.data import Fitted
 from .training.settings import given_weights, solver_of, structure_request
 
 __all__ = ["ANFISRegressor"]
@@ -356,13 +357,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             self.__dict__ = before
             raise
         self.model_ = fitted.model
-        self.n_iter_ = max(fitted.result.n_iter, 1)
-        self.loss_curve_ = np.resize(fitted.result.loss_curve, self.n_iter_ + 1)
-        self.status_ = fitted.result.message
-        self._keep_weights(fitted.start.penalty)
+        self._keep(fitted)
         self.stiffness_ = fitted.start.penalty.stiffness
         self.structures_ = fitted.start.candidates
-        self.redundant_rules_ = fitted.redundant_rules
         self.constraints_ = fitted.constraints
         self.robust_weights_ = fitted.robust_weights
         losses = fitted.validation_losses
@@ -621,11 +618,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         first = getattr(self, "_first_weights", None)
         solved = solve(self._sums, given_weights(self), first)
         self.model_ = solved.model.with_out_of_bounds(*policy_of(self.out_of_bounds))
-        self.n_iter_ = 1
-        self.loss_curve_ = np.full(2, solved.mean_squared_error)
-        self.status_ = MESSAGES["no_premise"]
-        self.redundant_rules_ = solved.redundant_rules
-        self._keep_weights(solved.penalty)
+        self._keep(solved)
 
     @available_if(chunk_checks.can_learn_from_chunks)
     def merge(self, *others: Any) -> Self:
@@ -756,8 +749,12 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         return self.model_
 
-    def _keep_weights(self, penalty):
-        """Set the attributes that tell the weights on the consequents, and the noise."""
+    def _keep(self, fitted: Fitted) -> None:
+        """Set what every fit tells beside its model, in one go or by chunks."""
+        result, penalty = fitted.result, fitted.start.penalty
+        self.redundant_rules_, self.status_ = fitted.redundant_rules, result.message
+        self.n_iter_ = max(result.n_iter, 1)
+        self.loss_curve_ = np.resize(result.loss_curve, self.n_iter_ + 1)
         self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
         self.slope_alpha_ = penalty.slope
         names = self.model_.input_names

@@ -14,6 +14,7 @@ import numpy as np
 from ..antecedent import strongest_rules
 from ..blocks import fitting_rows, row_blocks
 from ..consequent import LocalBasis, basis, in_user_units, with_common_slopes
+from ..learning import SolverResult
 from ..learning.covariance import posterior_of
 from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
 from ..learning.evidence import ROWS_EACH
@@ -24,9 +25,11 @@ from ..learning.penalty import CommonLine, Penalty
 from ..learning.premise import Premise
 from ..model import TSKModel
 from ..policies import TargetRange
+from ..search import Start
 from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
 from ..support import RuleSupport
 from .chunk_checks import check_distance
+from .data import Fitted
 from .pruning import redundant_rules
 
 # The weights of the penalty that are found where premises stay.
@@ -307,16 +310,6 @@ class _ProblemOfSums(SeparableProblem):
         return np.maximum(square - np.sum(solved * twice, axis=0), 0.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
-    """The model of all rows so far."""
-
-    model: TSKModel
-    penalty: Penalty
-    mean_squared_error: float  # of the standardised target, summed over outputs
-    redundant_rules: list[dict]
-
-
 def fitted_weights(estimator, sums: RowSums):
     """The weights of the penalty that a fit to these rows has found, times rows, in plain types."""
     place, n_rows = list(sums.base.input_names).index, sums.effective_weight
@@ -344,8 +337,8 @@ def fitted_weights(estimator, sums: RowSums):
     }
 
 
-def solve(sums: RowSums, given, first=None) -> Solved:
-    """Solve for the consequents.
+def solve(sums: RowSums, given, first=None) -> Fitted:
+    """Solve for the consequents: the model of all rows so far.
 
     ``given`` are weights of the penalty, by name. The others are those of ``first``, which
     :func:`fitted_weights` gives; without it, the evidence finds them.
@@ -370,10 +363,10 @@ def solve(sums: RowSums, given, first=None) -> Solved:
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
     overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight
-    return Solved(
+    return Fitted(
         _model(sums, problem, evaluation),
-        problem.penalty,
-        evaluation.mean_squared_error,
+        SolverResult(evaluation, np.full(1, evaluation.mean_squared_error), 0, "no_premise"),
+        Start(antecedent, problem.penalty),
         redundant_rules(overlap, sums.peak),
     )
 
