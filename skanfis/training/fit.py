@@ -23,15 +23,14 @@ from ..inspection.anova import input_marginals
 from ..learning import LeastSquares, VariableProjection
 from ..learning.covariance import posterior_of
 from ..learning.data import StandardisedData
-from ..learning.objective import SeparableProblem
+from ..learning.objective import Evaluation, SeparableProblem
 from ..learning.premise import Premise
 from ..learning.sampling import is_many, with_sample
 from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
 from ..search import Start, StructureRequest, effective_weight, report_constant
 from .data import Fitted, SolverRun, ValidatedData
-from .freezing import ModelBuilder, as_given, extrapolation_distance
-from .pruning import redundant_rules
+from .freezing import as_given, extrapolation_distance, frozen_model
 from .robust import (
     huber_weights,
     reweighted,
@@ -103,10 +102,10 @@ class _Fit:
             held=held_in_search(data.constraints),
         )
 
-    @property
-    def builder(self) -> ModelBuilder:
-        """What makes models of what is found on the rows as they are now."""
-        return ModelBuilder(self.data, self.rows, self.request, self.estimator.out_of_bounds)
+    def model(self, start: Start, evaluation: Evaluation) -> tuple[TSKModel, list[dict]]:
+        """What was found on the rows as they are now, as a model, and its redundant rules."""
+        model, redundant = frozen_model(self.data, self.rows, self.request, start, evaluation)
+        return model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds)), redundant
 
     def start(self, rows: StandardisedData) -> Start:
         """Where a run begins: rules, weights of the penalty, and the premises so far."""
@@ -151,7 +150,7 @@ class _Fit:
             )
 
         def tell_callbacks(n_iter, evaluation):
-            return self.callbacks.iteration(lambda: self.builder.model(start, evaluation))
+            return self.callbacks.iteration(lambda: self.model(start, evaluation)[0])
 
         watchers = [self.printer, self.callbacks and tell_callbacks] if is_watched else []
         displacement = start.displacement
@@ -224,8 +223,7 @@ class _Fit:
 
     def _free(self, run, weights):
         """The model of a run, whatever is known."""
-        rows, builder = self.rows, self.builder
-        firing = builder.firing(run.evaluation)
+        rows = self.rows
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
         n_rows = effective_weight(rows)
@@ -234,7 +232,8 @@ class _Fit:
             share, square = (np.average(weights**k, weights=rows.weights) for k in (1, 2))
             n_rows *= share**2 / square
         posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
-        model = replace(builder.model(run.start, run.evaluation, firing), posterior=posterior)
+        model, redundant = self.model(run.start, run.evaluation)
+        model = replace(model, posterior=posterior)
         assert model.support is not None
         marginals = input_marginals(rows, run.evaluation.antecedent)
         model = replace(model, support=replace(model.support, marginals=marginals))
@@ -248,7 +247,7 @@ class _Fit:
             model,
             run.result,
             run.start,
-            redundant_rules(firing.overlap / rows.total_weight, firing.peak),
+            redundant,
             weights,
             run.validation_losses,
         )

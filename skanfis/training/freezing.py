@@ -7,8 +7,7 @@ half a deviation; else it is a half. Distances beyond the outermost row all tell
 least of them counts.
 """
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,66 +38,51 @@ _DECISIVE, _QUARTILE = 0.25, 0.25
 _MOST_ROWS = 2000
 
 
-@dataclass(frozen=True, eq=False)
-class ModelBuilder:
-    """Makes models of what was found on ``rows``, which ``data`` has in the user's units."""
+def frozen_model(
+    data: ValidatedData,
+    rows: StandardisedData,
+    request: StructureRequest,
+    start: Start,
+    evaluation: Evaluation,
+) -> tuple[TSKModel, list[dict]]:
+    """The model, in the user's units, of what was found on ``rows``, and its redundant rules."""
+    trained, inputs = evaluation.antecedent, request.consequent_inputs
+    offset, scale, n_coefficients = rows.inputs.offset, rows.inputs.scale, 1 + inputs.size
+    firing = RuleFiring.of(rows, trained, n_coefficients)
+    coefficients = with_common_slopes(
+        evaluation.coefficients, evaluation.masses, start.penalty.common, inputs
+    )
+    support = rule_support(rows, trained, n_coefficients, firing)
+    model = TSKModel(
+        antecedent=trained.change_units(offset, scale),
+        initial_antecedent=start.antecedent.change_units(offset, scale),
+        coefficients=in_user_units(coefficients, rows.inputs, rows.targets, inputs, request.order),
+        reference=offset,
+        spread=scale,
+        minimum=rows.inputs.minimum,
+        maximum=rows.inputs.maximum,
+        rule_weights=evaluation.masses,
+        rule_rows=firing.strongest * (rows.n_rows / rows.total_weight),
+        input_names=data.input_names,
+        support=support.change_units(offset, scale),
+        term_names=start.term_names,
+        output_names=data.output_names,
+        target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
+        tangent_at=_tangent_at(data.constraints, rows),
+    )
+    return model, redundant_rules(firing.overlap / rows.total_weight, firing.peak)
 
-    data: ValidatedData
-    rows: StandardisedData
-    request: StructureRequest
-    out_of_bounds: Any
 
-    @property
-    def n_coefficients(self):
-        """Of a rule: one, and a slope for every input that its consequent takes."""
-        return 1 + self.request.consequent_inputs.size
-
-    def firing(self, evaluation: Evaluation) -> RuleFiring:
-        """How the rules fire on the rows, in a pass over them."""
-        return RuleFiring.of(self.rows, evaluation.antecedent, self.n_coefficients)
-
-    def model(
-        self, start: Start, evaluation: Evaluation, firing: RuleFiring | None = None
-    ) -> TSKModel:
-        """The model in the user's units; ``firing`` is how its rules fire, if that is at hand."""
-        rows, trained = self.rows, evaluation.antecedent
-        offset, scale = rows.inputs.offset, rows.inputs.scale
-        firing = self.firing(evaluation) if firing is None else firing
-        inputs, order = self.request.consequent_inputs, self.request.order
-        coefficients = with_common_slopes(
-            evaluation.coefficients, evaluation.masses, start.penalty.common, inputs
-        )
-        support = rule_support(rows, trained, self.n_coefficients, firing)
-        model = TSKModel(
-            antecedent=trained.change_units(offset, scale),
-            initial_antecedent=start.antecedent.change_units(offset, scale),
-            coefficients=in_user_units(coefficients, rows.inputs, rows.targets, inputs, order),
-            reference=offset,
-            spread=scale,
-            minimum=rows.inputs.minimum,
-            maximum=rows.inputs.maximum,
-            rule_weights=evaluation.masses,
-            rule_rows=firing.strongest * (rows.n_rows / rows.total_weight),
-            input_names=self.data.input_names,
-            support=support.change_units(offset, scale),
-            term_names=start.term_names,
-            output_names=self.data.output_names,
-            target=TargetRange(rows.targets.minimum, rows.targets.maximum, rows.targets.scale),
-            tangent_at=self._tangent_at(),
-        )
-        return model.with_out_of_bounds(*policy_of(self.out_of_bounds))
-
-    def _tangent_at(self):
-        """The medians of the inputs that an output is to rise or fall with; None without any."""
-        constraints, rows = self.data.constraints, self.rows.sample or self.rows
-        if constraints is None or not constraints.signs.any():
-            return None
-        table, weight, _ = representative_rows(rows, _MOST_ROWS)
-        held = constraints.signs.any(axis=0)
-        medians = [weighted_quantile(column, weight, 0.5, 1) for column in table.T[: held.size]]
-        found = rows.inputs.offset + rows.inputs.scale * np.array(medians)
-        found = np.clip(found, rows.inputs.minimum, rows.inputs.maximum)
-        return np.where(held, found, np.nan)
+def _tangent_at(constraints, rows):
+    """The medians of the inputs that an output is to rise or fall with; None without any."""
+    if constraints is None or not constraints.signs.any():
+        return None
+    table, weight, _ = representative_rows(rows.sample or rows, _MOST_ROWS)
+    held = constraints.signs.any(axis=0)
+    medians = [weighted_quantile(column, weight, 0.5, 1) for column in table.T[: held.size]]
+    found = rows.inputs.offset + rows.inputs.scale * np.array(medians)
+    found = np.clip(found, rows.inputs.minimum, rows.inputs.maximum)
+    return np.where(held, found, np.nan)
 
 
 def as_given(estimator, data, model) -> Fitted:
