@@ -144,10 +144,8 @@ class _Fit:
             problem = problem.on_all(rows)
         validation = None
         if self.held_out is not None:
-            inputs, stopping = self.request.consequent_inputs, self.stopping
-            validation = ValidationLoss(
-                self.held_out, inputs, stopping.n_iter_no_change, stopping.tol
-            )
+            inputs = self.request.consequent_inputs
+            validation = ValidationLoss(self.held_out, inputs, self.stopping)
 
         def tell_callbacks(n_iter, evaluation):
             return self.callbacks.iteration(lambda: self.model(start, evaluation)[0])
@@ -188,7 +186,7 @@ class _Fit:
         run = self.run(reweighted(rows, without_weight(weights)), start)
         for _ in range(_MOST_TURNS):
             before = weights
-            weights = huber_weights(run.problem, run.evaluation, epsilon, rows.sample_weight)
+            weights = huber_weights(run.problem, run.evaluation, epsilon, rows.weights)
             start = replace(run.start, displacement=run.displacement)
             run = self.run(reweighted(rows, weights), start)
             change = float(np.average(np.abs(weights - before), weights=rows.sample_weight))

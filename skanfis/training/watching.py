@@ -10,6 +10,7 @@ from sklearn.model_selection import GroupShuffleSplit
 from ..blocks import BLOCK_ROWS, row_blocks
 from ..consequent import basis, rule_outputs
 from ..learning.data import StandardisedData
+from ..options import EarlyStopping
 
 
 def watch_all(*watchers):
@@ -116,13 +117,11 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
 class ValidationLoss:
     """Watches a run: the mean squared error of held-out rows after every iteration.
 
-    ``rows`` are these, on the training rows' scales. The run ends after ``n_iter_no_change``
-    iterations without an error smaller by ``tol``, relatively.
+    ``rows`` are these, on the training rows' scales; ``stopping`` says when the run ends.
     """
 
-    def __init__(self, rows: StandardisedData, consequent_inputs, n_iter_no_change, tol):
-        self.rows, self.consequent_inputs = rows, consequent_inputs
-        self.n_iter_no_change, self.tol = n_iter_no_change, tol
+    def __init__(self, rows: StandardisedData, consequent_inputs, stopping: EarlyStopping):
+        self.rows, self.consequent_inputs, self.stopping = rows, consequent_inputs, stopping
         self.losses: list[float] = []
         self.best = None
         self._best_loss = self._last_counted = np.inf
@@ -133,11 +132,11 @@ class ValidationLoss:
         self.losses.append(loss)
         if loss < self._best_loss:
             self._best_loss, self.best = loss, evaluation
-        if loss < (1.0 - self.tol) * self._last_counted:
+        if loss < (1.0 - self.stopping.tol) * self._last_counted:
             self._last_counted, self._without_change = loss, 0
         else:
             self._without_change += 1
-        return self._without_change >= self.n_iter_no_change
+        return self._without_change >= self.stopping.n_iter_no_change
 
     def restored(self, result):
         """The result with the parameters of the smallest held-out error."""
