@@ -25,6 +25,7 @@ from sklearn.linear_model import HuberRegressor
 from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import column_statistics
 from ..learning.sampling import SAMPLE_ROWS, with_sample
+from ..search import weighted_quantile
 
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
@@ -39,12 +40,12 @@ _DIGITS = 2
 _OUTLIER = 0.5
 
 
-def huber_weights(problem, evaluation, epsilon, sample_weight):
-    """Weights (n_rows,) by the residuals at an evaluation; ``sample_weight`` is the rows' own."""
+def huber_weights(problem, evaluation, epsilon, own):
+    """Weights (n_rows,) by the residuals at an evaluation; ``own`` are those that the rows have."""
     sizes = np.empty(problem.rows.n_rows)
     for part, residual, _ in problem.residuals(evaluation):
         sizes[part] = np.sqrt(np.mean(residual**2, axis=0))
-    scale = _weighted_median(sizes, sample_weight) / _NORMAL_MEDIAN
+    scale = _weighted_median(sizes, own) / _NORMAL_MEDIAN
     if scale == 0.0:
         # Half of the rows are met exactly: what is not must not be the only one to count.
         return np.where(sizes == 0.0, 1.0, np.finfo(float).eps)
@@ -66,7 +67,7 @@ def robust_start(rows):
             for values, (center, spread, line) in zip(target, lines, strict=True)
         ]
         sizes[part] = np.sqrt(np.mean(squares, axis=0))
-    scale = _weighted_median(sizes, rows.sample_weight) / _NORMAL_MEDIAN
+    scale = _weighted_median(sizes, rows.weights) / _NORMAL_MEDIAN
     if scale == 0.0:
         return rows, weights
     weights = np.minimum(1.0, _FAR * scale / np.maximum(sizes, np.finfo(float).tiny))
@@ -79,18 +80,18 @@ def robust_start(rows):
 
 def _robust_lines(rows):
     """Centre, spread and scikit-learn's robust line of every output; None where there is none."""
-    Z, target, own = rows.read(slice(None))
+    Z, target, _ = rows.read(slice(None))
     lines = []
     for values in target:
-        center = _weighted_median(values, own)
-        spread = _weighted_median(np.abs(values - center), own)
+        center = _weighted_median(values, rows.weights)
+        spread = _weighted_median(np.abs(values - center), rows.weights)
         if spread == 0.0:
             return None
         linear = HuberRegressor(max_iter=_MOST_STEPS, tol=_TIGHT)
         # A rough line will do.
         with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
             try:
-                linear.fit(Z.T, (values - center) / spread, sample_weight=own)
+                linear.fit(Z.T, (values - center) / spread, sample_weight=rows.sample_weight)
             except ValueError:
                 return None
         lines.append((center, spread, linear))
@@ -99,11 +100,7 @@ def _robust_lines(rows):
 
 def _weighted_median(values, weight):
     """Half of the weight is below, half above; between two values, their mean."""
-    order = np.argsort(values, kind="stable")
-    upto = np.cumsum(np.ones(values.size) if weight is None else weight[order])
-    middle = np.searchsorted(upto, 0.5 * upto[-1])
-    after = min(middle + int(upto[middle] == 0.5 * upto[-1]), values.size - 1)
-    return 0.5 * float(values[order[middle]] + values[order[after]])
+    return 0.5 * sum(float(weighted_quantile(values, weight, 0.5, side)) for side in (1, -1))
 
 
 def reweighted(rows, weights):
