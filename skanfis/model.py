@@ -151,6 +151,13 @@ class TSKModel:
         return found
 
     @property
+    def rule_centers(self) -> np.ndarray:
+        """Mean of the training rows by each rule's strength, or of all, (n_rules, n_inputs)."""
+        if self.support is None:
+            return np.tile(self.reference, (self.n_rules, 1))
+        return np.where(self.support.share[:, None] > 0.0, self.support.center, self.reference)
+
+    @property
     def output_limits(self) -> np.ndarray:
         """Lowest and highest output that the model gives, (2, n_outputs); infinite if not held."""
         if self.target is None:

@@ -57,7 +57,7 @@ class Sentences:
         slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
         scale, noise = _resolution(model, slopes)
         two_valued = _two_valued(model)
-        digits, centers = max(_DIGITS_OF_PLACE, precision), rule_centers(model)
+        digits, centers = max(_DIGITS_OF_PLACE, precision), model.rule_centers
         places, common_place = (
             np.where(two_valued, np.round(np.clip(at, 0.0, 1.0)), rounded(at, model.spread, digits))
             for at in (centers, model.reference)
@@ -116,13 +116,6 @@ class Sentences:
     def reading_cost(self) -> int:
         """Numerals in the sentences of all rules, and in the common line."""
         return int(self.n_numbers.sum() + np.count_nonzero(self.common))
-
-
-def rule_centers(model):
-    """Mean of the training rows by each rule's strength, (n_rules, n_inputs), where it is known."""
-    if model.support is None:
-        return np.tile(model.reference, (model.n_rules, 1))
-    return np.where(model.support.share[:, None] > 0.0, model.support.center, model.reference)
 
 
 def rounded(values, unit, precision):

@@ -79,7 +79,7 @@ class RowSums:
         slope, square = np.zeros((n_rules * n_basis, y.shape[1])), np.zeros(y.shape[1])
         second = np.zeros((n_rules, 1 + n_inputs, 1 + n_inputs))
         strongest, peak = np.zeros(n_rules), np.zeros(n_rules)
-        centers, extent = _centers(base)[:, own], np.zeros((n_rules, own.size))
+        centers, extent = base.rule_centers[:, own], np.zeros((n_rules, own.size))
         distinct, distinct_inputs = np.zeros((0, 1)), np.zeros((0, 2))
         farthest = np.zeros((0, 1 + n_inputs))
         n_values = 4 * (n_rules + antecedent.n_terms + n_inputs) + sum(design.shape)
@@ -241,13 +241,6 @@ def _rescaled(sums, shift, factor):
     blocks[:, 1:] *= factor[:, None]
     blocks[:, 1:] += shift[:, None] * blocks[:, :1]
     return blocks.reshape(sums.shape)
-
-
-def _centers(base):
-    """Where the rules of a model stand, (n_rules, n_inputs): the same for all chunks."""
-    if base.support is None:
-        return np.tile(base.reference, (base.n_rules, 1))
-    return base.support.center
 
 
 def _distinct(table, most):
