@@ -60,7 +60,7 @@ class RowSums:
     peak: np.ndarray  # largest strength of each rule on any row
     # Largest sqrt(w_r) |x - a_r|, with a_r the centre that the rule has in ``base``, by input.
     extent: np.ndarray
-    distinct: np.ndarray  # fingerprints of distinct rows, up to a limit, (n, 1)
+    distinct: np.ndarray  # fingerprints of distinct rows, up to a limit
     # Rules, and fingerprints of distinct inputs on which they are the strongest, (n, 2).
     distinct_inputs: np.ndarray
     # Rules, and the rows on which they fire farthest from their centres, (n, 1 + n_inputs).
@@ -80,8 +80,8 @@ class RowSums:
         second = np.zeros((n_rules, 1 + n_inputs, 1 + n_inputs))
         strongest, peak = np.zeros(n_rules), np.zeros(n_rules)
         centers, extent = base.rule_centers[:, own], np.zeros((n_rules, own.size))
-        distinct, distinct_inputs = np.zeros((0, 1)), np.zeros((0, 2))
-        farthest = np.zeros((0, 1 + n_inputs))
+        distinct, distinct_inputs = np.empty(0), np.empty((0, 2))
+        farthest = np.empty((0, 1 + n_inputs))
         n_values = 4 * (n_rules + antecedent.n_terms + n_inputs) + sum(design.shape)
         for part in row_blocks(rows.n_rows, fitting_rows(n_values)):
             raw = np.array(rows.X[part].T, dtype=float, order="C")
@@ -96,7 +96,7 @@ class RowSums:
                 extent[:, j] = np.maximum(extent[:, j], distance.max(axis=1))
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
             marks = fingerprint(np.vstack([numbers, rows.y[part].T]))
-            distinct = _distinct(np.vstack([distinct, marks[:, None]]), ROWS_EACH * len(slope))
+            distinct = np.union1d(distinct, marks)[: ROWS_EACH * len(slope)]
             own_inputs = np.column_stack([best, numbers])
             distinct_inputs = _distinct(np.vstack([distinct_inputs, own_inputs]), 1 + n_inputs)
             rule, row = np.nonzero(strengths >= FIRES * top)
@@ -154,15 +154,13 @@ class RowSums:
         one, two = self._on(inputs, targets), other._on(inputs, targets)
         names = (*_SUMS, "n_rows", "squared_weight")
         both = replace(one, **{name: getattr(one, name) + getattr(two, name) for name in names})
-        distinct, distinct_inputs, farthest = (
-            np.vstack([getattr(one, name), getattr(two, name)])
-            for name in ("distinct", "distinct_inputs", "farthest")
-        )
+        distinct_inputs = np.vstack([one.distinct_inputs, two.distinct_inputs])
+        farthest = np.vstack([one.farthest, two.farthest])
         return replace(
             both,
             peak=np.maximum(one.peak, two.peak),
             extent=np.maximum(one.extent, two.extent),
-            distinct=_distinct(distinct, ROWS_EACH * len(self.slope)),
+            distinct=np.union1d(one.distinct, two.distinct)[: ROWS_EACH * len(self.slope)],
             distinct_inputs=_distinct(distinct_inputs, both.second.shape[1]),
             farthest=_far_rows(farthest, both.second, inputs),
         )
@@ -244,10 +242,12 @@ def _rescaled(sums, shift, factor):
 
 
 def _distinct(table, most):
-    """Distinct rows of a table, at most so many of every number in the first of two columns."""
-    table = np.unique(table, axis=0)
-    if table.shape[1] == 1:
-        return table[:most]
+    """Distinct rows of a table, at most so many of every number in its first column."""
+    return _first_of_each(np.unique(table, axis=0), most)
+
+
+def _first_of_each(table, most):
+    """So many rows of every number in the first column, by which the table is sorted."""
     rank = np.arange(len(table)) - np.searchsorted(table[:, 0], table[:, 0])
     return table[rank < most]
 
@@ -270,9 +270,7 @@ def _distances(farthest, second, scale):
 def _far_rows(rows, second, scale):
     """Of rows by their rules the few farthest of each: one more row may change who is."""
     rules, distance = _distances(rows, second, scale)
-    order = np.lexsort((-distance, rules))
-    rank = np.arange(order.size) - np.searchsorted(rules[order], rules[order])
-    return rows[order[rank < _MOST_FAR]]
+    return _first_of_each(rows[np.lexsort((-distance, rules))], _MOST_FAR)
 
 
 class _ProblemOfSums(SeparableProblem):
