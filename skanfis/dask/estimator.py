@@ -121,9 +121,8 @@ class DaskANFISRegressor(ANFISRegressor):
                 "give X.compute()."
             )
         data = ClusterData.of(Partitions.of(X, y, sample_weight, groups))
-        layout = data.partitions.layout
         constraints = Constraints.read(
-            self.monotonic_cst, self.constraints, layout.input_names, len(layout.output_names)
+            self.monotonic_cst, self.constraints, data.input_names, len(data.output_names)
         )
         if not is_many(data.rows()):
             here = computed(X, y, sample_weight, groups)

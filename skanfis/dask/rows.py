@@ -275,27 +275,19 @@ class ClusterData:
 
     partitions: Partitions
     described: tuple[int, float, Scale, Scale]  # as of ``_describe``
+    input_names: tuple[str, ...]
+    output_names: tuple[str, ...]
     constraints: Constraints | None = None
 
     @classmethod
     def of(cls, partitions):
         """Validate and measure the partitions, in one pass."""
-        describe = partial(_describe, layout=partitions.layout)
-        described = reduce_partitions(partitions, describe, joined)
+        layout = partitions.layout
+        described = reduce_partitions(partitions, partial(_describe, layout=layout), joined)
         n_rows = 0 if described is None else described[0]
         if n_rows < 2:
             raise ValueError(f"Found {n_rows} rows with a positive weight; at least 2 are needed.")
-        return cls(partitions, described)
-
-    @property
-    def input_names(self):
-        """Names of the inputs."""
-        return self.partitions.layout.input_names
-
-    @property
-    def output_names(self):
-        """Names of the outputs."""
-        return self.partitions.layout.output_names
+        return cls(partitions, described, layout.input_names, layout.output_names)
 
     def rows(self):
         """The rows on their scales."""
