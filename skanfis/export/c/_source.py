@@ -180,7 +180,7 @@ class Source:
             "tangent_given": "const $real *at, const $real *way, $int g"
             if "moves" in self.facts
             else ", ".join(f"const $real *{name}" for name in [*taken, "e"]),
-            "n_groups": str(self.n_groups),
+            "n_groups": self.n_groups,
             "tangent_indices": ", ".join(["i"] * (self.n_terms > 0) + indices),
             "tangent_arrays": _declared(tangent),
             "arrays": _declared(main),
@@ -192,9 +192,8 @@ class Source:
             "add_rules": self._over_rules(templates.ADD_RULE),
             "add_changes": self._over_rules(templates.ADD_CHANGE),
         }
-        text = kept_lines(templates.FUNCTIONS, self.facts) + "\n"
-        for word, part in words.items():
-            text = text.replace(f"${word}", part)
+        # These hold words of the dialect themselves.
+        text = dialect.write(kept_lines(templates.FUNCTIONS, self.facts) + "\n", **words)
         # int has 16 bits at least.
         is_long = max(self.model.n_rules, self.n_terms) > 32767
         functions = dialect.write(text, int="long" if is_long else "int")
@@ -260,11 +259,9 @@ class Source:
     def _strengths(self, logarithms, rules, slope):
         """Terms, then strengths; or the derivatives of their logarithms along e."""
         if self.is_tree:
+            sizes = {"n_nodes": self.n_terms // 2, "n_rules": self.model.n_rules}
             body = kept_lines(templates.TREE, {"slope" if slope else "share"})
-            words = {"$n_nodes": self.n_terms // 2, "$n_rules": self.model.n_rules}
-            words |= {"$rules": rules, "$first": "0.0R" if slope else "1.0R"}
-            for word, value in words.items():
-                body = body.replace(word, str(value))
+            body = self.dialect.write(body, rules=rules, first="0.0R" if slope else "1.0R", **sizes)
             return _indented(body.splitlines())
         numbers, lines = self.numbers, []
         if numbers.counts == ():
@@ -293,10 +290,9 @@ class Source:
 
     def _over_rules(self, template):
         """What a template does with every rule r."""
+        place = "$name_slope_input[j]" if 0 < self.n_slopes < self.model.n_inputs else "j"
         body = kept_lines(template, self.facts)
-        body = body.replace("$n_slopes", str(self.n_slopes))
-        selects = 0 < self.n_slopes < self.model.n_inputs
-        body = body.replace("$input", "$name_slope_input[j]" if selects else "j")
+        body = self.dialect.write(body, n_slopes=self.n_slopes, input=place)
         return _indented(_loop("r", self.model.n_rules, body.splitlines()))
 
 
