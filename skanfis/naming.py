@@ -12,12 +12,14 @@ import numpy as np
 
 from .antecedent.tree import CRISP
 from .membership import SigmoidFalling, SigmoidRising
+from .policies import MOST_DIGITS, told_apart
 
 __all__ = [
     "LINGUISTIC",
     "SIGNS",
     "default_output_names",
     "default_term_names",
+    "distinct",
     "given_term_names",
     "written_side",
 ]
@@ -32,8 +34,6 @@ LINGUISTIC = {
     6: ("NL", "NM", "NS", "PS", "PM", "PL"),
     7: ("NL", "NM", "NS", "ZE", "PS", "PM", "PL"),
 }
-# More than these tell no two doubles apart.
-_MOST_DIGITS = 17
 
 # Families that are one side of a cut.
 SIGNS = {SigmoidRising: "> ", SigmoidFalling: "< "}
@@ -89,11 +89,11 @@ def _sides(sign, cuts, log_widths, low, high, fewest):
     halves = np.where(alone, 0.5 * (high - low), widths * _MOSTLY_TRUE)
     sides = list(zip(cuts, halves, alone, strict=True))
     names: dict[tuple, str] = {}
-    for digits in range(fewest, _MOST_DIGITS + 1):
+    for digits in range(fewest, MOST_DIGITS + 1):
         written = {side: sign + _side(*side, digits) for side in sides}
         taken = Counter(written.values())
         for side, text in written.items():
-            if side not in names and (taken[text] == 1 or digits == _MOST_DIGITS):
+            if side not in names and (taken[text] == 1 or digits == MOST_DIGITS):
                 names[side] = text
         if len(names) == len(written):
             break
@@ -106,7 +106,7 @@ def _side(cut, half, alone, digits):
     """Write "6.8 ± 0.3", or the cut alone."""
     last = digits - 1 - int(np.floor(np.log10(half)))
     size = int(np.floor(np.log10(abs(cut)))) if cut else -last
-    text = _plain(cut, min(max(size + 1 + last, 1), _MOST_DIGITS))
+    text = _plain(cut, min(max(size + 1 + last, 1), MOST_DIGITS))
     return text if alone else f"{text} ± {_plain(half, digits)}"
 
 
@@ -160,16 +160,20 @@ def _near(places, size):
     """Places in as few digits as tell them apart; equal ones, but for rounding, are numbered."""
     if 0.0 < size < np.inf:
         places = _ALIKE * size * np.round(places / (_ALIKE * size)) + 0.0
-    for digits in range(3, _MOST_DIGITS + 1):
-        written = [_plain(place, digits) for place in places]
-        if len(set(written)) == len(set(places)):
-            break
-    counts: Counter = Counter()
-    names = []
-    for text in written:
-        counts[text] += 1
-        names.append(f"near {text}" + (f" ({counts[text]})" if counts[text] > 1 else ""))
-    return names
+    return distinct(f"near {text}" for text in told_apart(places, _plain, 3))
+
+
+def distinct(names, numbered="{} ({})"):
+    """The names; one that was there before gets a number."""
+    taken: dict[str, int] = {}
+    found = []
+    for name in names:
+        while name in taken:
+            taken[name] += 1
+            name = numbered.format(name, taken[name])
+        taken[name] = 1
+        found.append(name)
+    return tuple(found)
 
 
 def _plain(number, digits):

@@ -10,12 +10,14 @@ __all__ = [
     "FARTHEST",
     "FARTHEST_ROW",
     "MAX_EXTRAPOLATION",
+    "MOST_DIGITS",
     "OUT_OF_BOUNDS",
     "SILENT",
     "TargetRange",
     "check_policy",
     "describe_out_of_bounds",
     "policy_in_words",
+    "told_apart",
 ]
 
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
@@ -27,6 +29,8 @@ SILENT = ("nan", "raise")
 MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 # A row further off than so many of them counts as so far: results saturate, and overflow nowhere.
 FARTHEST_ROW = 1e100
+# More than these tell no two doubles apart, and give back no other double.
+MOST_DIGITS = 17
 # What a prediction may have beyond the range of the target: half a standard deviation at least,
 # whatever the limit of inputs, for peaks between rows; of rules that bend a quarter of the range at
 # most. A line has no peaks between rows.
@@ -104,7 +108,7 @@ def describe_out_of_bounds(X, minimum, maximum, names) -> str:
     for column, low, high, name in zip(X.T, minimum, maximum, names, strict=True):
         outside = (column < low) | (column > high)
         if outside.any():
-            ends = _told_apart(low, high, column.min(), column.max())
+            ends = told_apart([low, high, column.min(), column.max()], "{:.{}g}".format, 6)
             parts.append(
                 f"{name!r} in {outside.sum()} of {column.size} rows (trained on "
                 f"[{ends[0]}, {ends[1]}], found [{ends[2]}, {ends[3]}])"
@@ -112,10 +116,10 @@ def describe_out_of_bounds(X, minimum, maximum, names) -> str:
     return "X lies outside the training data: " + "; ".join(parts) + "."
 
 
-def _told_apart(*values):
-    """Numbers in six digits, or as many as tell them apart, as those of time stamps."""
-    for n_digits in range(6, 18):
-        texts = [f"{value:.{n_digits}g}" for value in values]
+def told_apart(values, write, fewest):
+    """Numbers in ``fewest`` digits, or as many as tell them apart, as those of time stamps."""
+    for n_digits in range(fewest, MOST_DIGITS + 1):
+        texts = [write(value, n_digits) for value in values]
         if len(set(texts)) == len(set(values)):
             break
     return texts

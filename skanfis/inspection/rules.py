@@ -11,7 +11,8 @@ from .._validation import check_count
 from ..export import fold, fold_with_rows
 from ..export.folding import last_step
 from ..model import TSKModel
-from .sentences import MOST_DIGITS, Sentences
+from ..policies import MOST_DIGITS
+from .sentences import Sentences
 
 
 def conditions(model):

@@ -21,11 +21,10 @@ import numpy as np
 from ..antecedent.tree import CRISP
 from ..model import TSKModel
 from ..naming import SIGNS, default_term_names, written_side
+from ..policies import MOST_DIGITS
 
 # Digits of the noise's deviation to which numbers are written.
 PRECISION = 2
-# More than these give back no other double.
-MOST_DIGITS = 17
 # Digits of a deviation of an input to which the places are written that slopes count from.
 _DIGITS_OF_PLACE = 2
 # As rounding leaves a 0 or a 1.

@@ -11,7 +11,7 @@ import pandas as pd
 
 from .._validation import check_count
 from ..export.folding import fold_with_reader
-from ..policies import policy_in_words
+from ..policies import MOST_DIGITS, policy_in_words
 from .rules import (
     condition,
     has_training_data,
@@ -21,7 +21,7 @@ from .rules import (
     rename,
     shown_rules,
 )
-from .sentences import MOST_DIGITS, PRECISION, Sentences, rounded
+from .sentences import PRECISION, Sentences, rounded
 
 # Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 3

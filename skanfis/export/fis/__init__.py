@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..._validation import warn_user
+from ...naming import distinct
 from ..folding import fold
 from .functions import function_of
-from .reader import distinct, parse_fis, read_fis
+from .reader import parse_fis, read_fis
 
 __all__ = ["export_fis", "read_fis"]
 

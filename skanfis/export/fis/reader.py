@@ -14,6 +14,7 @@ import numpy as np
 
 from ...antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from ...model import TSKModel
+from ...naming import distinct as distinct  # for names in logs too
 from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
 from .functions import theta_of
 
@@ -358,16 +359,3 @@ def _is_scattered(inputs, antecedents):
     return len(families) == 1 and all(
         own.min() > 0 and np.unique(own).size == own.size for _, own in used
     )
-
-
-def distinct(names, numbered="{} ({})"):
-    """The names; one that was there before gets a number."""
-    taken: dict[str, int] = {}
-    found = []
-    for name in names:
-        while name in taken:
-            taken[name] += 1
-            name = numbered.format(name, taken[name])
-        taken[name] = 1
-        found.append(name)
-    return tuple(found)
