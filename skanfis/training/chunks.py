@@ -307,6 +307,11 @@ def fitted_weights(estimator, sums: RowSums):
     model = estimator.model_
     is_absent = (model.coefficients[:, 1:] == 0.0).all(axis=2)
     varying = sums.consequent_inputs[(model.maximum > model.minimum)[sums.consequent_inputs]]
+
+    def by_input(is_marked):
+        found = [[int(j), np.flatnonzero(is_marked[:, j]).tolist()] for j in varying]
+        return [[j, rules] for j, rules in found if rules]
+
     return {
         "agreement": n_rows * estimator.agreement_,
         "alpha": n_rows * estimator.alpha_,
@@ -315,16 +320,8 @@ def fitted_weights(estimator, sums: RowSums):
             ([place(name) for name in one["inputs"]], one["pull"]) for one in estimator.pulls_
         ],
         "slope_pulls": [[place(name), pull] for name, pull in estimator.slope_pulls_.items()],
-        "common": [
-            [j, np.flatnonzero(rules).tolist()]
-            for j, rules in enumerate(model.common_slopes.T)
-            if rules.any()
-        ],
-        "absent": [
-            [int(j), np.flatnonzero(is_absent[:, j]).tolist()]
-            for j in varying
-            if is_absent[:, j].any()
-        ],
+        "common": by_input(model.common_slopes),
+        "absent": by_input(is_absent),
     }
 
 
