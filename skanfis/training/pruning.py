@@ -6,7 +6,7 @@ rows O_rs = mean of w_r w_s: O_rs / sqrt(O_rr O_ss) is close to one. They then h
 between them, however it is divided. Of two that repeat one another the stronger one stays.
 """
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -62,7 +62,11 @@ def model_without_rules(model: TSKModel, rules: ArrayLike) -> TSKModel:
         raise ValueError(f"rules names all {model.n_rules} rules: one at least must be left.")
     kept = np.setdiff1d(np.arange(model.n_rules), numbers)
     antecedent, terms = model.antecedent.without_rules(numbers)
-    weights = model.rule_weights[kept]
+    weights, support = model.rule_weights[kept], model.support
+    if support is not None:
+        # What the rules say of every input alone is another thing without some of them.
+        own = {key: of_rules[kept] for key, of_rules in vars(support).items() if key != "marginals"}
+        support = RuleSupport(**own)
     return replace(
         model,
         antecedent=antecedent,
@@ -70,15 +74,7 @@ def model_without_rules(model: TSKModel, rules: ArrayLike) -> TSKModel:
         coefficients=model.coefficients[kept],
         rule_weights=weights / weights.sum(),
         rule_rows=model.rule_rows[kept],
-        support=_support_of(model.support, kept),
+        support=support,
         posterior=None,  # it is of all rules
         term_names=tuple(model.term_names[t] for t in terms),
     )
-
-
-def _support_of(support, rules):
-    """The support of some of the rules; what they say of every input alone is another thing."""
-    if support is None:
-        return None
-    names = (field.name for field in fields(support) if field.name != "marginals")
-    return RuleSupport(*(getattr(support, name)[rules] for name in names))
