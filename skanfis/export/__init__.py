@@ -44,7 +44,6 @@ TRUSTED_TYPES = [
     "skanfis.options.EarlyStopping",
     "skanfis.options.Huber",
     "skanfis.options.LinearExtrapolation",
-    "skanfis.learning.penalty.Penalty",
     "skanfis.posterior.Posterior",
     "skanfis.inspection.measures.Measures",
     "skanfis.inspection.readability.Readability",
