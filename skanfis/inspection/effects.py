@@ -119,7 +119,7 @@ def _shares(subsets, closed, variance):
     return [(found[v] - sum(found[(g,)] for g in v if len(v) > 1)) / variance for v in subsets]
 
 
-def _notes(table, held, is_drawn):
+def _notes(table, held, is_by_draws):
     notes = []
     if "rows" in table:
         apart = table[(table["sobol"] - table["rows"]).abs() > _DIFFERENT]
@@ -133,7 +133,7 @@ def _notes(table, held, is_drawn):
             f"In {100.0 * held:.1f} % of the combinations of inputs, taken as independent, "
             "the output is held within its limits: shares are of the sum of rules before that."
         )
-    if is_drawn:
+    if is_by_draws:
         notes.append(
             "The strengths of these rules are no products of functions of one input: shares are "
             f"from {N_DRAWS:,} draws, that of an input or a pair good to about {DrawnAnova.error}."
@@ -190,7 +190,7 @@ class Study:
     output: int
     labels: list[str]
     blocks: list[Block]
-    is_drawn: list[bool]  # whether pictures show it: one input, or a category
+    is_shown: list[bool]  # whether pictures show it: one input, or a category
     rows: np.ndarray | None
     anova: ProductAnova | DrawnAnova
 
@@ -217,9 +217,9 @@ class Study:
         labels, inputs = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
         if sum(map(len, inputs)) != model.n_inputs:
             raise ValueError("groups: one of them is called as a column that it does not have.")
-        is_drawn = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
+        is_shown = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
         blocks = _known(model, inputs, rows)
-        return cls(model, k, labels, blocks, is_drawn, rows, _anova(model, k, blocks))
+        return cls(model, k, labels, blocks, is_shown, rows, _anova(model, k, blocks))
 
     def pairs(self):
         """Pairs of blocks by their positions, but those that are zero for want of terms."""

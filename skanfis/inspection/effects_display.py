@@ -79,8 +79,8 @@ class EffectsDisplay:
         """
         check_count("max_shown", max_shown, 1)
         study = Study.of(estimator, X, groups, output)
-        ones = [(g,) for g in np.flatnonzero(study.is_drawn).tolist()]
-        pairs = [(g, h) for g, h in study.pairs() if study.is_drawn[g] and study.is_drawn[h]]
+        ones = [(g,) for g in np.flatnonzero(study.is_shown).tolist()]
+        pairs = [(g, h) for g, h in study.pairs() if study.is_shown[g] and study.is_shown[h]]
         share = dict(zip([*ones, *pairs], study.sobol([*ones, *pairs]), strict=True))
         totals = study.anova.totals()
         ones = sorted(ones, key=lambda one: -totals[one[0]])[:max_shown]

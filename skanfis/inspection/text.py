@@ -360,8 +360,8 @@ def _signed(value):
 
 def number(value, precision):
     """Write so many significant digits, without an exponent while there is room."""
-    rounded = float(f"{float(value):.{precision - 1}e}")
-    return f"{rounded:.{max(precision, 15)}g}"
+    nearest = float(f"{float(value):.{precision - 1}e}")
+    return f"{nearest:.{max(precision, 15)}g}"
 
 
 def counted(number_of, what):

@@ -105,10 +105,10 @@ class RowSums:
             second += np.stack([(own_strength * weighted) @ every.T for own_strength in strengths])
             farthest = np.vstack([farthest, np.column_stack([rule, raw.T[row]])])
             farthest = _far_rows(farthest, second, rows.inputs)
-            basis_rows, weighted = (one[np.append(0, 1 + own)] for one in (every, weighted))
-            design.accumulate(gram, shares, basis_rows, weighted)
+            of_slopes, s_of_slopes = (one[np.append(0, 1 + own)] for one in (every, weighted))
+            design.accumulate(gram, shares, of_slopes, s_of_slopes)
             for k, values in enumerate(target):
-                slope[:, k] += (strengths @ (weighted * values).T).ravel()
+                slope[:, k] += (strengths @ (s_of_slopes * values).T).ravel()
                 square[k] += weighted[0] @ values**2
         return cls(
             base,
