@@ -235,6 +235,7 @@ def readability(
 
 
 def _readability(estimator, X, y, sample_weight):
+    # Apart and without types: of what is array-like, mypy knows neither rows nor a shape.
     model, reader = fold_with_reader(estimator)
     n_rows = X.shape[0] if hasattr(X, "shape") else len(X)
     take = getattr(X, "iloc", X)
