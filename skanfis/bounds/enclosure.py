@@ -17,7 +17,6 @@ from .terms import (
     ROUNDINGS,
     Shares,
     enclosed,
-    largest_mean,
     mean_range,
     product,
     size,
@@ -85,7 +84,7 @@ class Enclosure:
         """
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
-            natural = largest_mean(self._continued(parts)[1], parts.shares) + parts.slack
+            natural = self._natural(parts)[1]
             slopes = np.stack([self._slope(parts, low, high, i) for i in range(len(low))], axis=1)
             points, rise = _best_centres(slopes, low, high)
             attained = self.say(points.T)
@@ -119,7 +118,7 @@ class Enclosure:
         """Where what the rules say may pass the limits, (n_boxes,)."""
         if np.isinf([self.lowest, self.highest]).all():
             return np.zeros(parts.slack.size, dtype=bool)
-        least, most = widened(mean_range(self._continued(parts), parts.shares), parts.slack)
+        least, most = self._natural(parts)
         return ~((most <= self.highest) & (least >= self.lowest))
 
     def _gain_of_slope(self, parts, j):
@@ -220,27 +219,23 @@ class Enclosure:
         mean = mean_range(np.moveaxis(ends, axis, -2), [parts.shares[place]])
         return ends - np.expand_dims(mean[::-1], axis)
 
-    def _continued(self, parts):
-        """Range of f + sum_j h_j (b_j + D_j (f - phi)) by rule."""
-        found = parts.value
+    def _natural(self, parts):
+        """Range of what the rules say, E f + sum_j h_j dy/dx_j, (2, n_boxes)."""
+        found = mean_range(parts.value, parts.shares)
         for j in self._ways_out(parts):
-            there = self._there(parts, j)
-            if there is parts:
-                tangent = self._tangent(parts, j)
-            else:
-                tangent = np.expand_dims(self._steepness(there, j), tuple(1 + i for i in self.axes))
-            found = found + product(parts.way[:, j], tangent)
-        return found
+            slope = self._steepness(self._there(parts, j), j)
+            found = found + product(parts.way[:, j], slope)
+        return widened(found, parts.slack)
 
     def _there(self, parts, j):
         """Parts of where the tangent along j is found: other inputs may be held elsewhere."""
         own, at = self.tangents
         g = int(np.flatnonzero(own[:, j])[0])
-        is_held = np.isfinite(at[g])[:, None]
-        if not is_held.any():
+        if np.isnan(at[g]).all():
             return parts
         if ("there", g) not in parts.known:
-            parts.known["there", g] = self._parts(*np.where(is_held, at[g][:, None], parts.box))
+            there = np.where(np.isnan(at[g])[:, None], parts.box, at[g][:, None])
+            parts.known["there", g] = self._parts(*there)
         return parts.known["there", g]
 
     def _steepness(self, parts, j):
