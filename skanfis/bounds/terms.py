@@ -29,7 +29,7 @@ from ..membership import (
     TwoSidedGaussian,
     ZShaped,
 )
-from ..membership.profiles import LinearProfile
+from ..membership.profiles import LinearProfile, SplineProfile
 
 EPS = float(np.finfo(float).eps)
 # Roundings of a membership, a share, a rule's output or its slope, in EPS, with room to spare: of
@@ -39,10 +39,9 @@ _SIDES, _PRODUCTS = tuple(SIDES.values()), tuple(PRODUCTS.values())
 _LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, *_PRODUCTS, *_SIDES)
 _ONE_SIDED = (SShaped, ZShaped)
 _BY_SIDES = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
-# Where the logarithm of a floored flank is steepest: of the straight one as the foot is reached;
-# of two parabolas where 2 s^2 is as large as the floor, s = 1 - t = 5.5e-6, to a thousandth.
-_STEEPEST_LINEAR = (np.nextafter(1.0, 0.0),)
-_STEEPEST_SPLINE = tuple(1.0 - 5.507e-6 * np.array([1.5, 1.0, 0.5]))
+# Where the logarithm of a floored flank is steepest: of the straight one as the foot is reached; of
+# two parabolas where 2 s^2 is as large as the floor, s = 1 - t, to a thousandth.
+_STEEPEST = {LinearProfile: np.nextafter(1.0, 0.0), SplineProfile: 1.0 - 5.507e-6}
 
 
 def is_known(family):
@@ -105,20 +104,19 @@ def _slope_by_sides(group, lo, hi):
         flanks = {family.side: widths[0]}
     else:
         flanks = {-1.0: widths[0], 1.0: widths[0] if family is Bell else widths[1]}
-    low, high = np.full(lo.shape, np.inf), np.full(lo.shape, -np.inf)
-    touches_top = np.full(lo.shape, True)
+    found, reaches = [], []
     for side, flank in flanks.items():
         begin = theta[0] + side * _plateau(group)
-        near, far = np.sort([side * (lo - begin) / flank, side * (hi - begin) / flank], axis=0)
-        t = np.maximum(near, 0.0), np.maximum(far, 0.0)
+        ends = np.sort([side * (lo - begin) / flank, side * (hi - begin) / flank], axis=0)
+        t = np.maximum(ends, 0.0)
         sizes = _fall_of_bell(theta, *t) if family is Bell else _fall(family, *t)
-        found = np.sort([-side * one / flank for one in sizes], axis=0)
-        low = np.where(far > 0.0, np.minimum(low, found[0]), low)
-        high = np.where(far > 0.0, np.maximum(high, found[1]), high)
-        touches_top &= near <= 0.0
-    touches_top |= low > high
-    low, high = np.where(touches_top, [np.minimum(low, 0.0), np.maximum(high, 0.0)], [low, high])
-    return np.stack([low, high])
+        found.append(np.sort([-side * one / flank for one in sizes], axis=0))
+        reaches.append(ends[1] > 0.0)
+    low, high = np.moveaxis(found, 1, 0)
+    low = np.min(low, axis=0, where=reaches, initial=np.inf)
+    high = np.max(high, axis=0, where=reaches, initial=-np.inf)
+    # On the plateau alone it is zero; a flank that is not left is so at t = 0.
+    return np.where(low > high, 0.0, [low, high])
 
 
 def _fall_of_bell(theta, near, far):
@@ -126,31 +124,23 @@ def _fall_of_bell(theta, near, far):
     b = np.exp(theta[2])
     # Below 2b = 1 it is at the centre, and has no bound.
     peak = np.maximum(2.0 * b - 1.0, 0.0) ** (0.5 / b)
-
-    def steepness(t):
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            log_t = np.log(t)
-            log_size = (2.0 * b - 1.0) * log_t - np.logaddexp(0.0, 2.0 * b * log_t)
-            found = 2.0 * b * np.exp(log_size)
-        # 0 log 0, of 2b = 1 at the centre.
-        return np.where(np.isnan(found), 2.0 * b, found)
-
-    return np.minimum(steepness(near), steepness(far)), steepness(np.clip(peak, near, far))
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        log_t = np.log([near, np.clip(peak, near, far), far])
+        log_size = (2.0 * b - 1.0) * log_t - np.logaddexp(0.0, 2.0 * b * log_t)
+        sizes = 2.0 * b * np.exp(log_size)
+    # 0 log 0, of 2b = 1 at the centre.
+    sizes = np.where(np.isnan(sizes), 2.0 * b, sizes)
+    return sizes.min(axis=0), sizes.max(axis=0)
 
 
 def _fall(family, near, far):
-    """Range of -d log mu / dt of a profile with a foot: it is largest just before it, t = 1."""
-    profile = family.profile
-    top = _STEEPEST_LINEAR if profile is LinearProfile else _STEEPEST_SPLINE
-    at_near, at_far = (-profile.log_value_and_slope(t)[1] for t in (near, far))
-    steepest = max(-float(profile.log_value_and_slope(np.array(t))[1]) for t in top)
-    rises = far <= top[0]
-    crosses = ~rises & (near <= top[-1])
-    most = np.where(crosses, np.maximum(steepest * (1.0 + 1e-3), far), np.maximum(at_near, at_far))
-    least = np.minimum(at_near, at_far)
-    # Past the top the size may be less in between: never below one.
-    least = np.where(rises | (near >= 1.0), least, np.minimum(least, 1.0))
-    return np.where(near <= 0.0, 0.0, least), most
+    """Range of -d log mu / dt of a profile with a foot: it falls from its top to t = 1 alone."""
+    top = _STEEPEST[family.profile]
+    turns = np.array([0.0, top, 1.0, np.inf])[:, None, None]
+    sizes = -family.profile.log_value_and_slope(np.clip(turns, near, far))[1]
+    # What the top is between floats.
+    more = np.where((near <= top) & (top <= far), 1.0 + 1e-3, 1.0)
+    return sizes.min(axis=0), sizes.max(axis=0) * more
 
 
 def _curvature(group, lo, hi):
