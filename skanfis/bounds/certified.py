@@ -1,7 +1,7 @@
 """Bounds of predictions and of their slopes over a box: what a user calls."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -16,7 +16,7 @@ from ..policies import SILENT
 from .construction import is_in_order
 from .enclosure import Enclosure, reach_of
 from .search import largest
-from .terms import is_known
+from .terms import is_known, size
 
 # Rows that are looked at first: all corners, of so few inputs, and some between.
 _CORNERS, _POINTS = 8, 1024
@@ -127,12 +127,10 @@ def bounds(
     model, box = _checked(model, box, tol, max_boxes)
     low, high = held_box(box, model)
 
-    def sides_of(k, X):
-        below, above = (Enclosure(model, k, sign) for sign in (-1.0, 1.0))
-        values = above.hold(above.say(X))
-        return float(np.ptp(values)), ((below.values, -values), (above.values, values))
+    def evaluated(k, sign):
+        return Enclosure(model, k, sign).values
 
-    return _enclosed(model, box, low, high, sides_of, tol, max_boxes, model.output_names)
+    return _enclosed(model, box, low, high, evaluated, np.ptp, tol, max_boxes)
 
 
 def gradient_bounds(
@@ -177,13 +175,12 @@ def gradient_bounds(
     j = input_index(feature, model, "feature")
     low, high = held_box(box, model, _BEYOND)
 
-    def sides_of(k, X):
-        slopes = [partial(Enclosure(model, k, sign).slope, j=j) for sign in (-1.0, 1.0)]
-        sides = [(slope, slope(X.T, X.T)[2]) for slope in slopes]
-        return max(float(np.abs(values).max()) for _, values in sides), sides
+    def evaluated(k, sign):
+        return partial(Enclosure(model, k, sign).slope, j=j)
 
+    found = _enclosed(model, box, low, high, evaluated, size, tol, max_boxes)
     names = tuple(f"d {y} / d {model.input_names[j]}" for y in model.output_names)
-    return _enclosed(model, box, low, high, sides_of, tol, max_boxes, names)
+    return replace(found, output_names=names)
 
 
 def monotonicity(
@@ -243,19 +240,19 @@ def cuts_of(model):
     return np.stack([model.minimum, model.maximum], axis=1)
 
 
-def _enclosed(model, box, low, high, sides_of, tol, max_boxes, names):
-    """Bounds; ``sides_of`` gives the scale of ``tol``, and by side what bounds it, and values."""
-    X, found = spread_points(low, high), []
+def _enclosed(model, box, low, high, evaluated, scale, tol, max_boxes):
+    """Bounds of what ``evaluated`` by output and sign; ``tol`` is in units of ``scale(ends)``."""
+    X, found = spread_points(low, high).T, []
     for k in range(model.n_outputs):
-        scale, sides = sides_of(k, X)
-        for evaluate, values in sides:
-            top = int(values.argmax())
-            point = X[top][:, None]
-            bound, _, attained, _ = evaluate(point, point)
+        sides = [evaluated(k, sign) for sign in (-1.0, 1.0)]
+        seen = [evaluate(X, X) for evaluate in sides]
+        tops = [attained.max() for _, _, attained, _ in seen]
+        tolerance = tol * float(scale([-tops[0], tops[1]]))
+        for evaluate, (bound, _, attained, _) in zip(sides, seen, strict=True):
             # Bound and value are apart by rounding, beneath which no bound can go.
-            least = max(tol * scale, 8.0 * float(bound[0] - attained[0]))
-            start = X[top], float(values[top])
-            found.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model), start))
+            rounding = (bound - attained)[attained.argmax()]
+            least = max(tolerance, 8.0 * float(rounding))
+            found.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model)))
     below, above = found[::2], found[1::2]
     return Bounds(
         lower=np.array([-one.bound for one in below]),
@@ -268,7 +265,7 @@ def _enclosed(model, box, low, high, sides_of, tol, max_boxes, names):
         n_boxes=sum(one.n_boxes for one in found),
         converged=all(one.converged for one in found),
         input_names=model.input_names,
-        output_names=names,
+        output_names=model.output_names,
     )
 
 
