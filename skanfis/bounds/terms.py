@@ -39,9 +39,9 @@ _SIDES, _PRODUCTS = tuple(SIDES.values()), tuple(PRODUCTS.values())
 _LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, *_PRODUCTS, *_SIDES)
 _ONE_SIDED = (SShaped, ZShaped)
 _BY_SIDES = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
-# Where the logarithm of a floored flank is steepest: of the straight one as the foot is reached; of
-# two parabolas where 2 s^2 is as large as the floor, s = 1 - t, to a thousandth.
-_STEEPEST = {LinearProfile: np.nextafter(1.0, 0.0), SplineProfile: 1.0 - 5.507e-6}
+# Where the logarithm of a floored flank is steepest, to the last bit: of the straight one as the foot
+# is reached; of two parabolas where 2 s^2 is about as large as the floor, s = 1 - t.
+_STEEPEST = {LinearProfile: np.nextafter(1.0, 0.0), SplineProfile: 1.0 - 5.506937986e-6}
 
 
 def is_known(family):
@@ -112,9 +112,9 @@ def _slope_by_sides(group, lo, hi):
         sizes = _fall_of_bell(theta, *t) if family is Bell else _fall(family, *t)
         found.append(np.sort([-side * one / flank for one in sizes], axis=0))
         reaches.append(ends[1] > 0.0)
-    low, high = np.moveaxis(found, 1, 0)
-    low = np.min(low, axis=0, where=reaches, initial=np.inf)
-    high = np.max(high, axis=0, where=reaches, initial=-np.inf)
+    slopes = np.array(found)
+    low = np.min(slopes[:, 0], axis=0, where=reaches, initial=np.inf)
+    high = np.max(slopes[:, 1], axis=0, where=reaches, initial=-np.inf)
     # On the plateau alone it is zero; a flank that is not left is so at t = 0.
     return np.where(low > high, 0.0, [low, high])
 
@@ -138,7 +138,7 @@ def _fall(family, near, far):
     top = _STEEPEST[family.profile]
     turns = np.array([0.0, top, 1.0, np.inf])[:, None, None]
     sizes = -family.profile.log_value_and_slope(np.clip(turns, near, far))[1]
-    # What the top is between floats.
+    # The top may lie between floats.
     more = np.where((near <= top) & (top <= far), 1.0 + 1e-3, 1.0)
     return sizes.min(axis=0), sizes.max(axis=0) * more
 
