@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
-from .._validation import check_count, position_of
+from .._validation import check_count, feature_indices
 from ..export import fold
 from ..model import TSKModel
 from ..policies import SILENT
@@ -172,7 +172,7 @@ def gradient_bounds(
     True
     """
     model, box = _checked(model, box, tol, max_boxes)
-    j = input_index(feature, model, "feature")
+    (j,) = feature_indices([feature], model.input_names, "feature")
     low, high = held_box(box, model, _BEYOND)
 
     def evaluated(k, sign):
@@ -215,24 +215,20 @@ def monotonicity(
     array([1])
     """
     model, box = _checked(model, box, 0.0, max_boxes)
-    j = input_index(feature, model, "feature")
+    (j,) = feature_indices([feature], model.input_names, "feature")
     low, high = held_box(box, model, _BEYOND)
-    signs = np.zeros(model.n_outputs, dtype=int)
     in_range = (low >= model.minimum).all() and (high <= model.maximum).all()
     goes_on = model.tangent_at is None or np.isnan(model.tangent_at[j])
     is_promised = in_range or model.out_of_bounds != "linear" or not goes_on
-    for k in range(model.n_outputs):
-        for sign in (1, -1):
-            own = sign * (np.arange(model.n_inputs) == j)
-            is_proven = is_promised and is_in_order(model, k, own)
-            if not is_proven:
-                slope = partial(Enclosure(model, k, -float(sign)).slope, j=j)
-                found = largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0)
-                is_proven = found.bound <= 0.0
-            if is_proven:
-                signs[k] = sign
-                break
-    return signs
+
+    def is_proven(k, sign):
+        if is_promised and is_in_order(model, k, sign * (np.arange(model.n_inputs) == j)):
+            return True
+        slope = partial(Enclosure(model, k, -float(sign)).slope, j=j)
+        return largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0).bound <= 0.0
+
+    outputs = range(model.n_outputs)
+    return np.array([next((s for s in (1, -1) if is_proven(k, s)), 0) for k in outputs])
 
 
 def cuts_of(model):
@@ -291,7 +287,7 @@ def read_box(box, model: TSKModel):
     names = ", ".join(map(repr, model.input_names))
     if isinstance(box, Mapping):
         for name, ends in box.items():
-            j = input_index(name, model, "box")
+            (j,) = feature_indices([name], model.input_names, "box")
             if np.shape(ends) != (2,):
                 raise ValueError(f"box[{name!r}]={ends!r} must be two numbers: (low, high).")
             found[j] = ends
@@ -342,17 +338,6 @@ def held_box(box, model: TSKModel, beyond=0.0):
     strip = np.where(reach > 0.0, strip, 0.0) + beyond * (model.maximum - model.minimum)
     edges = model.minimum - reach - strip, model.maximum + reach + strip
     return np.clip(low, *edges), np.clip(high, *edges)
-
-
-def input_index(name, model: TSKModel, parameter):
-    """The position of an input, by its name or position."""
-    found = position_of(name, model.input_names)
-    if found is not None:
-        return found
-    raise ValueError(
-        f"{parameter} names {name!r}, which is no input of the model; they are "
-        f"{', '.join(map(repr, model.input_names))}, at positions 0 to {model.n_inputs - 1}."
-    )
 
 
 def spread_points(low, high):

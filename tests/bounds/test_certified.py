@@ -89,7 +89,7 @@ def test_the_box_is_held_where_the_policy_holds(rng):
     [
         ([(0.0, 1.0)], r"one \(low, high\) for each of the 3 inputs .*shape \(1, 2\)"),
         ("all", r"one \(low, high\) for each of the 3 inputs .*got 'all'"),
-        ({"speed": (0.0, 1.0)}, r"box names 'speed', which is no input .*'rate', at positions 0"),
+        ({"speed": (0.0, 1.0)}, r"box names 'speed', which is no column .*'rate', at positions 0"),
         ({"rate": (1.0, 0.0)}, r"box has \(1, 0\) for 'rate': low must not be above high"),
         ({"rate": (np.nan, 0.0)}, "above high, or NaN"),
         ({"rate": 1.0}, "must be two numbers"),
