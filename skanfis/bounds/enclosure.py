@@ -137,11 +137,9 @@ class Enclosure:
         box = np.clip(ends, model.minimum[:, None], model.maximum[:, None])
         way = np.clip(ends - box, -self.reach[:, None], self.reach[:, None])
         middle, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0]) * (1.0 + 4.0 * EPS)
-        log_mu = model.antecedent.log_memberships(middle)
-        log_mu = np.concatenate([log_mu, np.zeros((1, low.shape[1]))])
         terms = term_ranges(model.antecedent, *box)
         at_middle = term_ranges(model.antecedent, middle, middle)
-        shares = [enclosed(one, terms, at_middle, log_mu, half) for one in self.factors]
+        shares = [enclosed(one, terms, at_middle, half) for one in self.factors]
         departure, curvature = (
             {
                 j: self._placed(ends, place)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import softmax
 
 from ..antecedent import Antecedent, TermGroup
 from ..membership import (
@@ -213,14 +214,12 @@ def term_ranges(antecedent: Antecedent, low, high):
     return TermRanges(*(np.concatenate(one, axis=-2) for one in zip(*parts, strict=True)))
 
 
-def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, log_mu, half):
+def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, half):
     """The :class:`Shares` of a factor, from the ranges of its terms over boxes and at the middles.
 
     A factor has, by input, the terms (n_shares, n) whose log mu add up; the last place is none.
     """
-    middle = _total(factor, log_mu)
-    middle = np.exp(middle - middle.max(axis=0))
-    middle /= middle.sum(axis=0)
+    middle = softmax(_total(factor, at_middle.log_mu.mean(axis=0)), axis=0)
     least, most = _by_range(*_total(factor, terms.log_mu))
     error = _total(factor, terms.error)
     # The mean error of all counts for each: the sum of the softmax.
@@ -260,11 +259,10 @@ def _by_range(low, high):
 def _departures(shares, slopes):
     found = {}
     for j, ends in slopes.items():
-        slack = 4.0 * ROUNDINGS * EPS * size(ends)
-        common = slack.max(axis=0, initial=0.0, where=shares.high > EPS)
-        total = (shares.high * size(ends)).sum(axis=0)
-        common = common + EPS * (ROUNDINGS + ends.shape[1]) * total
-        found[j] = widened(ends - mean_range(ends, [shares])[::-1, None], slack + common)
+        # A slope is off by so many roundings, and its mean by those of the sum besides.
+        slack, total = 4.0 * ROUNDINGS * EPS * size(ends), (shares.high * size(ends)).sum(axis=0)
+        slack = slack + EPS * (5.0 * ROUNDINGS + ends.shape[1]) * total
+        found[j] = widened(ends - mean_range(ends, [shares])[::-1, None], slack)
     return found
 
 
