@@ -1,4 +1,4 @@
-r"""Rules in order: predictions that rise, or keep within limits, by how a model is made.
+"""Rules in order: predictions that rise, or keep within limits, by how a model is made.
 
 Let no rule's slope by x_j be negative. Where the part of one rule grows at the cost of another's,
 the prediction changes by the difference of their values, and by their own slopes. It rises where,
@@ -7,26 +7,9 @@ for every such pair, with values f, slopes b by x_j and u = (x_j - middle) / wid
     f_above - f_below + width ((o + c e^u) b_above + (o + c e^-u) b_below) >= 0
 
 all over a box: linear in the consequents at every point, and least at a corner of all inputs but
-x_j, along which it is convex. Pairs are those
-
-*Of a tree*: rules above and below a cut of x_j, in the middle, with its width. With t the truth of
-"above", y = t A + (1 - t) B, where A and B are means over the rules on either side, and
-
-    dy / dx_j = t (1 - t) (A - B) / width + t dA / dx_j + (1 - t) dB / dx_j ,
-
-divided by t (1 - t), with e^u = t / (1 - t): o = c = 1. A rule's slope serves every cut of x_j on
-its path, in equal parts.
-
-*Of Gaussian terms of one width s on x_j*: rules with other centres in it; on a grid, those that
-have all other terms alike. With w the strengths, a = (center - x_j) / s^2 the slopes of log w,
-
-    dy / dx_j = E b + Cov(a, f) ,    Cov(a, f) = sum over pairs of w_r w_s (a_r - a_s) (f_r - f_s) ,
-
-divided by w_r w_s: the width is s^2 over the distance of their centres, and o = 1. On a grid
-w_r / w_s = e^u, and what is left of E b, w_r^2 b_r, serves the n - 1 pairs that r is in: c is
-1 / (n - 1).
-
-*Of one line for all rules* there are none.
+x_j, along which it is convex. docs/bounds.rst says why, which rules of a tree, of a grid and of
+scattered rules are pairs, and their middle, width, o and c. Of one line for all rules there are
+none.
 
 To fall is the same with all signs reversed. A prediction is within limits where every rule is.
 """
