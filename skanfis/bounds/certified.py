@@ -244,11 +244,12 @@ def _enclosed(model, box, low, high, evaluated, scale, tol, max_boxes):
         seen = [evaluate(X, X) for evaluate in sides]
         tops = [attained.max() for _, _, attained, _ in seen]
         tolerance = tol * float(scale([-tops[0], tops[1]]))
-        for evaluate, (bound, _, attained, _) in zip(sides, seen, strict=True):
+        for evaluate, (bound, points, attained, _) in zip(sides, seen, strict=True):
+            top = int(attained.argmax())
             # Bound and value are apart by rounding, beneath which no bound can go.
-            rounding = (bound - attained)[attained.argmax()]
-            least = max(tolerance, 8.0 * float(rounding))
-            found.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model)))
+            least = max(tolerance, 8.0 * float(bound[top] - attained[top]))
+            first = points[:, top], float(attained[top])
+            found.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model), first))
     below, above = found[::2], found[1::2]
     return Bounds(
         lower=np.array([-one.bound for one in below]),

@@ -66,13 +66,15 @@ class _Boxes(NamedTuple):
         return _Boxes(low, high, np.tile(self.bound, 2), np.tile(gain, 2))
 
 
-def largest(evaluate: Callable, low, high, tolerance, max_boxes, cuts, until=None) -> Found:
+def largest(
+    evaluate: Callable, low, high, tolerance, max_boxes, cuts, first=None, until=None
+) -> Found:
     """Enclose the largest value that a function takes on a box.
 
     ``evaluate`` is as ``Enclosure.values``. Bound and value may be ``tolerance`` apart, or both on
-    one side of ``until``; boxes are cut at ``cuts`` first.
+    one side of ``until``; boxes are cut at ``cuts`` first. ``first`` is a point and its value.
     """
-    where, best = low, -np.inf
+    where, best = (low, -np.inf) if first is None else first
     lows, highs = low[:, None].astype(float), high[:, None].astype(float)
     n_boxes, discarded, waiting = 0, -np.inf, None
     while True:
