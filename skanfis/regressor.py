@@ -754,6 +754,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         result, penalty = fitted.result, fitted.start.penalty
         self.redundant_rules_, self.status_ = fitted.redundant_rules, result.message
         self.n_iter_ = max(result.n_iter, 1)
+        # Where there was nothing to do, the loss at the end is that of the start.
         self.loss_curve_ = np.resize(result.loss_curve, self.n_iter_ + 1)
         self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
         self.slope_alpha_ = penalty.slope

@@ -94,7 +94,7 @@ class StructureRequest(Plan):
 
     def _check_combination(self):
         """Raise ValueError where two parameters contradict each other."""
-        if isinstance(self.n_mfs, str) or str(self.partition) in ("auto", "grid"):
+        if isinstance(self.n_mfs, str) or self.partition in ("auto", "grid"):
             return
         what = "the imported rules" if isinstance(self.partition, TSKModel) else "other rules"
         raise ValueError(

@@ -28,7 +28,8 @@ def given_weights(estimator):
 def structure_request(estimator, names, sample_weight=None):
     """What training starts from, with all names of columns and families resolved."""
     start = _imported(estimator, names, sample_weight)
-    if isinstance(start, str) and start == "tree" and str(estimator.mf) != "gaussian":
+    is_default = isinstance(estimator.mf, str) and estimator.mf == "gaussian"
+    if isinstance(start, str) and start == "tree" and not is_default:
         raise ValueError(
             f"mf={estimator.mf!r} means nothing to partition='tree', whose rules are sides of "
             "cuts: leave mf at 'gaussian', its default, or use another partition."

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from ...model import TSKModel
-from ...naming import distinct as distinct  # for names in logs too
+from ...naming import distinct as distinct  # the application may take it from export alone
 from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
 from .functions import theta_of
 
