@@ -38,6 +38,7 @@ class Candidate:
     is_grown: bool = False  # whether they go on from fewer
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
     has_sparse_slopes: bool = False  # where the evidence asks for no more
+    has_all_slopes: bool = False  # also where rows are few (``lasso``)
 
     @property
     def kind(self):
@@ -69,6 +70,7 @@ class Candidate:
         if not self.is_grid:
             words = "tree of {} rules" if self.splits else "{} scattered rules"
         words = "one rule" if self.n_rules == 1 else words.format(self.n_rules)
+        words += ", all slopes" if self.has_all_slopes else ""
         return words + (", sparse slopes" if self.has_sparse_slopes else "")
 
     def with_more_terms(self, j):
@@ -120,14 +122,13 @@ class TermScores:
     """How much the residual of a model asks for terms, beside those that are told.
 
     As of the splits of a tree (``splits``), with the shares nu_k of so many even Gaussian terms on
-    an input, less their means, in the place of h - p.
+    an input, less their means, in the place of h - p; z_i are those of the inputs ``crossed``.
     """
 
-    def __init__(self, tuned: Tuned, spacing: Spacing):
+    def __init__(self, tuned: Tuned, spacing: Spacing, crossed):
         rows, self.weight = tuned.problem.rows, counting_weight(tuned.problem.rows)
         self.X, self.spacing, root = rows.X, spacing, np.sqrt(self.weight)[:, None]
-        varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
-        self.basis = np.hstack([root, root * varying])
+        self.basis = np.hstack([root, root * rows.X[:, crossed]])
         mean = np.average(tuned.residual, axis=0, weights=self.weight)
         self.residual, self.known = root * (tuned.residual - mean), np.empty((rows.n_rows, 0))
 

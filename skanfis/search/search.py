@@ -2,7 +2,8 @@
 
 Every kind is a sequence from small to large (``candidates``). It is grown on all rows and, beside,
 anew without those that judge it (``judging``), all in step, while the error expected of new rows
-falls, and a step further.
+falls, and a step further. Where rows are few for so many inputs, there are two of every kind: with
+slopes by the inputs of the lasso (``lasso``), and by all.
 """
 
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..learning.data import StandardisedData
+from ..learning.evidence import ROWS_EACH
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, splits
 from .start import Start, started
@@ -20,6 +22,8 @@ from .tuning import cost_of
 # Steps beyond the best of a kind, after which its sequence ends: a product of two inputs needs
 # terms on both before any helps.
 _FURTHER = 2
+# With rows for fewer rules than so many, slopes by the inputs of the lasso are tried too.
+_FEW_RULES = 3
 
 
 class StructureSearch:
@@ -29,17 +33,24 @@ class StructureSearch:
         self.plan, self.simplicity = plan, simplicity
         sample = dealt_rows(rows)
         found = splits(sample)
-        self.folds = [Trials(sample.part(grow), plan) for grow, _ in found]
+        n_basis = 1 + plan.consequent_inputs.size
+        is_wide = sample.n_rows < ROWS_EACH * _FEW_RULES * n_basis
+        self.folds = [Trials(sample.part(grow), plan, is_wide) for grow, _ in found]
         self.rest = [sample.part(judge) for _, judge in found]
-        self.trials = self.folds[0] if len(found) == 1 else Trials(sample, plan)
+        self.trials = self.folds[0] if len(found) == 1 else Trials(sample, plan, is_wide)
         self.judges = Judges.of(self.rest)
         self.judged: list[Judged] = []
 
     def run(self, kinds: Sequence[str]) -> Start:
         """A start from the structure that is chosen."""
-        one_rule = self._judge(self.trials.one_rule, [self.trials.one_rule] * len(self.folds))
-        for kind in kinds:
-            self._grow(kind, one_rule)
+        lines, n_slopes = [self.trials.one_rule], self.trials.slope_inputs.size
+        if n_slopes < self.plan.consequent_inputs.size:
+            lines.append(replace(lines[0], has_all_slopes=True))
+        for line in lines:
+            one_rule = self._judge(line, [line] * len(self.folds))
+            # Where the lasso keeps no input, the mean is to be compared, and nothing more.
+            for kind in kinds if n_slopes or line is lines[-1] else ():
+                self._grow(kind, one_rule)
         best = best_of(self.judged, self.judges)
         variance = self._variance()
         most = tolerated(best.squared_error, variance, self.simplicity)

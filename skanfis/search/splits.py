@@ -36,19 +36,20 @@ class Split:
     log_width: float
 
 
-def best_splits(tuned: Tuned, inputs, n_most):
-    """Those that the residual asks for most, best first; one of every leaf and input."""
+def best_splits(tuned: Tuned, inputs, crossed, n_most):
+    """Those that the residual asks for most, best first; one of every leaf and input.
+
+    z_i are those of the inputs ``crossed``.
+    """
     rows, residual = tuned.problem.rows, tuned.residual
     weight = counting_weight(rows)
     variance = np.average(residual**2, axis=0, weights=weight)
-    varying = rows.X[:, np.ptp(rows.X, axis=0) > 0.0]
-    if varying.shape[1] > _MOST_CROSSED:
-        varying = varying[:, :0]
+    crossed = rows.X[:, crossed if crossed.size <= _MOST_CROSSED else []]
     found = []
     for leaf, strength in enumerate(tuned.evaluation.antecedent.strengths(rows.X.T)):
         own = weight * strength
-        center = np.average(varying, axis=0, weights=own)
-        basis = np.column_stack([np.ones(rows.n_rows), varying - center])
+        center = np.average(crossed, axis=0, weights=own)
+        basis = np.column_stack([np.ones(rows.n_rows), crossed - center])
         along = own[:, None, None] * basis[:, :, None] * residual[:, None]
         sums = np.column_stack([own, own[:, None] * basis**2, along.reshape(rows.n_rows, -1)])
         for j in inputs:

@@ -45,6 +45,7 @@ class Start:
 
     antecedent: Antecedent
     penalty: Penalty
+    consequent_inputs: np.ndarray  # that the consequents are linear in
     displacement: np.ndarray | None = None  # of the premises; None is zero
     is_unbounded: bool = False  # whether terms have no bounds (see ``premise``)
     # Agreement was raised as far as the tolerance allows: it does not fall as the rows rise.
@@ -66,6 +67,7 @@ def started(tuned: Tuned, plan: Plan, left: float, candidates, is_unbounded=Fals
     return Start(
         problem.antecedent,
         scaled(agreeing.penalty, plan.free, n_rows / plan.n_all, is_raised),
+        problem.consequent_inputs,
         # Training goes on from there, without the digits that rounding errors reach.
         np.round(agreeing.displacement, _DIGITS),
         is_unbounded,

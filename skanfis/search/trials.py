@@ -23,6 +23,7 @@ from ..model import TSKModel
 from ..policies import TargetRange
 from .candidates import Candidate, TermScores, rule_base
 from .grid import Spacing
+from .lasso import lasso_inputs
 from .sample import effective_weight, to_six_digits, unit_scale
 from .splits import best_splits
 from .tuning import (
@@ -79,16 +80,20 @@ class Plan:
 
 
 class Trials:
-    """Trainings on one set of rows, whose order says nothing."""
+    """Trainings on one set of rows, whose order says nothing.
 
-    def __init__(self, rows: StandardisedData, plan: Plan):
+    ``is_wide``: whether they are few for so many inputs (``lasso``).
+    """
+
+    def __init__(self, rows: StandardisedData, plan: Plan, is_wide=False):
         self.rows, self.plan = rows, plan
+        self.slope_inputs = plan.consequent_inputs
+        if is_wide:
+            self.slope_inputs = lasso_inputs(rows, plan.consequent_inputs)
         self.spacing = Spacing(rows)
         self.one_rule = Candidate((1,) * rows.X.shape[1])
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
-        line = self._train(self._problem(self.one_rule), turns=0, first_steps=ARRIVING)
-        self._found[self.one_rule] = line
 
     def _asking(self, candidate):
         """Inputs for terms of scattered rules: those that ask by more than chance, at first one.
@@ -98,7 +103,7 @@ class Trials:
         """
         left = [int(j) for j in self.plan.premise_inputs if self.spacing.n_values(j) > 2]
         asked: list[int] = []
-        scores = TermScores(self.tuned(candidate), self.spacing)
+        scores = TermScores(self.tuned(candidate), self.spacing, self._crossed(candidate))
         work = len(scores.basis) * (_TERMS * scores.basis.shape[1]) ** 2
         # Where to tell them is too much work, all that ask have terms.
         while left and work * len(asked) * len(left) <= _MOST_OPERATIONS:
@@ -126,12 +131,14 @@ class Trials:
             grown = [anew, replace(anew, is_grown=True)] if candidate.n_clusters else [anew]
             grown = grown if anew.inputs else []
         elif kind == "tree":
-            splits = best_splits(self.tuned(candidate), self.plan.premise_inputs, _TRIED)
+            inputs = self.plan.premise_inputs
+            splits = best_splits(self.tuned(candidate), inputs, self._crossed(candidate), _TRIED)
             grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
         else:
             inputs = self.plan.premise_inputs
             asking = [(j, candidate.counts[j] + _TERMS - 1) for j in inputs]
-            scores = TermScores(self.tuned(candidate), self.spacing).of(asking)
+            crossed = self._crossed(candidate)
+            scores = TermScores(self.tuned(candidate), self.spacing, crossed).of(asking)
             best = np.argsort(-scores, kind="stable")[:_TRIED]
             grown = [candidate.with_more_terms(j) for j in inputs[best]]
         smaller = self.tuned(candidate)
@@ -147,9 +154,18 @@ class Trials:
         self._begun |= begun
         return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
 
+    def _slope_inputs(self, candidate):
+        """Inputs that the consequents of a candidate are linear in."""
+        return self.plan.consequent_inputs if candidate.has_all_slopes else self.slope_inputs
+
+    def _crossed(self, candidate):
+        """Inputs that terms and cuts may act together with: those of the lasso, or all."""
+        is_all = candidate.has_all_slopes or self.slope_inputs is self.plan.consequent_inputs
+        return np.flatnonzero(np.ptp(self.rows.X, axis=0)) if is_all else self.slope_inputs
+
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
-        n_basis = 1 + self.plan.consequent_inputs.size
+        n_basis = 1 + self._slope_inputs(candidate).size
         return candidate.n_rules * n_basis + 2 * candidate.n_terms
 
     def _is_small(self, candidate):
@@ -167,6 +183,8 @@ class Trials:
             if candidate.has_sparse_slopes:
                 trained = self.tuned(replace(candidate, has_sparse_slopes=False))
                 found = with_sparse_slopes(trained, self.plan.free)
+            elif candidate.n_rules == 1:
+                found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
                 # Terms of a grid serve many rules: trained on, they tell runs that lie apart from
                 # one another, and are wild between them.
@@ -193,7 +211,7 @@ class Trials:
         plan, rows = self.plan, self.rows_for(candidate)
         penalty = plan.first if smaller is None else smaller.penalty
         antecedent = rule_base(candidate, rows, plan.families, self.spacing, plan.seed, smaller)
-        inputs = plan.consequent_inputs
+        inputs = self._slope_inputs(candidate)
         return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=inputs)
 
     def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE, begun=None):

@@ -354,7 +354,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     return Fitted(
         _model(sums, problem, evaluation),
         SolverResult(evaluation, np.full(1, evaluation.mean_squared_error), 0, "no_premise"),
-        Start(antecedent, problem.penalty),
+        Start(antecedent, problem.penalty, problem.consequent_inputs),
         redundant_rules(overlap, sums.peak),
     )
 

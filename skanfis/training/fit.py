@@ -138,14 +138,13 @@ class _Fit:
             self.estimator.order,
             start.penalty,
             self.map_ordered,
-            self.request.consequent_inputs,
+            start.consequent_inputs,
         )
         if rows.sample is not None:
             problem = problem.on_all(rows)
         validation = None
         if self.held_out is not None:
-            inputs = self.request.consequent_inputs
-            validation = ValidationLoss(self.held_out, inputs, self.stopping)
+            validation = ValidationLoss(self.held_out, start.consequent_inputs, self.stopping)
 
         def tell_callbacks(n_iter, evaluation):
             return self.callbacks.iteration(lambda: self.model(start, evaluation)[0])

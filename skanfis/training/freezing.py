@@ -46,7 +46,7 @@ def frozen_model(
     evaluation: Evaluation,
 ) -> tuple[TSKModel, list[dict]]:
     """The model, in the user's units, of what was found on ``rows``, and its redundant rules."""
-    trained, inputs = evaluation.antecedent, request.consequent_inputs
+    trained, inputs = evaluation.antecedent, start.consequent_inputs
     offset, scale, n_coefficients = rows.inputs.offset, rows.inputs.scale, 1 + inputs.size
     firing = RuleFiring.of(rows, trained, n_coefficients)
     coefficients = with_common_slopes(
@@ -107,7 +107,8 @@ def as_given(estimator, data, model) -> Fitted:
     firing = RuleFiring.of(rows, imported_antecedent(model, rows), 0)
     redundant = redundant_rules(firing.overlap / rows.total_weight, firing.peak)
     result = SolverResult(None, np.full(2, loss), 0, "as_given")
-    return Fitted(model, result, Start(model.antecedent, Penalty()), redundant)
+    start = Start(model.antecedent, Penalty(), np.arange(model.n_inputs))
+    return Fitted(model, result, start, redundant)
 
 
 def extrapolation_distance(model: TSKModel, rows: StandardisedData) -> float:

@@ -408,7 +408,7 @@ def test_weights_found_on_a_sample_are_for_all_rows(data, agreement_is_raised, r
     rows = StandardisedData.of(X, y, weight)
     sample = replace(rows, X=X[:60], y=y[:60], sample_weight=weight[:60])
     found = Penalty(agreement=0.01, alpha=0.02, slope=0.03, stiffness=0.04)
-    start = Start(None, found, agreement_is_raised=agreement_is_raised)
+    start = Start(None, found, np.arange(2), agreement_is_raised=agreement_is_raised)
     asked = request_for([2, 1, 1], {"alpha": 0.02}).for_all(start, sample, rows).penalty
     # Relative to a mean over rows they fall with their number; one that is given stays as it is.
     ratio = weight[:60].sum() / weight.sum()

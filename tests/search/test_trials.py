@@ -136,7 +136,8 @@ class TestSequences:
             trials = trials_of(X, np.tanh(X[:, :3].sum(axis=1)) + 0.1 * rng.normal(size=500))
             asked.append(trials.larger("scattered", trials.one_rule).inputs)
             pairs = [(j, 3) for j in range(6)]
-            scores = TermScores(trials.tuned(trials.one_rule), trials.spacing).of(pairs)
+            line = trials.tuned(trials.one_rule)
+            scores = TermScores(line, trials.spacing, np.arange(6)).of(pairs)
             assert scores.min() > 10.0
         # Noise alone asks by two deviations in one of twenty.
         assert sum(map(len, asked)) <= 5 * 3 + 2

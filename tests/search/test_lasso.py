@@ -1,0 +1,99 @@
+"""Few rows for many inputs: which inputs the lasso keeps, and what is learnt from them."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.linear_model import Lasso, LassoCV, RidgeCV
+
+from skanfis import ANFISRegressor
+from skanfis.learning.data import StandardisedData
+from skanfis.search.lasso import lasso_inputs
+
+
+def rows_of(X, y, weight=None):
+    rows = StandardisedData.of(X, np.reshape(y, (len(X), -1)), weight)
+    table = rows.table(slice(None))
+    n_inputs = X.shape[1]
+    return StandardisedData.of(table[:, :n_inputs], table[:, n_inputs:], weight)
+
+
+@pytest.mark.theory
+def test_the_penalty_is_the_largest_within_one_standard_error(rng):
+    """Fold by fold and penalty by penalty."""
+    X, weight = rng.standard_normal((60, 12)), rng.integers(1, 4, 60).astype(float)
+    rows = rows_of(X, X[:, 2] - 0.5 * X[:, 7] + rng.standard_normal(60), weight)
+    X, y = rows.X, rows.y[:, 0]
+    centred = X - np.average(X, axis=0, weights=weight)
+    largest = np.abs((weight * (y - np.average(y, weights=weight))) @ centred).max() / weight.sum()
+    penalties, errors = np.geomspace(largest, 0.01 * largest, 100), []
+    for penalty in penalties:
+        errors.append([])
+        for part in np.split(np.arange(60), 5):
+            rest = np.delete(np.arange(60), part)
+            line = Lasso(penalty).fit(X[rest], y[rest], weight[rest])
+            left = (y[part] - line.predict(X[part])) ** 2
+            errors[-1].append(np.average(left, weights=weight[part]))
+    mean, chance = np.mean(errors, axis=1), np.std(errors, axis=1) / np.sqrt(5)
+    first = np.flatnonzero(mean <= mean.min() + chance[mean.argmin()])[0]
+    kept = np.flatnonzero(Lasso(penalties[first]).fit(X, y, weight).coef_)
+    assert 0 < first < mean.argmin()
+    assert_array_equal(lasso_inputs(rows, np.arange(12)), kept)
+
+
+def test_of_some_inputs_those_of_every_output_are_kept(rng):
+    X = rng.standard_normal((50, 40))
+    y = np.column_stack([X[:, [3, 5]] + 0.1 * rng.standard_normal((50, 2)), np.ones(50)])
+    found = lasso_inputs(rows_of(X, y), np.arange(2, 40))
+    assert {3, 5} <= set(found)
+    assert found.size <= 6
+    assert lasso_inputs(rows_of(X, np.ones(50)), np.arange(40)).size == 0
+    assert_array_equal(lasso_inputs(rows_of(X[:4], y[:4]), np.arange(40)), np.arange(40))
+
+
+def error_to(truth, model, X):
+    return np.sqrt(np.mean((model.predict(X) - truth(X)) ** 2))
+
+
+@pytest.mark.parametrize("n_inputs", [80, 300])
+def test_rules_on_few_of_many_inputs_are_found(rng, n_inputs):
+    def truth(X):
+        return np.tanh(2.0 * X[:, 0]) + X[:, 1] + 0.5 * X[:, 1] * X[:, 2]
+
+    X = rng.standard_normal((200, n_inputs))
+    y = truth(X) + 0.5 * rng.standard_normal(200)
+    model = ANFISRegressor().fit(X, y)
+    X_new = rng.standard_normal((2000, n_inputs))
+    assert model.n_rules_ > 1
+    assert error_to(truth, model, X_new) < 0.8 * error_to(truth, LassoCV().fit(X, y), X_new)
+    slopes = np.flatnonzero(model.model_.coefficients[:, 1:].any(axis=(0, 2)))
+    assert {0, 1} <= set(slopes)
+    assert slopes.size <= 8
+
+
+def test_where_all_inputs_count_all_have_slopes(rng):
+    weights = rng.standard_normal(60)
+    X, X_new = rng.standard_normal((80, 60)), rng.standard_normal((2000, 60))
+    y = X @ weights + 0.5 * rng.standard_normal(80)
+    model = ANFISRegressor().fit(X, y)
+    chosen = next(one["structure"] for one in model.structures_ if one["chosen"])
+    assert chosen == "one rule, all slopes"
+    ridge = RidgeCV(np.logspace(-3, 3, 25)).fit(X, y)
+    assert error_to(lambda X: X @ weights, model, X_new) < 1.05 * error_to(
+        lambda X: X @ weights, ridge, X_new
+    )
+
+
+def test_of_noise_on_more_inputs_than_rows_nothing_is_learnt(rng):
+    X, y = rng.standard_normal((60, 100)), rng.standard_normal(60)
+    assert_allclose(ANFISRegressor().fit(X, y).predict(X), y.mean(), atol=0.2)
+
+
+def test_a_stream_goes_on_with_the_inputs_of_its_first_chunk(rng):
+    X = rng.standard_normal((160, 30))
+    y = X[:, 0] + X[:, 1] + 0.1 * rng.standard_normal(160)
+    model = ANFISRegressor().partial_fit(X[:60], y[:60])
+    has_slope = model.model_.coefficients[:, 1:].any(axis=(0, 2))
+    assert np.count_nonzero(has_slope) < 10
+    model.partial_fit(X[60:], y[60:])
+    assert_array_equal(model.model_.coefficients[:, 1:].any(axis=(0, 2)), has_slope)
+    assert_allclose(model.model_.coefficients[0, 1:3, 0], 1.0, atol=0.05)
