@@ -66,10 +66,11 @@ class Candidate:
 
     def describe(self):
         """In words."""
-        words = f"grid {list(self.counts)}"
-        if not self.is_grid:
-            words = "tree of {} rules" if self.splits else "{} scattered rules"
-        words = "one rule" if self.n_rules == 1 else words.format(self.n_rules)
+        words = f"{self.kind} of {self.n_rules} rules"
+        if self.n_clusters:
+            words = f"{self.n_rules} scattered rules"
+        elif self.n_rules == 1:
+            words = "one rule"
         words += ", all slopes" if self.has_all_slopes else ""
         return words + (", sparse slopes" if self.has_sparse_slopes else "")
 

@@ -41,7 +41,7 @@ class TestCandidate:
         assert [c.n_terms for c in (one, grid, scattered)] == [0, 5, 4]
         assert [c.describe() for c in (one, grid, scattered)] == [
             "one rule",
-            "grid [2, 1, 3]",
+            "grid of 6 rules",
             "2 scattered rules",
         ]
 
