@@ -85,7 +85,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ValueError with "tree".
     premise_features, consequent_features : array-like of str, int or bool, default=None
         Columns of X in the rules' IF parts, and in their THEN parts, by name, position or mask;
-        None is all.
+        None is all; where rows are few, a search may find slopes by fewer of them.
     order : {0, 1}, default=1
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
     monotonic_cst : array-like of shape (n_features,) or dict, default=None
