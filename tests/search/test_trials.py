@@ -128,6 +128,11 @@ class TestSequences:
         assert {int(j) for group in groups for j in group.inputs} == {0, 1}
         assert trials.larger("scattered", two).inputs == (0, 1)
 
+    def test_a_column_that_never_changes_acts_together_with_nothing(self, rng):
+        X, y = surface(rng, 200, 3)
+        trials = trials_of(np.column_stack([X, np.ones(200)]), y)
+        assert trials._crossed(trials.one_rule).tolist() == [0, 1, 2]
+
     def test_no_input_asks_for_what_terms_on_others_say(self, rng):
         """Half of them only go with the others, and ask as loudly of the line's residual."""
         asked = []
