@@ -36,7 +36,7 @@ from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .policies import OUT_OF_BOUNDS
 from .training import Callbacks, chunk_checks, fit_rules, model_without_rules, validated
-from .training.chunks import RowSums, fitted_weights, solve
+from .training.chunks import RowSums, fitted_weights, inputs_with_slopes, solve
 from .training.data import Fitted
 from .training.settings import given_weights, solver_of, structure_request
 
@@ -589,12 +589,14 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     def _begin_chunks(self, X, y, data, weight):
         """Premises of a first chunk, inputs of consequents, and whether the rows were fitted."""
         request = structure_request(self, data.input_names)
+        own = request.consequent_inputs
         after_fit = hasattr(self, "model_")
         is_imported = isinstance(request.partition, TSKModel) and not solver_of(self).moves_premises
         is_fitted = not (after_fit or is_imported)
         chunk_checks.check_begin(self, data.X.shape[0], finds_structure=is_fitted)
         if is_fitted:
             self.fit(X, y, data.over_all(weight, 0.0))
+            own = inputs_with_slopes(self.model_, own)
         elif after_fit:
             chunk_checks.check_outputs(self.model_, data.y.shape[1], data.output_names)
             warnings.warn(
@@ -611,7 +613,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             self.stiffness_, self.structures_ = 0.0, []
             self.robust_weights_ = self.validation_loss_curve_ = self.constraints_ = None
         self._chunk_settings = chunk_checks.structure_settings(self)
-        return replace(self.model_, posterior=None), request.consequent_inputs, is_fitted
+        return replace(self.model_, posterior=None), own, is_fitted
 
     def _solve_chunks(self):
         """The model of all rows so far."""

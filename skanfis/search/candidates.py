@@ -147,6 +147,7 @@ class TermScores:
     def of(self, asking):
         """Of every pair of an input and a number of terms, in deviations from chance."""
         scores, squared, n_known = [], self.basis**2, self.known.shape[1]
+        asked = (self.residual[:, :, None] * self.basis[:, None]).reshape(len(self.X), -1)
         part_free = max(1.0 - n_known / len(self.X), np.finfo(float).eps)
         variance = np.sum(self.residual**2, axis=0) / (part_free * self.weight.sum())
         for j, count in asking:
@@ -155,8 +156,9 @@ class TermScores:
             if n_known:
                 told = [self.known.T @ (own[:, None] * self.basis) for own in shares.T]
                 norm = np.maximum(norm - np.sum(np.square(told), axis=1), _RANK * norm)
-            along = np.einsum("nk,no,nb->kbo", shares, self.residual, self.basis, optimize=True)
-            squares = along**2 / np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
+            along = (shares.T @ asked).reshape(count, variance.size, -1)
+            least = np.finfo(float).tiny
+            squares = along**2 / np.maximum(norm[:, None] * variance[:, None], least)
             free = 1.0 - 1.0 / count  # one of the shares follows from the others
             scores.append(to_six_digits(in_deviations(free * squares.sum(), free * squares.size)))
         return np.array(scores)

@@ -29,24 +29,29 @@ def dealt_rows(rows: StandardisedData) -> StandardisedData:
     return sample.part(order[np.random.default_rng(0).permutation(order.size)])
 
 
-def splits(rows: StandardisedData):
-    """Positions to grow on and positions to judge on, of every fold.
-
-    Where there is but one fold, what is grown for it serves as the sequence of all rows.
-    """
-    n_rows, groups = rows.n_rows, rows.groups
-    every, n_folds = np.arange(n_rows), min(_FOLDS, n_rows)
-    if n_rows == 1:
-        return [(every, every)]
+def folds(rows: StandardisedData):
+    """Positions of the other rows and of its own, of every fold; whole groups, if there are any."""
+    every, n_folds, groups = np.arange(rows.n_rows), min(_FOLDS, rows.n_rows), rows.groups
     if groups is not None and np.unique(groups).size > 1:
         n_folds = min(_FOLDS, np.unique(groups).size)
-        folds = list(GroupKFold(n_folds).split(rows.X, groups=groups))
-    elif n_rows >= _FOLDS * _ENOUGH:
-        folds = [(every[1::2], every[::2])]
-    else:
-        folds = [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
-        folds = folds[: int(np.ceil(n_folds * _ENOUGH / n_rows))]
-    return [(grow, _in_range(rows.X, grow, judge)) for grow, judge in folds]
+        return list(GroupKFold(n_folds).split(rows.X, groups=groups))
+    return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
+
+
+def splits(rows: StandardisedData):
+    """Positions to grow on and positions to judge on, of every fold that is needed.
+
+    Where there is but one, what is grown for it serves as the sequence of all rows.
+    """
+    n_rows, every = rows.n_rows, np.arange(rows.n_rows)
+    if n_rows == 1:
+        return [(every, every)]
+    found = folds(rows)
+    if rows.groups is None or np.unique(rows.groups).size == 1:
+        if n_rows >= _FOLDS * _ENOUGH:
+            found = [(every[1::2], every[::2])]
+        found = found[: int(np.ceil(len(found) * _ENOUGH / n_rows))]
+    return [(grow, _in_range(rows.X, grow, judge)) for grow, judge in found]
 
 
 def _in_range(X, grow, judge):

@@ -301,6 +301,15 @@ class _ProblemOfSums(SeparableProblem):
         return np.maximum(square - np.sum(solved * twice, axis=0), 0.0)
 
 
+def inputs_with_slopes(model: TSKModel, inputs):
+    """Those by which a model has slopes, or may yet: nothing is known of what has not changed."""
+    assert model.target is not None
+    if (model.target.minimum == model.target.maximum).all():
+        return inputs
+    has_slope = model.coefficients[:, 1:].any(axis=(0, 2)) | (model.minimum == model.maximum)
+    return inputs[has_slope[inputs]]
+
+
 def fitted_weights(estimator, sums: RowSums):
     """The weights of the penalty that a fit to these rows has found, times rows, in plain types."""
     place, n_rows = list(sums.base.input_names).index, sums.effective_weight

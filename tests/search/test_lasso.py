@@ -1,11 +1,14 @@
 """Few rows for many inputs: which inputs the lasso keeps, and what is learnt from them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.linear_model import Lasso, LassoCV, RidgeCV
 
 from skanfis import ANFISRegressor
+from skanfis.exceptions import ConstantInputWarning
 from skanfis.learning.data import StandardisedData
 from skanfis.search.lasso import lasso_inputs
 
@@ -28,8 +31,8 @@ def test_the_penalty_is_the_largest_within_one_standard_error(rng):
     penalties, errors = np.geomspace(largest, 0.01 * largest, 100), []
     for penalty in penalties:
         errors.append([])
-        for part in np.split(np.arange(60), 5):
-            rest = np.delete(np.arange(60), part)
+        for k in range(5):
+            part, rest = np.arange(k, 60, 5), np.delete(np.arange(60), np.s_[k::5])
             line = Lasso(penalty).fit(X[rest], y[rest], weight[rest])
             left = (y[part] - line.predict(X[part])) ** 2
             errors[-1].append(np.average(left, weights=weight[part]))
@@ -47,7 +50,17 @@ def test_of_some_inputs_those_of_every_output_are_kept(rng):
     assert {3, 5} <= set(found)
     assert found.size <= 6
     assert lasso_inputs(rows_of(X, np.ones(50)), np.arange(40)).size == 0
-    assert_array_equal(lasso_inputs(rows_of(X[:4], y[:4]), np.arange(40)), np.arange(40))
+    assert_array_equal(lasso_inputs(rows_of(X[:1], y[:1]), np.arange(40)), np.arange(40))
+
+
+def test_runs_are_left_out_whole(rng):
+    """What moves with the run alone tells nothing of another run."""
+    run = np.repeat(np.arange(10), 12)
+    level = rng.standard_normal((10, 30))
+    X = level[run] + 0.1 * rng.standard_normal((120, 30))
+    rows = rows_of(X, rng.standard_normal(10)[run] + 0.1 * rng.standard_normal(120))
+    assert lasso_inputs(rows, np.arange(30)).size > 5
+    assert lasso_inputs(replace(rows, groups=run), np.arange(30)).size == 0
 
 
 def error_to(truth, model, X):
@@ -88,12 +101,23 @@ def test_of_noise_on_more_inputs_than_rows_nothing_is_learnt(rng):
     assert_allclose(ANFISRegressor().fit(X, y).predict(X), y.mean(), atol=0.2)
 
 
-def test_a_stream_goes_on_with_the_inputs_of_its_first_chunk(rng):
+@pytest.mark.parametrize("alpha", ["auto", 1e-3])
+def test_a_stream_goes_on_with_the_inputs_of_its_first_chunk(rng, alpha):
     X = rng.standard_normal((160, 30))
     y = X[:, 0] + X[:, 1] + 0.1 * rng.standard_normal(160)
-    model = ANFISRegressor().partial_fit(X[:60], y[:60])
+    model = ANFISRegressor(alpha=alpha).partial_fit(X[:60], y[:60])
     has_slope = model.model_.coefficients[:, 1:].any(axis=(0, 2))
     assert np.count_nonzero(has_slope) < 10
     model.partial_fit(X[60:], y[60:])
     assert_array_equal(model.model_.coefficients[:, 1:].any(axis=(0, 2)), has_slope)
+    assert_allclose(model.model_.coefficients[0, 1:3, 0], 1.0, atol=0.05)
+
+
+def test_a_column_that_has_not_yet_changed_may_gain_a_slope(rng):
+    X = rng.standard_normal((160, 30))
+    X[:60, 1] = 0.0
+    y = X[:, 0] + X[:, 1] + 0.1 * rng.standard_normal(160)
+    with pytest.warns(ConstantInputWarning, match="'x1'"):
+        model = ANFISRegressor().partial_fit(X[:60], y[:60])
+    model.partial_fit(X[60:], y[60:])
     assert_allclose(model.model_.coefficients[0, 1:3, 0], 1.0, atol=0.05)
