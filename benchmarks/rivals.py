@@ -8,7 +8,7 @@ import pandas as pd
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
-from sklearn.linear_model import RidgeCV
+from sklearn.linear_model import LassoCV, RidgeCV
 from sklearn.model_selection import GridSearchCV
 from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
@@ -36,6 +36,10 @@ GP_ROWS = 1500
 def quadratic_ridge(n_inputs):
     alphas = np.logspace(-3, 3, 13)
     return make_pipeline(StandardScaler(), PolynomialFeatures(2), StandardScaler(), RidgeCV(alphas))
+
+
+def lasso(n_inputs):
+    return make_pipeline(StandardScaler(), LassoCV())
 
 
 def support_vectors(n_inputs):
@@ -86,6 +90,7 @@ def figs(n_inputs):
 
 RIVALS = {
     "quadratic ridge": quadratic_ridge,
+    "lasso": lasso,
     "SVR": support_vectors,
     "Gaussian process": gaussian_process,
     "neural network": network,

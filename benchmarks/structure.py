@@ -1,9 +1,10 @@
 """The structure that is chosen, with simplicity=0 and by default: its error, cost and expectation.
 
 All cases were chosen before any was fitted. Real sets and tables are judged in folds, beside the
-best of quadratic ridge, SVR and a Gaussian process; smooth functions of inputs that all act
-together by their error to the truth, beside the best of SVR, a neural network and a Gaussian
-process. Errors below a fiftieth of the target's deviation count as that.
+best of quadratic ridge, SVR and a Gaussian process; tables of which few rows for each column are
+learnt from by the others, beside the better of the lasso and a Gaussian process; smooth functions
+of inputs that all act together by their error to the truth, beside the best of SVR, a neural
+network and a Gaussian process. Errors below a fiftieth of the target's deviation count as that.
 """
 
 import math
@@ -25,7 +26,13 @@ __all__ = ["cases", "run"]
 
 SIMPLICITIES = (0.0, 0.05)
 _EXACT, _N_TEST, _TUNED_ON = 0.02, 2000, 4000
-_SMOOTH_RIVALS = ("SVR", "neural network", "Gaussian process")
+# Of the kinds that are not judged in folds.
+_RIVALS = {
+    "smooth": ("SVR", "neural network", "Gaussian process"),
+    "few rows": ("lasso", "Gaussian process"),
+}
+# Rows for each column, of tables with so many columns at least.
+_FEW, _MANY_COLUMNS = (1.5, 3.0, 5.0), 10
 # One row decides.
 _APART = "carData Davis"
 
@@ -103,6 +110,11 @@ FUNCTIONS = {
 
 def drawn(case, seed=0):
     """Rows to train on and fresh ones with the truth; noise over the truth's deviation."""
+    if case.kind == "few rows":
+        X, y = _loaded(case)
+        order = np.random.default_rng(seed).permutation(len(y))
+        train, test = order[: case.n_rows], order[case.n_rows :]
+        return X[train], y[train], X[test], y[test], 0.0
     function, n_inputs = FUNCTIONS[case.name]
     rng = np.random.default_rng([seed, case.n_rows, round(1000 * case.noise), n_inputs])
     Z = rng.uniform(-1.0, 1.0, (case.n_rows + _N_TEST, n_inputs))
@@ -159,10 +171,10 @@ def of_folds(X, y, n_folds, options):
     return found
 
 
-def smooth_rivals(case):
+def rivals_of(case):
     X, y, fresh, truth, _ = drawn(case)
     found = {}
-    for name in _SMOOTH_RIVALS:
+    for name in _RIVALS[case.kind]:
         rival, _ = fitted_rival(name, X[:_TUNED_ON], y[:_TUNED_ON])
         if case.n_rows > _TUNED_ON and name != "Gaussian process":
             best = clone(rival.regressor_.best_estimator_)
@@ -181,17 +193,17 @@ def measure(case, options):
         if not options.quick:
             key = f"{folder}/{case.name.replace('/', '-')}"
             rivals = rival_errors(key, X, y, n_folds)
-            rivals = {name: max(error, _EXACT) for name, error in rivals.items()}
     else:
-        found = of_functions(case, options, 1 if case.kind == "smooth" else 5)
-        if case.kind == "smooth" and not options.quick:
-            key = f"structure/{case}".replace(" ", "_")
-            rivals = remembered(key, lambda *_: smooth_rivals(case), *drawn(case)[:2])
-    best = min(rivals.values(), default=np.nan)
+        found = of_functions(case, options, 1 if case.kind in _RIVALS else 5)
+        if case.kind in _RIVALS and not options.quick:
+            key = f"structure/{case}".replace("/", "-").replace(" ", "_")
+            rivals = remembered(key, lambda *_: rivals_of(case), *drawn(case)[:2])
+    least = 0.0 if case.kind == "smooth" else _EXACT
+    best = max(min(rivals.values(), default=np.nan), least)
     figures = {"case": str(case), "kind": case.kind}
     for simplicity, parts in found.items():
         middle = {name: float(np.median([p[name] for p in parts])) for name in ("error", "cost")}
-        middle["over the rivals"] = middle["error"] / best
+        middle["over the rivals"] = max(middle["error"], least) / best
         figures[f"{simplicity:g}"] = middle | {"parts": parts}
     return figures
 
@@ -211,6 +223,12 @@ def cases():
     yield from (Case("Friedman", "Friedman", n, 0.2) for n in (500, 1000))
     yield from (Case("real set", one.name) for one in real_sets.SETS)
     yield from (Case("table", name) for name, _, _ in part(0))
+    yield from (
+        Case("few rows", name, int(each * X.shape[1]))
+        for name, X, y in part(0)
+        if X.shape[1] >= _MANY_COLUMNS and len(y) >= 60 + (2 + _FEW[-1]) * X.shape[1]
+        for each in _FEW
+    )
     yield from (
         Case("smooth", name, n, noise)
         for n in (250, 1000, 4000, 16000)
@@ -235,7 +253,7 @@ def _row(kind, some):
     zero, default = ([one[f"{s:g}"] for one in some] for s in SIMPLICITIES)
     parts = [each for one in zero for each in one["parts"]]
     measures = []
-    if kind in ("real set", "table"):
+    if kind in ("real set", "table", "few rows"):
         for name, own in (("simplicity=0", zero), ("default", default)):
             ratios = [each["over the rivals"] for each in own]
             measures.append(Measure(name, geometric_mean(ratios)))

@@ -53,6 +53,7 @@ TRUSTED_TYPES = [
     "skanfis.learning.solver.LeastSquares",
     "skanfis.learning.varpro.VariableProjection",
     "skanfis.training.chunks.RowSums",
+    "skanfis.training.rule_rows.RuleRows",
     "skanfis.support.RuleSupport",
     "skanfis.policies.TargetRange",
 ]

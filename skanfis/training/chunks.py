@@ -11,14 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..antecedent import strongest_rules
 from ..blocks import fitting_rows, row_blocks
 from ..consequent import LocalBasis, basis, in_user_units, with_common_slopes
 from ..learning import SolverResult
 from ..learning.covariance import posterior_of
 from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
 from ..learning.evidence import ROWS_EACH
-from ..learning.firing import FIRES, inverse_factor
 from ..learning.gram import DesignMoments
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import CommonLine, Penalty
@@ -27,18 +25,15 @@ from ..model import TSKModel
 from ..policies import TargetRange
 from ..search import Start
 from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
-from ..support import RuleSupport
 from .chunk_checks import check_distance
 from .data import Fitted
 from .pruning import redundant_rules
+from .rule_rows import RuleRows, rescaled
 
 # The weights of the penalty that are found where premises stay.
 _FREE = ("agreement", "alpha", "slope")
 # What adds up over rows, each with its weight.
-_SUMS = ("weight", "gram", "slope", "square", "second", "strongest")
-# Rows of a rule that are kept because one of them may be its farthest.
-_MOST_FAR = 8
-_TINY = float(np.finfo(float).tiny)
+_SUMS = ("weight", "gram", "slope", "square")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,16 +50,8 @@ class RowSums:
     gram: np.ndarray  # G
     slope: np.ndarray  # c, (n_columns, n_outputs)
     square: np.ndarray  # q, (n_outputs,)
-    second: np.ndarray  # sums of s w_r [1, z] [1, z]', (n_rules, 1 + n_inputs, 1 + n_inputs)
-    strongest: np.ndarray  # weight of the rows on which each rule is the strongest
-    peak: np.ndarray  # largest strength of each rule on any row
-    # Largest sqrt(w_r) |x - a_r|, with a_r the centre that the rule has in ``base``, by input.
-    extent: np.ndarray
     distinct: np.ndarray  # fingerprints of distinct rows, up to a limit
-    # Rules, and fingerprints of distinct inputs on which they are the strongest, (n, 2).
-    distinct_inputs: np.ndarray
-    # Rules, and the rows on which they fire farthest from their centres, (n, 1 + n_inputs).
-    farthest: np.ndarray
+    rules: RuleRows
 
     @classmethod
     def of(cls, base: TSKModel, consequent_inputs, X, y, sample_weight=None):
@@ -77,39 +64,25 @@ class RowSums:
         design = DesignMoments(antecedent.share_counts, n_basis)
         gram = np.zeros(design.shape, order="F")
         slope, square = np.zeros((n_rules * n_basis, y.shape[1])), np.zeros(y.shape[1])
-        second = np.zeros((n_rules, 1 + n_inputs, 1 + n_inputs))
-        strongest, peak = np.zeros(n_rules), np.zeros(n_rules)
-        centers, extent = base.rule_centers[:, own], np.zeros((n_rules, own.size))
-        distinct, distinct_inputs = np.empty(0), np.empty((0, 2))
-        farthest = np.empty((0, 1 + n_inputs))
+        centers, distinct = base.rule_centers[:, own], np.empty(0)
+        rules = RuleRows.none(n_rules, n_inputs, own.size)
         n_values = 4 * (n_rules + antecedent.n_terms + n_inputs) + sum(design.shape)
         for part in row_blocks(rows.n_rows, fitting_rows(n_values)):
             raw = np.array(rows.X[part].T, dtype=float, order="C")
             Z, target, weight = rows.read(part)
             strengths, shares = antecedent.strengths_and_shares(raw)
-            best, top = strongest_rules(strengths), strengths.max(axis=0)
-            strongest += np.bincount(best, weights=weight, minlength=n_rules)
-            peak = np.maximum(peak, strengths.max(axis=1))
-            root = np.sqrt(strengths)
-            for j, x in enumerate(raw[own]):
-                distance = root * np.abs(x - centers[:, j, None])
-                extent[:, j] = np.maximum(extent[:, j], distance.max(axis=1))
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
             marks = fingerprint(np.vstack([numbers, rows.y[part].T]))
             distinct = np.union1d(distinct, marks)[: ROWS_EACH * len(slope)]
-            own_inputs = np.column_stack([best, numbers])
-            distinct_inputs = _distinct(np.vstack([distinct_inputs, own_inputs]), 1 + n_inputs)
-            rule, row = np.nonzero(strengths >= FIRES * top)
             every = basis(Z)
-            weighted = every if weight is None else every * weight
-            second += np.stack([(own_strength * weighted) @ every.T for own_strength in strengths])
-            farthest = np.vstack([farthest, np.column_stack([rule, raw.T[row]])])
-            farthest = _far_rows(farthest, second, rows.inputs)
-            of_slopes, s_of_slopes = (one[np.append(0, 1 + own)] for one in (every, weighted))
+            block = RuleRows.of(raw, every, strengths, weight, numbers, own, centers)
+            rules = rules.plus(block, rows.inputs)
+            of_slopes = every[np.append(0, 1 + own)]
+            s_of_slopes = of_slopes if weight is None else of_slopes * weight
             design.accumulate(gram, shares, of_slopes, s_of_slopes)
             for k, values in enumerate(target):
                 slope[:, k] += (strengths @ (s_of_slopes * values).T).ravel()
-                square[k] += weighted[0] @ values**2
+                square[k] += s_of_slopes[0] @ values**2
         return cls(
             base,
             own,
@@ -121,13 +94,8 @@ class RowSums:
             design.gram(gram),
             slope,
             square,
-            second,
-            strongest,
-            peak,
-            extent,
             distinct,
-            distinct_inputs,
-            farthest,
+            rules,
         )
 
     @property
@@ -143,7 +111,8 @@ class RowSums:
     def faded(self, factor):
         """The same rows with all weights times a factor."""
         sums = {name: factor * getattr(self, name) for name in _SUMS}
-        return replace(self, squared_weight=factor**2 * self.squared_weight, **sums)
+        squared, rules = factor**2 * self.squared_weight, self.rules.faded(factor)
+        return replace(self, squared_weight=squared, rules=rules, **sums)
 
     def plus(self, other):
         """The rows of both."""
@@ -153,17 +122,9 @@ class RowSums:
         check_scales(inputs, targets, self.base.input_names, self.base.output_names)
         one, two = self._on(inputs, targets), other._on(inputs, targets)
         names = (*_SUMS, "n_rows", "squared_weight")
-        both = replace(one, **{name: getattr(one, name) + getattr(two, name) for name in names})
-        distinct_inputs = np.vstack([one.distinct_inputs, two.distinct_inputs])
-        farthest = np.vstack([one.farthest, two.farthest])
-        return replace(
-            both,
-            peak=np.maximum(one.peak, two.peak),
-            extent=np.maximum(one.extent, two.extent),
-            distinct=np.union1d(one.distinct, two.distinct)[: ROWS_EACH * len(self.slope)],
-            distinct_inputs=_distinct(distinct_inputs, both.second.shape[1]),
-            farthest=_far_rows(farthest, both.second, inputs),
-        )
+        sums = {name: getattr(one, name) + getattr(two, name) for name in names}
+        distinct = np.union1d(one.distinct, two.distinct)[: ROWS_EACH * len(self.slope)]
+        return replace(one, distinct=distinct, rules=one.rules.plus(two.rules, inputs), **sums)
 
     def _on(self, inputs: Scale, targets: Scale):
         """The same sums on other scales."""
@@ -173,33 +134,15 @@ class RowSums:
         # sum s phi, since strengths sum to one; and sum s y likewise.
         every = self.gram[:, :: self.n_basis].sum(axis=1)
         total = self.slope[:: self.n_basis].sum(axis=0)
-        gram = _rescaled(self.gram, *own)
+        gram = rescaled(self.gram, *own)
         return replace(
             self,
             inputs=inputs,
             targets=targets,
-            gram=_rescaled(np.ascontiguousarray(gram.T), *own),
-            slope=_rescaled(g * self.slope + t * every[:, None], *own),
+            gram=rescaled(np.ascontiguousarray(gram.T), *own),
+            slope=rescaled(g * self.slope + t * every[:, None], *own),
             square=g**2 * self.square + 2.0 * t * g * total + t**2 * self.weight,
-            second=np.stack(
-                [_rescaled(_rescaled(one, shift, factor).T, shift, factor) for one in self.second]
-            ),
-        )
-
-    def support(self):
-        """The support of every rule, in the units of X."""
-        scale = self.inputs
-        n_coefficients = 1 + int(np.sum(~scale.is_constant[self.consequent_inputs]))
-        counts = np.bincount(self.distinct_inputs[:, 0].astype(int), minlength=len(self.second))
-        known = counts > 0
-        center, factor = _places(self.second)
-        center[~known], factor[~known] = 0.0, 0.0
-        radius = np.zeros(known.size)
-        rules, distance = _distances(self.farthest, self.second, scale)
-        np.maximum.at(radius, rules, distance)
-        share = np.minimum(counts, n_coefficients) / n_coefficients
-        return RuleSupport(share, center, factor, radius * known).change_units(
-            scale.offset, scale.scale
+            rules=self.rules.on(shift, factor),
         )
 
 
@@ -233,46 +176,6 @@ def _change(old: Scale, new: Scale):
     return (old.offset - new.offset) / new.scale, old.scale / new.scale
 
 
-def _rescaled(sums, shift, factor):
-    """Sums of [1, z] times something, rule by rule along the first axis, on [1, t + g z]."""
-    blocks = sums.reshape(-1, 1 + shift.size, sums.shape[-1]).copy()
-    blocks[:, 1:] *= factor[:, None]
-    blocks[:, 1:] += shift[:, None] * blocks[:, :1]
-    return blocks.reshape(sums.shape)
-
-
-def _distinct(table, most):
-    """Distinct rows of a table, at most so many of every number in its first column."""
-    return _first_of_each(np.unique(table, axis=0), most)
-
-
-def _first_of_each(table, most):
-    """So many rows of every number in the first column, by which the table is sorted."""
-    rank = np.arange(len(table)) - np.searchsorted(table[:, 0], table[:, 0])
-    return table[rank < most]
-
-
-def _places(second):
-    """Mean and inverse factor of the covariance of the rows of every rule."""
-    moments = second / np.maximum(second[:, :1, :1], _TINY)
-    center = moments[:, 0, 1:].copy()
-    return center, inverse_factor(moments[:, 1:, 1:], center)
-
-
-def _distances(farthest, second, scale):
-    """The rules of rows that were far, and Mahalanobis' distances from these rules' centres."""
-    rules = farthest[:, 0].astype(int)
-    center, factor = _places(second)
-    away = (farthest[:, 1:] - scale.offset) / scale.scale - center[rules]
-    return rules, np.linalg.norm(np.einsum("nij,nj->ni", factor[rules], away), axis=1)
-
-
-def _far_rows(rows, second, scale):
-    """Of rows by their rules the few farthest of each: one more row may change who is."""
-    rules, distance = _distances(rows, second, scale)
-    return _first_of_each(rows[np.lexsort((-distance, rules))], _MOST_FAR)
-
-
 class _ProblemOfSums(SeparableProblem):
     """The least-squares problem at premises that stay, out of sums; no rows are read."""
 
@@ -288,7 +191,7 @@ class _ProblemOfSums(SeparableProblem):
         self._sums_at_start = self._means = means
         self.local = LocalBasis.from_gram(means[0], self.antecedent.n_rules)
         own = self.consequent_inputs
-        extent = np.maximum(sums.extent / sums.inputs.scale[own], 1.0)
+        extent = np.maximum(sums.rules.extent / sums.inputs.scale[own], 1.0)
         slopes = sums.inputs.varying(own)
         self.common_line = CommonLine(self.local, extent, self.antecedent, slopes)
 
@@ -364,7 +267,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
         _model(sums, problem, evaluation),
         SolverResult(evaluation, np.full(1, evaluation.mean_squared_error), 0, "no_premise"),
         Start(antecedent, problem.penalty, problem.consequent_inputs),
-        redundant_rules(overlap, sums.peak),
+        redundant_rules(overlap, sums.rules.peak),
     )
 
 
@@ -387,8 +290,8 @@ def _model(sums, problem, evaluation):
         minimum=inputs.minimum,
         maximum=inputs.maximum,
         rule_weights=evaluation.masses,
-        rule_rows=sums.strongest * (sums.n_rows / sums.weight),
-        support=sums.support(),
+        rule_rows=sums.rules.strongest * (sums.n_rows / sums.weight),
+        support=sums.rules.support(inputs, 1 + int(np.sum(~inputs.is_constant[own]))),
         target=TargetRange(targets.minimum, targets.maximum, targets.scale),
         posterior=posterior,
         tangent_at=None,  # nothing is known to rise or fall

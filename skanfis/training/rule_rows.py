@@ -1,0 +1,133 @@
+"""Where the rows of every rule lie, and how many they are, of rows that come in chunks.
+
+Sums are on the rows' standardised inputs z; those of two sets of rows are carried over to the
+scale of both, z' = t + g z, and added.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..antecedent import strongest_rules
+from ..learning.data import Scale
+from ..learning.firing import FIRES, inverse_factor
+from ..support import RuleSupport
+
+# Rows of a rule that are kept because one of them may be its farthest.
+_MOST_FAR = 8
+_TINY = float(np.finfo(float).tiny)
+
+
+@dataclass(frozen=True, eq=False)
+class RuleRows:
+    """What is kept of the rows of every rule; of a fixed size, immutable."""
+
+    second: np.ndarray  # sums of s w_r [1, z] [1, z]', (n_rules, 1 + n_inputs, 1 + n_inputs)
+    strongest: np.ndarray  # weight of the rows on which each rule is the strongest
+    peak: np.ndarray  # largest strength of each rule on any row
+    extent: np.ndarray  # largest sqrt(w_r) |x - a_r|, by inputs that consequents are linear in
+    # Rules, and fingerprints of distinct inputs on which they are the strongest, (n, 2).
+    distinct: np.ndarray
+    # Rules, and the rows on which they fire farthest from their centres, (n, 1 + n_inputs).
+    farthest: np.ndarray
+
+    @classmethod
+    def none(cls, n_rules, n_inputs, n_slopes):
+        """Of no rows."""
+        n_basis = 1 + n_inputs
+        extent, zeros = np.zeros((n_rules, n_slopes)), np.zeros(n_rules)
+        second, nothing = np.zeros((n_rules, n_basis, n_basis)), np.empty((0, n_basis))
+        return cls(second, zeros, zeros, extent, np.empty((0, 2)), nothing)
+
+    @classmethod
+    def of(cls, X, basis_rows, strengths, weight, numbers, slope_inputs, centers):
+        """Of a block of rows, X (n_inputs, n_rows), ``basis_rows`` [1, z].
+
+        ``numbers`` are fingerprints of the inputs, ``centers`` a_r of the rules on the inputs by
+        which they have slopes, (n_rules, n_slopes).
+        """
+        best, top = strongest_rules(strengths), strengths.max(axis=0)
+        weighted = basis_rows if weight is None else basis_rows * weight
+        rule, row = np.nonzero(strengths >= FIRES * top)
+        root, extent = np.sqrt(strengths), np.empty_like(centers)
+        for j, x in enumerate(X[slope_inputs]):
+            extent[:, j] = (root * np.abs(x - centers[:, j, None])).max(axis=1)
+        return cls(
+            np.stack([(own * weighted) @ basis_rows.T for own in strengths]),
+            np.bincount(best, weights=weight, minlength=len(strengths)),
+            strengths.max(axis=1),
+            extent,
+            np.column_stack([best, numbers]),
+            np.column_stack([rule, X.T[row]]),
+        )
+
+    def faded(self, factor):
+        """The same rows with all weights times a factor."""
+        return replace(self, second=factor * self.second, strongest=factor * self.strongest)
+
+    def plus(self, other, scale: Scale):
+        """The rows of both, of which the sums are on this scale."""
+        second = self.second + other.second
+        distinct = np.unique(np.vstack([self.distinct, other.distinct]), axis=0)
+        return RuleRows(
+            second,
+            self.strongest + other.strongest,
+            np.maximum(self.peak, other.peak),
+            np.maximum(self.extent, other.extent),
+            _first_of_each(distinct, second.shape[1]),
+            _far_rows(np.vstack([self.farthest, other.farthest]), second, scale),
+        )
+
+    def on(self, shift, factor):
+        """The same sums on z' = shift + factor z."""
+        second = [rescaled(rescaled(own, shift, factor).T, shift, factor) for own in self.second]
+        return replace(self, second=np.stack(second))
+
+    def support(self, scale: Scale, n_coefficients):
+        """The support of every rule, in the units of X."""
+        counts = np.bincount(self.distinct[:, 0].astype(int), minlength=len(self.second))
+        known = counts > 0
+        center, factor = _places(self.second)
+        center[~known], factor[~known] = 0.0, 0.0
+        radius = np.zeros(known.size)
+        rules, distance = _distances(self.farthest, self.second, scale)
+        np.maximum.at(radius, rules, distance)
+        share = np.minimum(counts, n_coefficients) / n_coefficients
+        return RuleSupport(share, center, factor, radius * known).change_units(
+            scale.offset, scale.scale
+        )
+
+
+def rescaled(sums, shift, factor):
+    """Sums of [1, z] times something, rule by rule along the first axis, on [1, t + g z]."""
+    blocks = sums.reshape(-1, 1 + shift.size, sums.shape[-1]).copy()
+    blocks[:, 1:] *= factor[:, None]
+    blocks[:, 1:] += shift[:, None] * blocks[:, :1]
+    return blocks.reshape(sums.shape)
+
+
+def _first_of_each(table, most):
+    """So many rows of every number in the first column, by which the table is sorted."""
+    rank = np.arange(len(table)) - np.searchsorted(table[:, 0], table[:, 0])
+    return table[rank < most]
+
+
+def _places(second):
+    """Mean and inverse factor of the covariance of the rows of every rule."""
+    moments = second / np.maximum(second[:, :1, :1], _TINY)
+    center = moments[:, 0, 1:].copy()
+    return center, inverse_factor(moments[:, 1:, 1:], center)
+
+
+def _distances(farthest, second, scale):
+    """The rules of rows that were far, and Mahalanobis' distances from these rules' centres."""
+    rules = farthest[:, 0].astype(int)
+    center, factor = _places(second)
+    away = (farthest[:, 1:] - scale.offset) / scale.scale - center[rules]
+    return rules, np.linalg.norm(np.einsum("nij,nj->ni", factor[rules], away), axis=1)
+
+
+def _far_rows(rows, second, scale):
+    """Of rows by their rules the few farthest of each: one more row may change who is."""
+    rules, distance = _distances(rows, second, scale)
+    return _first_of_each(rows[np.lexsort((-distance, rules))], _MOST_FAR)
