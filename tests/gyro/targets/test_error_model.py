@@ -5,7 +5,7 @@ import pandas as pd
 import pytest
 
 from skanfis.gyro import GyroCompensator
-from skanfis.gyro.targets.error_model import ErrorModel, Piecewise, difference, polynomial_ranges
+from skanfis.gyro.targets.error_model import ErrorModel, Piecewise, difference
 from skanfis.gyro.targets.tables import Table
 
 from .models import ENDS, error_of, error_over_temperature, polynomial, rows
@@ -36,8 +36,10 @@ def test_values_and_slopes_in_a_box_are_in_their_ranges(kind):
             slack = 1e-9 * np.abs(by_difference).max()
             assert (by_difference >= slopes[0, axis] - slack)[stays].all()
             assert (by_difference <= slopes[1, axis] + slack)[stays].all()
-    # Of a small box the slopes are next to known.
+    # Of a small box the slopes are next to known, and of a point the value.
     assert (slopes[1] - slopes[0]).max() <= 0.01 * np.abs(slopes).max()
+    value, _ = error.ranges(low.T, low.T)
+    np.testing.assert_allclose(value, [error(low)] * 2, rtol=1e-7, atol=1e-9)
 
 
 def test_nothing_is_known_beyond_the_largest_phase():
@@ -46,16 +48,6 @@ def test_nothing_is_known_beyond_the_largest_phase():
     output = 1.5 * law.amplitude_[0]
     value, _ = error.ranges(np.array([[20.0], [output]]), np.array([[21.0], [output + 1.0]]))
     assert np.isnan(value).all()
-
-
-def test_polynomials_by_numpy():
-    powers, coefficients = np.array([[0, 0], [1, 2], [3, 0]]), np.array([0.5, -2.0, 1.5])
-    point = np.array([[0.3, -1.2], [0.7, 0.4]])
-    value, slopes = polynomial_ranges(powers, coefficients, point, point)
-    x, y = point
-    for side in (0, 1):
-        np.testing.assert_allclose(value[side], 0.5 - 2.0 * x * y**2 + 1.5 * x**3)
-        np.testing.assert_allclose(slopes[side], [-2.0 * y**2 + 4.5 * x**2, -4.0 * x * y])
 
 
 def line_through(function, edges, shift=0.0):
