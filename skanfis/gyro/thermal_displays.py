@@ -256,7 +256,7 @@ class CoverageDisplay(GyroDisplay):
                 raise ValueError(f"{name!r} is no column of X, which has {', '.join(X)}.")
         rows = pd.DataFrame({label: check_column(X[name], name) for name, label in labels.items()})
         steps = np.linspace(-_MARGIN, 1.0 + _MARGIN, _N_POINTS)
-        axes = (rows[label].min() + steps * np.ptp(rows[label]) for label in rows)
+        axes = (rows[label].min() + steps * (np.ptp(rows[label]) or 1.0) for label in rows)
         places = dict(zip(labels, (each.ravel() for each in np.meshgrid(*axes)), strict=True))
         grid = pd.DataFrame(X.median().to_dict() | places)[list(X)]
         cells, numbers = _cells(dict(rows))

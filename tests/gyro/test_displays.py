@@ -124,13 +124,6 @@ def test_numbers_have_three_digits(value, text):
     assert three_digits(value) == text
 
 
-def test_the_allan_deviation_needs_every_row(log):
-    rate, before, after = log["rate"], log["output"], log["after"]
-    lacking = after.where(after.index > 0)
-    with pytest.raises(ValueError, match="after is NaN in some rows; leave out these runs"):
-        AllanDisplay.from_predictions(rate, before, lacking, sampling_interval=1.0)
-
-
 def test_bad_columns_are_named(log):
     rate, before, after = log["rate"], log["output"], log["after"]
     draw, columns = GroupResidualDisplay.from_predictions, {"groups": log["groups"]}
@@ -144,6 +137,9 @@ def test_bad_columns_are_named(log):
         draw(rate, before, after * np.nan, **columns)
     with pytest.raises(TypeError, match="GroupResidualDisplay needs groups, with one value per"):
         draw(rate, before, after)
+    lacking = after.where(after.index > 0)
+    with pytest.raises(ValueError, match="after is NaN in some rows; leave out these runs"):
+        AllanDisplay.from_predictions(rate, before, lacking, sampling_interval=1.0)
 
 
 def test_error_band_keeps_every_peak_and_leaves_gaps_open(log):
@@ -255,6 +251,8 @@ def test_coverage_is_that_of_the_estimator(rng):
     assert display.ax_.get_xlabel() == "temperature [°C]"
     far = CoverageDisplay.from_estimator(pipeline, X.assign(time=9.0))
     assert not far.tables()["points"]["in range"].any()
+    level = CoverageDisplay.from_estimator(pipeline, X.assign(output=9.0)).tables()["points"]
+    assert level.iloc[:, 1].nunique() == 96
     with pytest.raises(ValueError, match="'output' is no column of X, which has temperature, time"):
         CoverageDisplay.from_estimator(pipeline, X.drop(columns="output"))
     with pytest.raises(ValueError, match="LinearRegression has no method 'coverage'"):
