@@ -178,8 +178,8 @@ class ResidualSurfaceDisplay(GyroDisplay):
     _PANELS: ClassVar = {"ncols": 2, "sharey": True}
 
     def _computed(self, rows):
-        columns = {"temperature [degC]": rows["temperature"], "true rate [deg/s]": rows["rate"]}
-        cells, numbers = _cells(columns)
+        columns = {"temperature": "temperature [degC]", "rate": "true rate [deg/s]"}
+        cells, numbers = _cells(rows[[*columns]].rename(columns=columns))
         found = rows["after"].groupby(numbers).agg(["count", "mean"]).reindex(cells.index)
         cells["rows"] = found["count"].fillna(0).astype(int)
         cells[f"mean error after [{self._unit}]"] = found["mean"]
@@ -259,13 +259,15 @@ class CoverageDisplay(GyroDisplay):
         axes = (rows[label].min() + steps * (np.ptp(rows[label]) or 1.0) for label in rows)
         places = dict(zip(labels, (each.ravel() for each in np.meshgrid(*axes)), strict=True))
         grid = pd.DataFrame(X.median().to_dict() | places)[list(X)]
-        cells, numbers = _cells(dict(rows))
+        cells, numbers = _cells(rows)
         cells["rows"] = np.bincount(numbers, minlength=len(cells))
         points = grid[list(labels)].rename(columns=labels)
         points["coverage"] = ask(estimator, "coverage", grid)
         points["in range"] = ask(estimator, "in_bounds", grid).astype(int)
-        numbers = _cell_numbers({label: points[label] for label in rows}, _edges(cells))
-        points["in a cell with data"] = numbers.map(cells["rows"] > 0).eq(True).astype(int)
+        # With a margin of empty cells about them.
+        has_rows = np.pad(cells["rows"].to_numpy().reshape(_N_CELLS, _N_CELLS) > 0, 1)
+        at = np.ceil(_N_CELLS * steps).clip(0, _N_CELLS + 1).astype(int)
+        points["in a cell with data"] = has_rows[np.ix_(at, at)].ravel().astype(int)
         rows = rows.iloc[evenly_chosen(len(rows), _MOST_DOTS)].reset_index(drop=True)
         display = cls()
         display.min_coverage = min_coverage
@@ -301,28 +303,17 @@ class CoverageDisplay(GyroDisplay):
 
 def _cells(columns):
     """Ends of all cells over two columns, a line for each, and the number of that of every row."""
+    ends, numbers = {}, np.zeros(len(columns), dtype=int)
     lines, places = np.divmod(np.arange(_N_CELLS**2), _N_CELLS)
-    edges = [bins_of(values, _N_CELLS)[1] for values in columns.values()]
-    ends: dict[str, np.ndarray] = {}
-    for label, place, each in zip(columns, (places, lines), edges, strict=True):
-        ends |= {f"{label}, from": each[place], f"{label}, to": each[place + 1]}
-    return pd.DataFrame(ends), _cell_numbers(columns, edges).astype(int)
-
-
-def _cell_numbers(columns, edges):
-    """Number of the cell of every row; NaN beyond all."""
-    place, line = (
-        pd.Series(pd.cut(values, each, labels=False, include_lowest=True))
-        for values, each in zip(columns.values(), edges, strict=True)
-    )
-    return line * _N_CELLS + place
-
-
-def _edges(cells):
-    return [np.append(cells.iloc[:, k].unique(), cells.iloc[-1, k + 1]) for k in (0, 2)]
+    for label, place, size in zip(columns, (places, lines), (1, _N_CELLS), strict=True):
+        bins, edges = bins_of(columns[label], _N_CELLS)
+        ends |= {f"{label}, from": edges[place], f"{label}, to": edges[place + 1]}
+        numbers = numbers + size * bins
+    return pd.DataFrame(ends), numbers
 
 
 def _draw_cells(axes, cells, values, **options):
     axes.set_facecolor(_NO_DATA)
+    edges = (np.append(cells.iloc[:, k].unique(), cells.iloc[-1, k + 1]) for k in (0, 2))
     image = values.to_numpy().reshape(_N_CELLS, _N_CELLS)
-    return axes.pcolormesh(*_edges(cells), image, rasterized=True, **options)
+    return axes.pcolormesh(*edges, image, rasterized=True, **options)
