@@ -225,20 +225,19 @@ class AllanDisplay(GyroDisplay):
     _UNITS = ("deg/h", "deg/s")
 
     def _computed(self, rows, sampling_interval):
-        parts = []
         for side in SIDES:
             if rows[side].isna().any():
                 raise ValueError(f"{side} is NaN in some rows; leave out these runs.")
-            # This takes deg/s and gives deg/h: 3600 times the unit of what it is given.
-            curve = allan_deviation(rows[side], sampling_interval, run=rows.get("run"))
-            columns = {
-                "curve": side,
-                "averaging time [s]": curve["averaging_time"],
-                f"Allan deviation [{self._unit}]": curve["deviation"] / PER_HOUR,
-                f"error [{self._unit}]": curve["error"] / PER_HOUR,
-            }
-            parts.append(pd.DataFrame(columns))
-        return {"allan": pd.concat(parts, ignore_index=True)}
+        run, unit = rows.get("run"), self._unit
+        curves = {side: allan_deviation(rows[side], sampling_interval, run) for side in SIDES}
+        table = pd.concat(curves, names=["curve"]).drop(columns="n").reset_index("curve")
+        # It takes deg/s and gives deg/h: 3600 times the unit of what it is given.
+        table[["deviation", "error"]] /= PER_HOUR
+        table.columns = [
+            *("curve", "averaging time [s]"),
+            *(f"Allan deviation [{unit}]", f"error [{unit}]"),
+        ]
+        return {"allan": table.reset_index(drop=True)}
 
     def _draw(self, axes, allan):
         (panel,) = axes

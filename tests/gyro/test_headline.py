@@ -12,9 +12,9 @@ from skanfis.gyro._calibration import Recipe, calibrate
 from skanfis.gyro._headline import flagged_text, law_text, proven_bounds, rules_text
 from skanfis.gyro._split import choose_split
 
-pytestmark = pytest.mark.usefixtures("few_rivals")
+pytestmark = pytest.mark.usefixtures("given_weights", "few_rivals")
 
-N_RUNS, N_ROWS = 24, 40
+N_RUNS, N_ROWS = 12, 40
 NOISE, SCATTER = 2e-4, 5e-4
 
 
