@@ -233,10 +233,8 @@ class AllanDisplay(GyroDisplay):
         table = pd.concat(curves, names=["curve"]).drop(columns="n").reset_index("curve")
         # It takes deg/s and gives deg/h: 3600 times the unit of what it is given.
         table[["deviation", "error"]] /= PER_HOUR
-        table.columns = [
-            *("curve", "averaging time [s]"),
-            *(f"Allan deviation [{unit}]", f"error [{unit}]"),
-        ]
+        names = "averaging time [s]", f"Allan deviation [{unit}]", f"error [{unit}]"
+        table.columns = ["curve", *names]
         return {"allan": table.reset_index(drop=True)}
 
     def _draw(self, axes, allan):

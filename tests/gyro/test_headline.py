@@ -64,7 +64,9 @@ def test_flagged_rows_are_counted_by_the_input_to_blame():
         folds = [(np.isin(labels, labels[test]), test) for _, test in calibration.split.folds]
         ends = [(X[name][~own].min(), X[name][~own].max(), test) for own, test in folds]
         counts[name] = sum((~X[name].iloc[test].between(*at)).sum() for *at, test in ends)
-    named = ", ".join(f"{name} in {counts[name]}" for name in sorted(counts, key=counts.get)[::-1])
+    named = ", ".join(
+        f"{name} in {counts[name]}" for name in sorted(counts, key=lambda name: -counts[name])
+    )
     assert min(counts.values()) > 0
     assert f"were flagged ({named})." in flagged_text(calibration)
 
