@@ -303,7 +303,8 @@ class CoverageDisplay(GyroDisplay):
 
 def _cells(columns):
     """Ends of all cells over two columns, a line for each, and the number of that of every row."""
-    ends, numbers = {}, np.zeros(len(columns), dtype=int)
+    ends: dict[str, np.ndarray] = {}
+    numbers = np.zeros(len(columns), dtype=int)
     lines, places = np.divmod(np.arange(_N_CELLS**2), _N_CELLS)
     for label, place, size in zip(columns, (places, lines), (1, _N_CELLS), strict=True):
         bins, edges = bins_of(columns[label], _N_CELLS)
