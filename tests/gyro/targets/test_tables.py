@@ -10,7 +10,7 @@ from skanfis.gyro.targets.error_model import difference
 from skanfis.gyro.targets.tables import TYPES, Spline, Table
 
 from ...export.c_compiler import UNTOUCHED, evaluate_all, needs_compiler
-from .models import ENDS, error_of, error_over_temperature
+from .models import ENDS, error_of
 
 UNITS = {"temperature": "degC", "output": "counts"}
 REALS = {"float": np.float32, "double": np.float64, "q31": np.int32, "q15": np.int16}
@@ -18,8 +18,8 @@ REALS = {"float": np.float32, "double": np.float64, "q31": np.int32, "q15": np.i
 
 def made(kind, type_name, n_cells=8):
     if kind == "cubic":
-        return error_over_temperature(), Spline(error_over_temperature(), type_name, n_cells)
-    error = error_of("rules") if kind == "rate-table" else error_over_temperature()
+        return error_of("rules", 1), Spline(error_of("rules", 1), type_name, n_cells)
+    error = error_of("rules") if kind == "rate-table" else error_of("rules", 1)
     return error, Table(error, type_name, n_cells)
 
 
@@ -91,7 +91,7 @@ def test_a_table_is_the_interpolation_between_values_of_the_error(kind):
 
 
 def test_a_piecewise_cubic_is_a_cubic_where_the_error_is_and_nearer_than_lines_elsewhere():
-    cubic = error_over_temperature("polynomial")
+    cubic = error_of("polynomial", 1)
     points = np.random.default_rng(6).uniform(*ENDS[:1].T, (500, 1))
     found = Spline(cubic, "double", 4).piecewise
     np.testing.assert_allclose(found(points), cubic(points), rtol=0, atol=1e-13)
