@@ -134,6 +134,9 @@ def test_what_is_missing_is_said(log):
     note = "No scale factor: the rate is 0 deg/s in all rows."
     assert table.loc["scale_factor_error", "note"] == note
     assert np.isnan(table.loc["scale_factor_error", "before"])
+    one = figures(report_of(log.assign(rate=log["rate"].where(log["run"] == 0, 0.0)), "run"))
+    note = "no interval: too many resamples do not have this figure"
+    assert one.loc["scale_factor_error", "note"] == note
     few = figures(report_of(log[log["run"] < 2], "run"))
     assert few.loc["bias_repeatability", "note"] == "no interval: fewer than 5 runs"
     assert np.isfinite(few.loc["bias_repeatability", "before"])
