@@ -67,7 +67,7 @@ def drawn(display):
 
 @pytest.mark.parametrize("kind", WANTS)
 def test_draws_with_units_on_the_axes_given(kind, log):
-    display = display_of(kind, log)
+    display = display_of(kind, log, ax=Figure(dpi=30))
     display.figure_.canvas.draw()
     assert display.axes_[-1].get_xlabel().endswith("]")
     assert all("deg" not in axes.get_xlabel() + axes.get_ylabel() for axes in display.axes_)
