@@ -1,21 +1,12 @@
 """Pictures over temperature: scale factor, hysteresis, where error is left, what is covered."""
 
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 
 from ._columns import ask, check_column, evenly_chosen
-from .displays import (
-    SIDES,
-    TWO_ROWS,
-    GyroDisplay,
-    bins_of,
-    dress,
-    mark_decades,
-    signs,
-    three_digits,
-)
+from .displays import SIDES, GyroDisplay, bins_of, dress, mark_decades, signs, three_digits
 from .metrics import HYSTERESIS_BINS, ROWS_PER_MEAN
 
 # Odd, so that a bin has the rest in its middle; near rest, a bias over the rate would fill it.
@@ -53,7 +44,7 @@ class ScaleFactorErrorDisplay(GyroDisplay):
 
     _PER_ROW = ("temperature",)
     _UNITS = ("ppm",)
-    _PANELS: ClassVar = TWO_ROWS
+    _PANELS = 2, 1
 
     def _computed(self, rows):
         if np.ptp(rows["rate"]) == 0:
@@ -116,7 +107,7 @@ class HysteresisDisplay(GyroDisplay):
 
     _PER_ROW = ("temperature", "temperature_rate")
     _UNITS = ("deg/h", "deg/s")
-    _PANELS: ClassVar = TWO_ROWS
+    _PANELS = 2, 1
 
     def _computed(self, rows):
         bins, edges = bins_of(rows["temperature"], HYSTERESIS_BINS)
@@ -175,7 +166,7 @@ class ResidualSurfaceDisplay(GyroDisplay):
 
     _PER_ROW = ("temperature",)
     _size = (7.0, 3.3)
-    _PANELS: ClassVar = {"ncols": 2, "sharey": True}
+    _PANELS = 1, 2
 
     def _computed(self, rows):
         columns = {"temperature": "temperature [degC]", "rate": "true rate [deg/s]"}
