@@ -182,7 +182,7 @@ class GroupResidualDisplay(GyroDisplay):
     _PER_ROW = ("groups",)
 
     def _computed(self, rows):
-        squares = rows[[*SIDES]].pow(2).groupby(rows["groups"]).mean()
+        squares = rows[[*SIDES]].pow(2).groupby(rows["groups"], dropna=False).mean()
         # Groups without an answer last, at the top: nothing is worse.
         table = np.sqrt(squares).sort_values("after", kind="stable").reset_index()
         table.columns = ["group", *(f"RMS error {side} [{self._unit}]" for side in SIDES)]

@@ -231,6 +231,9 @@ def test_groups_are_sorted_by_what_is_left_and_only_the_worst_are_drawn(log):
     np.testing.assert_allclose(table.iloc[:-1, 2], 0.001 * (np.array(order[:-1]) + 1))
     labels = [tick.get_text() for tick in display.ax_.get_yticklabels()]
     assert labels == [str(group) for group in order[-30:]]
+    # Rows without a label are a group too.
+    some = display_of(GroupResidualDisplay, log.assign(groups=np.where(groups < 9, np.nan, 1.0)))
+    assert some.tables()["groups"]["group"].isna().sum() == 1
 
 
 def test_coverage_is_that_of_the_estimator(rng):
