@@ -238,21 +238,18 @@ class _Composition:
         self.names = [f"x{j}" if given is None else given[j] for j in columns]
         positions = np.searchsorted(columns, rules.positions)
         self.rules = replace(rules, model=part.model, positions=positions)
-        self.law, self.is_cubic, ends = law, isinstance(law, Polynomial), ("minimum_", "maximum_")
-        box = {key: self.rounded(getattr(law, key)) for key in ends}
-        if self.is_cubic:
-            self.law = replace(law, **box)
-            keys = ("center", "scale", "coefficients")
-            self.tables = {key: self.rounded(getattr(law, key)) for key in keys}
-            return
-        self.law = copy(law)
-        vars(self.law).pop("feature_names_in_", None)  # it takes rows without names
-        vars(self.law).update(box, n_features_in_=columns.size)
-        self.law.columns_ = np.searchsorted(columns, law.columns_)
-        self.reference = self.rounded(law.reference_temperature_)
-        coefficients = law.amplitude_, law.sagnac_factor_, law.bias_
-        keys = ("amplitude", "sagnac", "bias")
-        self.tables = dict(zip(keys, map(self.rounded, coefficients), strict=True))
+        self.law, self.is_cubic = copy(law), isinstance(law, Polynomial)
+        own = vars(self.law)
+        # It takes rows without names, of these columns alone, and says by NaN that it is silent.
+        own.pop("feature_names_in_", None)
+        own |= {key: self.rounded(own[key]) for key in ("minimum_", "maximum_")}
+        keys = {key: key for key in ("center", "scale", "coefficients")}
+        if not self.is_cubic:
+            own |= {"columns_": np.searchsorted(columns, law.columns_)}
+            own |= {"n_features_in_": columns.size, "out_of_bounds": _said(law)}
+            self.reference = self.rounded(law.reference_temperature_)
+            keys = {"amplitude": "amplitude_", "sagnac": "sagnac_factor_", "bias": "bias_"}
+        self.tables = {key: self.rounded(own[name]) for key, name in keys.items()}
 
     def rounded(self, values):
         values = np.asarray(values, dtype=float)
@@ -394,18 +391,16 @@ def _known_answers(whole):
     sure = ~(np.abs(phase - limit) < 1e-3) & (np.abs(coverage - asked) > 1e-3 * asked)
     chosen = np.flatnonzero(sure)[:ROWS]
     X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= limit)[chosen]
-    silent = beyond & (law.out_of_bounds in SILENT)
-    silent |= ~rules.in_bounds(X) & (rules.model.out_of_bounds in SILENT)
     # The status tells, row by row.
     with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
-        answering = law if whole.is_cubic else copy(law).set_params(out_of_bounds=_answering(law))
-        of_law = answering.predict(X)
-    model, z = rules.model.with_out_of_bounds(_answering(rules.model)), X[:, rules.positions]
+        of_law = law.predict(X)
+    model, z = rules.model.with_out_of_bounds(_said(rules.model)), X[:, rules.positions]
     of_rules = model.predict(z)
-    silent |= ~np.isfinite(of_law.astype(whole.dtype))
+    y = (of_law + of_rules[:, 0])[:, None]
+    silent = ~np.isfinite(y.astype(whole.dtype))[:, 0]
     inside = ((low <= X) & (high >= X)).all(axis=1) & ~beyond
     status = status_word(~inside, silent, coverage < asked)
-    y = np.where(silent, 0.0, of_law + of_rules[:, 0])[:, None]
+    y[silent], of_rules[silent] = 0.0, 0.0
     tolerance = TOLERANCE[whole.dtype] * (size_of_sum(model, z, of_rules) + _steepest(whole, y))
     return X.astype(whole.dtype), y.astype(whole.dtype), status, tolerance.astype(whole.dtype)
 
@@ -421,9 +416,9 @@ def _steepest(whole, y):
     return size * (1.0 + (np.abs(ends) / law.scale).max())
 
 
-def _answering(part):
-    """The policy by which a part answers everywhere: its own, or the nearest where it is silent."""
-    return "linear" if part.out_of_bounds == "linear" else "clip"
+def _said(part):
+    """The policy of a part, where it raises that which says so row by row."""
+    return "nan" if part.out_of_bounds in SILENT else part.out_of_bounds
 
 
 def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:

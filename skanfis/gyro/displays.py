@@ -14,7 +14,6 @@ from .metrics import allan_deviation, allan_figures, rms, table_of
 # Colours that the colour-blind can tell apart.
 SIDES = {"before": "#d55e00", "after": "#0072b2"}
 _SIGNS = {"degC": "°C", "deg/": "°/", "sqrt(h)": "√h"}
-TWO_ROWS = {"nrows": 2, "sharex": True}
 # Bands about two dots wide in the picture; points beyond cover one another.
 _N_BANDS, _N_POINTS = 300, 3_000
 # The worst groups: more lines cannot be read.
@@ -33,7 +32,7 @@ class GyroDisplay:
     _OPTIONAL: ClassVar[tuple[str, ...]] = ()
     # The first is that of from_predictions unless another is given.
     _UNITS: ClassVar[tuple[str, ...]] = ("deg/s", "deg/h")
-    _PANELS: ClassVar[dict[str, Any]] = {}
+    _PANELS = 1, 1  # rows and columns
     _size: tuple[float, float] = (6.2, 4.4)
 
     # Tables of what is drawn, from the errors of all rows in the unit, and options.
@@ -60,9 +59,9 @@ class GyroDisplay:
             ax = pyplot.figure(layout="constrained")
         if hasattr(ax, "set_size_inches"):
             ax.set_size_inches(self._size)
-            ax = ax.subplots(**self._PANELS)
+            ax = ax.subplots(*self._PANELS, sharex="col", sharey="row")
         self.axes_ = np.atleast_1d(np.asarray(ax, dtype=object)).ravel()
-        n_axes = self._PANELS.get("nrows", 1) * self._PANELS.get("ncols", 1)
+        n_axes = np.prod(self._PANELS)
         if self.axes_.size != n_axes:
             raise ValueError(f"ax has {self.axes_.size} axes; this picture needs {n_axes}.")
         self.ax_, self.figure_ = self.axes_[0], self.axes_[0].figure
@@ -129,7 +128,7 @@ class ErrorDisplay(GyroDisplay):
     """
 
     _PER_ROW = ("position",)
-    _PANELS: ClassVar = TWO_ROWS
+    _PANELS = 2, 1
 
     def _computed(self, rows, position_label="time [s]"):
         errors, unit = rows[[*SIDES]], self._unit
@@ -183,7 +182,7 @@ class GroupResidualDisplay(GyroDisplay):
     _PER_ROW = ("groups",)
 
     def _computed(self, rows):
-        squares = rows[[*SIDES]].pow(2).groupby(rows["groups"]).mean()
+        squares = rows[[*SIDES]].pow(2).groupby(rows["groups"], dropna=False).mean()
         # Groups without an answer last, at the top: nothing is worse.
         table = np.sqrt(squares).sort_values("after", kind="stable").reset_index()
         table.columns = ["group", *(f"RMS error {side} [{self._unit}]" for side in SIDES)]
@@ -225,20 +224,17 @@ class AllanDisplay(GyroDisplay):
     _UNITS = ("deg/h", "deg/s")
 
     def _computed(self, rows, sampling_interval):
-        parts = []
         for side in SIDES:
             if rows[side].isna().any():
                 raise ValueError(f"{side} is NaN in some rows; leave out these runs.")
-            # This takes deg/s and gives deg/h: 3600 times the unit of what it is given.
-            curve = allan_deviation(rows[side], sampling_interval, run=rows.get("run"))
-            columns = {
-                "curve": side,
-                "averaging time [s]": curve["averaging_time"],
-                f"Allan deviation [{self._unit}]": curve["deviation"] / PER_HOUR,
-                f"error [{self._unit}]": curve["error"] / PER_HOUR,
-            }
-            parts.append(pd.DataFrame(columns))
-        return {"allan": pd.concat(parts, ignore_index=True)}
+        run, unit = rows.get("run"), self._unit
+        curves = {side: allan_deviation(rows[side], sampling_interval, run) for side in SIDES}
+        table = pd.concat(curves, names=["curve"]).drop(columns="n").reset_index("curve")
+        # It takes deg/s and gives deg/h: 3600 times the unit of what it is given.
+        table[["deviation", "error"]] /= PER_HOUR
+        names = "averaging time [s]", f"Allan deviation [{unit}]", f"error [{unit}]"
+        table.columns = ["curve", *names]
+        return {"allan": table.reset_index(drop=True)}
 
     def _draw(self, axes, allan):
         (panel,) = axes

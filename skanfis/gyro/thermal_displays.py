@@ -1,21 +1,12 @@
 """Pictures over temperature: scale factor, hysteresis, where error is left, what is covered."""
 
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 import pandas as pd
 
 from ._columns import ask, check_column, evenly_chosen
-from .displays import (
-    SIDES,
-    TWO_ROWS,
-    GyroDisplay,
-    bins_of,
-    dress,
-    mark_decades,
-    signs,
-    three_digits,
-)
+from .displays import SIDES, GyroDisplay, bins_of, dress, mark_decades, signs, three_digits
 from .metrics import HYSTERESIS_BINS, ROWS_PER_MEAN
 
 # Odd, so that a bin has the rest in its middle; near rest, a bias over the rate would fill it.
@@ -53,7 +44,7 @@ class ScaleFactorErrorDisplay(GyroDisplay):
 
     _PER_ROW = ("temperature",)
     _UNITS = ("ppm",)
-    _PANELS: ClassVar = TWO_ROWS
+    _PANELS = 2, 1
 
     def _computed(self, rows):
         if np.ptp(rows["rate"]) == 0:
@@ -116,7 +107,7 @@ class HysteresisDisplay(GyroDisplay):
 
     _PER_ROW = ("temperature", "temperature_rate")
     _UNITS = ("deg/h", "deg/s")
-    _PANELS: ClassVar = TWO_ROWS
+    _PANELS = 2, 1
 
     def _computed(self, rows):
         bins, edges = bins_of(rows["temperature"], HYSTERESIS_BINS)
@@ -175,11 +166,11 @@ class ResidualSurfaceDisplay(GyroDisplay):
 
     _PER_ROW = ("temperature",)
     _size = (7.0, 3.3)
-    _PANELS: ClassVar = {"ncols": 2, "sharey": True}
+    _PANELS = 1, 2
 
     def _computed(self, rows):
-        columns = {"temperature [degC]": rows["temperature"], "true rate [deg/s]": rows["rate"]}
-        cells, numbers = _cells(columns)
+        columns = {"temperature": "temperature [degC]", "rate": "true rate [deg/s]"}
+        cells, numbers = _cells(rows[[*columns]].rename(columns=columns))
         found = rows["after"].groupby(numbers).agg(["count", "mean"]).reindex(cells.index)
         cells["rows"] = found["count"].fillna(0).astype(int)
         cells[f"mean error after [{self._unit}]"] = found["mean"]
@@ -256,16 +247,18 @@ class CoverageDisplay(GyroDisplay):
                 raise ValueError(f"{name!r} is no column of X, which has {', '.join(X)}.")
         rows = pd.DataFrame({label: check_column(X[name], name) for name, label in labels.items()})
         steps = np.linspace(-_MARGIN, 1.0 + _MARGIN, _N_POINTS)
-        axes = (rows[label].min() + steps * np.ptp(rows[label]) for label in rows)
+        axes = (rows[label].min() + steps * (np.ptp(rows[label]) or 1.0) for label in rows)
         places = dict(zip(labels, (each.ravel() for each in np.meshgrid(*axes)), strict=True))
         grid = pd.DataFrame(X.median().to_dict() | places)[list(X)]
-        cells, numbers = _cells(dict(rows))
+        cells, numbers = _cells(rows)
         cells["rows"] = np.bincount(numbers, minlength=len(cells))
         points = grid[list(labels)].rename(columns=labels)
         points["coverage"] = ask(estimator, "coverage", grid)
         points["in range"] = ask(estimator, "in_bounds", grid).astype(int)
-        numbers = _cell_numbers({label: points[label] for label in rows}, _edges(cells))
-        points["in a cell with data"] = numbers.map(cells["rows"] > 0).eq(True).astype(int)
+        # With a margin of empty cells about them.
+        has_rows = np.pad(cells["rows"].to_numpy().reshape(_N_CELLS, _N_CELLS) > 0, 1)
+        at = np.ceil(_N_CELLS * steps).clip(0, _N_CELLS + 1).astype(int)
+        points["in a cell with data"] = has_rows[np.ix_(at, at)].ravel().astype(int)
         rows = rows.iloc[evenly_chosen(len(rows), _MOST_DOTS)].reset_index(drop=True)
         display = cls()
         display.min_coverage = min_coverage
@@ -301,28 +294,18 @@ class CoverageDisplay(GyroDisplay):
 
 def _cells(columns):
     """Ends of all cells over two columns, a line for each, and the number of that of every row."""
-    lines, places = np.divmod(np.arange(_N_CELLS**2), _N_CELLS)
-    edges = [bins_of(values, _N_CELLS)[1] for values in columns.values()]
     ends: dict[str, np.ndarray] = {}
-    for label, place, each in zip(columns, (places, lines), edges, strict=True):
-        ends |= {f"{label}, from": each[place], f"{label}, to": each[place + 1]}
-    return pd.DataFrame(ends), _cell_numbers(columns, edges).astype(int)
-
-
-def _cell_numbers(columns, edges):
-    """Number of the cell of every row; NaN beyond all."""
-    place, line = (
-        pd.Series(pd.cut(values, each, labels=False, include_lowest=True))
-        for values, each in zip(columns.values(), edges, strict=True)
-    )
-    return line * _N_CELLS + place
-
-
-def _edges(cells):
-    return [np.append(cells.iloc[:, k].unique(), cells.iloc[-1, k + 1]) for k in (0, 2)]
+    numbers = np.zeros(len(columns), dtype=int)
+    lines, places = np.divmod(np.arange(_N_CELLS**2), _N_CELLS)
+    for label, place, size in zip(columns, (places, lines), (1, _N_CELLS), strict=True):
+        bins, edges = bins_of(columns[label], _N_CELLS)
+        ends |= {f"{label}, from": edges[place], f"{label}, to": edges[place + 1]}
+        numbers = numbers + size * bins
+    return pd.DataFrame(ends), numbers
 
 
 def _draw_cells(axes, cells, values, **options):
     axes.set_facecolor(_NO_DATA)
+    edges = (np.append(cells.iloc[:, k].unique(), cells.iloc[-1, k + 1]) for k in (0, 2))
     image = values.to_numpy().reshape(_N_CELLS, _N_CELLS)
-    return axes.pcolormesh(*_edges(cells), image, rasterized=True, **options)
+    return axes.pcolormesh(*edges, image, rasterized=True, **options)

@@ -67,7 +67,7 @@ def drawn(display):
 
 @pytest.mark.parametrize("kind", WANTS)
 def test_draws_with_units_on_the_axes_given(kind, log):
-    display = display_of(kind, log)
+    display = display_of(kind, log, ax=Figure(dpi=30))
     display.figure_.canvas.draw()
     assert display.axes_[-1].get_xlabel().endswith("]")
     assert all("deg" not in axes.get_xlabel() + axes.get_ylabel() for axes in display.axes_)
@@ -124,13 +124,6 @@ def test_numbers_have_three_digits(value, text):
     assert three_digits(value) == text
 
 
-def test_the_allan_deviation_needs_every_row(log):
-    rate, before, after = log["rate"], log["output"], log["after"]
-    lacking = after.where(after.index > 0)
-    with pytest.raises(ValueError, match="after is NaN in some rows; leave out these runs"):
-        AllanDisplay.from_predictions(rate, before, lacking, sampling_interval=1.0)
-
-
 def test_bad_columns_are_named(log):
     rate, before, after = log["rate"], log["output"], log["after"]
     draw, columns = GroupResidualDisplay.from_predictions, {"groups": log["groups"]}
@@ -144,6 +137,9 @@ def test_bad_columns_are_named(log):
         draw(rate, before, after * np.nan, **columns)
     with pytest.raises(TypeError, match="GroupResidualDisplay needs groups, with one value per"):
         draw(rate, before, after)
+    lacking = after.where(after.index > 0)
+    with pytest.raises(ValueError, match="after is NaN in some rows; leave out these runs"):
+        AllanDisplay.from_predictions(rate, before, lacking, sampling_interval=1.0)
 
 
 def test_error_band_keeps_every_peak_and_leaves_gaps_open(log):
@@ -235,6 +231,9 @@ def test_groups_are_sorted_by_what_is_left_and_only_the_worst_are_drawn(log):
     np.testing.assert_allclose(table.iloc[:-1, 2], 0.001 * (np.array(order[:-1]) + 1))
     labels = [tick.get_text() for tick in display.ax_.get_yticklabels()]
     assert labels == [str(group) for group in order[-30:]]
+    # Rows without a label are a group too.
+    some = display_of(GroupResidualDisplay, log.assign(groups=np.where(groups < 9, np.nan, 1.0)))
+    assert some.tables()["groups"]["group"].isna().sum() == 1
 
 
 def test_coverage_is_that_of_the_estimator(rng):
@@ -252,9 +251,14 @@ def test_coverage_is_that_of_the_estimator(rng):
     assert cells["rows"].sum() == len(part)
     beyond = cells[(cells.iloc[:, 0] > 25.0) & (cells.iloc[:, 2] > 9.0)]
     assert not beyond["rows"].any()
+    for x, y, *_, has_rows in points.iloc[::89].to_numpy():
+        own = (cells.iloc[:, [0, 2]] < [x, y]) & (cells.iloc[:, [1, 3]].to_numpy() >= [x, y])
+        assert has_rows == (cells["rows"][own.all(axis=1)] > 0).any()
     assert display.ax_.get_xlabel() == "temperature [°C]"
     far = CoverageDisplay.from_estimator(pipeline, X.assign(time=9.0))
     assert not far.tables()["points"]["in range"].any()
+    level = CoverageDisplay.from_estimator(pipeline, X.assign(output=9.0)).tables()["points"]
+    assert level.iloc[:, 1].nunique() == 96
     with pytest.raises(ValueError, match="'output' is no column of X, which has temperature, time"):
         CoverageDisplay.from_estimator(pipeline, X.drop(columns="output"))
     with pytest.raises(ValueError, match="LinearRegression has no method 'coverage'"):

@@ -102,9 +102,9 @@ def test_intervals_hold_the_figure_and_come_back_with_the_seed(log):
 def test_interval_is_that_of_the_runs_not_of_the_rows(rng):
     """Each run has a bias of its own: the mean of 10 is known to 1 / sqrt(10) of their spread."""
     n_runs, biases = 10, 5.0 * rng.normal(size=10) / HOUR
-    rate = np.tile(np.linspace(-100, 100, 400), n_runs)
-    before = rate + np.repeat(biases, 400)
-    run = np.repeat(np.arange(n_runs), 400)
+    rate = np.tile(np.linspace(-100, 100, 40), n_runs)
+    before = rate + np.repeat(biases, 40)
+    run = np.repeat(np.arange(n_runs), 40)
     report = gyro_report(rate, before, run=run, n_resamples=2000, random_state=0)
     bias = figures(report).loc["bias"]
     expected = 2 * 1.96 * HOUR * biases.std() / np.sqrt(n_runs)
@@ -134,6 +134,9 @@ def test_what_is_missing_is_said(log):
     note = "No scale factor: the rate is 0 deg/s in all rows."
     assert table.loc["scale_factor_error", "note"] == note
     assert np.isnan(table.loc["scale_factor_error", "before"])
+    one = figures(report_of(log.assign(rate=log["rate"].where(log["run"] == 0, 0.0)), "run"))
+    note = "no interval: too many resamples do not have this figure"
+    assert one.loc["scale_factor_error", "note"] == note
     few = figures(report_of(log[log["run"] < 2], "run"))
     assert few.loc["bias_repeatability", "note"] == "no interval: fewer than 5 runs"
     assert np.isfinite(few.loc["bias_repeatability", "before"])

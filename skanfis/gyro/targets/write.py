@@ -25,29 +25,23 @@ _N_CALIBRATION_TEMPERATURES = 200
 _THERMOMETER = "The temperature [degC] must come from the thermometer that was logged."
 
 
-class RefusedError(Exception):
-    """Why a target is not written."""
-
-
 def write_targets(calibration, texts, folder):
     """Write targets such as "px4:x:0"; yields these, a sentence, and whether it was done."""
     for text in texts:
-        try:
-            yield text, _write(calibration, text, folder), True
-        except RefusedError as reason:
-            yield text, str(reason), False
+        yield text, *_write(calibration, text, folder)
 
 
 def _write(calibration, text, folder):
+    """What a target that was written is worth, or why it was not; and which of both."""
     name, *details = text.split(":")
     compensator, X = calibration.compensator, calibration.X
     axes = ("temperature", "output") if name == "rate-table" else ("temperature",)
     if set(X) != set(axes):
-        raise RefusedError(
+        return (
             f"the model needs {' and '.join(X)}, and this target says what follows from "
             f"{' and '.join(axes)}. Calibrate again with --inputs {' '.join(axes)}, or ask for "
             "another target."
-        )
+        ), False
     make: Any = partial(Cubic, autopilot=name)
     is_code = name not in NOTES
     if is_code:
@@ -61,13 +55,13 @@ def _write(calibration, text, folder):
     largest = high - low if is_relative else max(-low, high)
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if not np.isfinite(largest):
-        raise RefusedError("no bound of its difference from the model could be proven.")
+        return "no bound of its difference from the model could be proven.", False
     left = _held_out_rms(calibration, make, is_relative)
     if left > _MOST_TIMES * model_rms:
-        raise RefusedError(
+        return (
             f"it leaves {left:.4g} deg/s RMS on rows held out, and the model {model_rms:.4g}; more "
             f"than {_MOST_TIMES:g} times as much is not written."
-        )
+        ), False
     of = "model(T) - model(T_cal), for the worst T_cal," if is_relative else "the model"
     worth = (
         f"it differs from {of} by {largest:.4g} deg/s at most, proven; it leaves {left:.4g} deg/s "
@@ -82,7 +76,7 @@ def _write(calibration, text, folder):
     else:
         written = made.text([NOTES[name], *notes], *details)
         (folder / FILES[name][0]).write_text(written, encoding="ascii", newline="\n")
-    return worth
+    return worth, True
 
 
 def _held_out_rms(calibration, make, is_relative):

@@ -13,7 +13,7 @@ from ...quick import quick
 
 ENDS = np.array([(-20.0, 60.0), (-2500.0, 2500.0)])  # degC, counts
 COUNTS = -25.0  # per deg/s
-AXES = INPUTS = ("temperature", "output")
+AXES = ("temperature", "output")
 
 
 def rows(n_rows, seed=0):
@@ -25,11 +25,6 @@ def planted(temperature, output):
     """An error [deg/s] that is bent in both."""
     rate = output / COUNTS
     return 0.02 * np.tanh((temperature - 20.0) / 15.0) + 1e-3 * rate * np.sin(temperature / 25.0)
-
-
-def framed():
-    """Rows with the ends of the range among them."""
-    return np.vstack([rows(800), ENDS.T])
 
 
 def polynomial(X, error, policy="clip"):
@@ -44,31 +39,18 @@ def law_and_line():
 
 
 @cache
-def error_of(kind):
-    """The ErrorModel of both inputs, of a kind of estimator."""
-    points = framed()
-    X = pd.DataFrame(points, columns=AXES)[list(INPUTS)]
-    error = planted(*points.T)
-    rate = X["output"] / COUNTS - error
-    make = {
-        "rules": quick([3, 4]).fit,
-        "polynomial": polynomial,
-        "constant": quick([1, 1], order=0).fit,
-        "law and line": law_and_line().fit,
-    }[kind]
-    is_rate = kind == "law and line"
-    estimator = make(X, rate if is_rate else error)
-    predicts = "rate" if is_rate else "error"
-    compensator = GyroCompensator(estimator, INPUTS, predicts, COUNTS, "counts")
-    return ErrorModel(compensator, estimator, X)
-
-
-@cache
-def error_over_temperature(kind="rules"):
-    """The ErrorModel of the temperature alone."""
-    points = framed()[:, :1]
-    X = pd.DataFrame(points, columns=AXES[:1])
-    make = {"rules": quick([4]).fit, "polynomial": polynomial}[kind]
-    estimator = make(X, planted(points[:, 0], 0.0))
-    compensator = GyroCompensator(estimator, AXES[:1])
+def error_of(kind, n_inputs=2):
+    """The ErrorModel of both inputs, or of the temperature, of a kind of estimator."""
+    # With the ends of the range among them.
+    points = np.vstack([rows(800), ENDS.T])[:, :n_inputs]
+    X = pd.DataFrame(points, columns=AXES[:n_inputs])
+    output = points[:, 1] if n_inputs > 1 else 0.0
+    error = planted(points[:, 0], output)
+    estimator, predicts = {
+        "rules": lambda: (quick([3, 4] if n_inputs > 1 else [4]).fit(X, error), "error"),
+        "polynomial": lambda: (polynomial(X, error), "error"),
+        "constant": lambda: (quick([1, 1], order=0).fit(X, error), "error"),
+        "law and line": lambda: (law_and_line().fit(X, output / COUNTS - error), "rate"),
+    }[kind]()
+    compensator = GyroCompensator(estimator, AXES[:n_inputs], predicts, COUNTS, "counts")
     return ErrorModel(compensator, estimator, X)

@@ -6,7 +6,7 @@ import pytest
 from skanfis.gyro.targets.autopilots import Cubic
 from skanfis.gyro.targets.error_model import difference
 
-from .models import ENDS, error_over_temperature
+from .models import ENDS, error_of
 
 F = np.float32
 
@@ -71,7 +71,7 @@ def ardupilot_correction(found, temperature, cal_temp, imu, axis):
 
 @pytest.mark.parametrize("kind", ["rules", "polynomial"])
 def test_px4_is_within_the_certain_difference(kind):
-    error = error_over_temperature(kind)
+    error = error_of(kind, 1)
     cubic = Cubic(error, "px4")
     found = parameters(cubic.text(["A note."], "z", "2", "3407914"))
     assert {"TC_G_ENABLE": "1", "TC_G2_ID": "3407914"}.items() <= found.items()
@@ -91,7 +91,7 @@ def test_px4_is_within_the_certain_difference(kind):
 
 
 def test_ardupilot_is_within_the_certain_difference_for_any_calibration_temperature():
-    error = error_over_temperature()
+    error = error_of("rules", 1)
     cubic = Cubic(error, "ardupilot")
     found = parameters(cubic.text(["A note."], "y", "3"))
     assert len(found) == 6
@@ -115,7 +115,7 @@ def test_the_nearest_cubic_of_a_fourth_power_by_chebyshev(autopilot):
 
 
 def test_a_range_is_no_wider_for_two_digits_and_no_parameter_has_an_exponent():
-    error = Within(error_over_temperature(), np.array([(-19.996, 59.994)]))
+    error = Within(error_of("rules", 1), np.array([(-19.996, 59.994)]))
     for autopilot in ("px4", "ardupilot"):
         text = Cubic(error, autopilot).text([], "x", "1")
         found = parameters(text)

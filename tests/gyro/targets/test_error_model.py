@@ -5,10 +5,10 @@ import pandas as pd
 import pytest
 
 from skanfis.gyro import GyroCompensator
-from skanfis.gyro.targets.error_model import ErrorModel, Piecewise, difference, polynomial_ranges
+from skanfis.gyro.targets.error_model import ErrorModel, Piecewise, difference
 from skanfis.gyro.targets.tables import Table
 
-from .models import ENDS, error_of, error_over_temperature, polynomial, rows
+from .models import ENDS, error_of, polynomial, rows
 
 BEND = 3e-5  # deg/s/degC^2
 KINDS = ["rules", "polynomial", "constant", "law and line"]
@@ -36,8 +36,10 @@ def test_values_and_slopes_in_a_box_are_in_their_ranges(kind):
             slack = 1e-9 * np.abs(by_difference).max()
             assert (by_difference >= slopes[0, axis] - slack)[stays].all()
             assert (by_difference <= slopes[1, axis] + slack)[stays].all()
-    # Of a small box the slopes are next to known.
+    # Of a small box the slopes are next to known, and of a point the value.
     assert (slopes[1] - slopes[0]).max() <= 0.01 * np.abs(slopes).max()
+    value, _ = error.ranges(low.T, low.T)
+    np.testing.assert_allclose(value, [error(low)] * 2, rtol=1e-7, atol=1e-9)
 
 
 def test_nothing_is_known_beyond_the_largest_phase():
@@ -46,16 +48,6 @@ def test_nothing_is_known_beyond_the_largest_phase():
     output = 1.5 * law.amplitude_[0]
     value, _ = error.ranges(np.array([[20.0], [output]]), np.array([[21.0], [output + 1.0]]))
     assert np.isnan(value).all()
-
-
-def test_polynomials_by_numpy():
-    powers, coefficients = np.array([[0, 0], [1, 2], [3, 0]]), np.array([0.5, -2.0, 1.5])
-    point = np.array([[0.3, -1.2], [0.7, 0.4]])
-    value, slopes = polynomial_ranges(powers, coefficients, point, point)
-    x, y = point
-    for side in (0, 1):
-        np.testing.assert_allclose(value[side], 0.5 - 2.0 * x * y**2 + 1.5 * x**3)
-        np.testing.assert_allclose(slopes[side], [-2.0 * y**2 + 4.5 * x**2, -4.0 * x * y])
 
 
 def line_through(function, edges, shift=0.0):
@@ -95,7 +87,7 @@ def test_lines_through_a_parabola_by_the_closed_form(parabola, n_cells):
     ],
 )
 def test_no_point_is_beyond_and_some_is_near(kind, type_name):
-    error = error_over_temperature() if kind == "over the temperature" else error_of(kind)
+    error = error_of("rules", 1) if kind == "over the temperature" else error_of(kind)
     target = Table(error, type_name, 8).piecewise
     low, high = difference(error, target)
     points = rows(100_000, seed=3)[:, : len(target.ends)]

@@ -10,7 +10,7 @@ from skanfis.gyro.targets.error_model import difference
 from skanfis.gyro.targets.tables import TYPES, Spline, Table
 
 from ...export.c_compiler import UNTOUCHED, evaluate_all, needs_compiler
-from .models import ENDS, error_of, error_over_temperature
+from .models import ENDS, error_of
 
 UNITS = {"temperature": "degC", "output": "counts"}
 REALS = {"float": np.float32, "double": np.float64, "q31": np.int32, "q15": np.int16}
@@ -18,15 +18,9 @@ REALS = {"float": np.float32, "double": np.float64, "q31": np.int32, "q15": np.i
 
 def made(kind, type_name, n_cells=8):
     if kind == "cubic":
-        return error_over_temperature(), Spline(error_over_temperature(), type_name, n_cells)
-    error = error_of("rules") if kind == "rate-table" else error_over_temperature()
+        return error_of("rules", 1), Spline(error_of("rules", 1), type_name, n_cells)
+    error = error_of("rules") if kind == "rate-table" else error_of("rules", 1)
     return error, Table(error, type_name, n_cells)
-
-
-def evaluated(code, X, folder):
-    """What the compiled function makes of rows, and the status."""
-    [(y, status)] = evaluate_all([code], X, folder, "c99", [1])
-    return y[:, 0], status
 
 
 def scales_of(header):
@@ -52,6 +46,7 @@ def test_what_c_says_is_within_the_certain_difference(kind, type_name, tmp_path)
     code, real = table.code(["A note */ with stars * 2."], UNITS), REALS[type_name]
     rng, d = np.random.default_rng(5), len(table.names)
     points = rng.uniform(*ENDS[:d].T, (5000, d))
+    bad = np.repeat([[np.nan], [np.inf], [-np.inf]], d, axis=1)
     if np.issubdtype(real, np.integer):
         scales, unit = scales_of(code.header)
         ends = np.iinfo(real).min, np.iinfo(real).max
@@ -60,14 +55,21 @@ def test_what_c_says_is_within_the_certain_difference(kind, type_name, tmp_path)
         X = np.vstack([whole, np.rint(points / scales)]).astype(real)
         # A step of the error is a small part of it.
         assert unit < 1e-3 * np.abs(error(points)).max()
+        bad = bad[:0]
     else:
         scales, unit = np.ones(d), 1.0
         X = np.vstack([points, 3.0 * points]).astype(real)
-    y, status = evaluated(code, X, tmp_path)
     inputs = X * scales
     held = inputs.clip(*table.piecewise.ends.T)
     outside = (held != inputs).any(axis=1)
-    np.testing.assert_array_equal(status, outside)
+    given = np.vstack([X, held / scales, bad]).astype(real)
+    [(y, status)] = evaluate_all([code], given, tmp_path, "c99", [1])
+    (y, again), nothing = np.split(y[: 2 * len(X), 0], 2), y[2 * len(X) :]
+    np.testing.assert_array_equal(status[: len(X)], outside)
+    # Held at the ends is the value there, to the last bit.
+    np.testing.assert_array_equal(y, again)
+    np.testing.assert_array_equal(status[2 * len(X) :], 2 + 8)
+    np.testing.assert_array_equal(nothing, UNTOUCHED)
     assert 100 < outside.sum() < len(X) - 100
     low, high = difference(error, table.piecewise)
     # What the caller has rounded counts as it was before.
@@ -75,9 +77,6 @@ def test_what_c_says_is_within_the_certain_difference(kind, type_name, tmp_path)
     off = error(asked) - y * unit
     assert low <= off.min()
     assert off.max() <= high
-    # Held at the ends is the value there, to the last bit.
-    again = (held / scales).astype(real)
-    np.testing.assert_array_equal(y, evaluated(code, again, tmp_path)[0])
 
 
 @pytest.mark.parametrize("kind", ["table", "rate-table"])
@@ -92,7 +91,7 @@ def test_a_table_is_the_interpolation_between_values_of_the_error(kind):
 
 
 def test_a_piecewise_cubic_is_a_cubic_where_the_error_is_and_nearer_than_lines_elsewhere():
-    cubic = error_over_temperature("polynomial")
+    cubic = error_of("polynomial", 1)
     points = np.random.default_rng(6).uniform(*ENDS[:1].T, (500, 1))
     found = Spline(cubic, "double", 4).piecewise
     np.testing.assert_allclose(found(points), cubic(points), rtol=0, atol=1e-13)
@@ -102,15 +101,6 @@ def test_a_piecewise_cubic_is_a_cubic_where_the_error_is_and_nearer_than_lines_e
         low, high = difference(error, target.piecewise)
         largest[kind] = max(-low, high)
     assert largest["cubic"] < 0.1 * largest["table"]
-
-
-@needs_compiler
-def test_no_answer_to_what_is_not_finite(tmp_path):
-    _, table = made("table", "float")
-    X = np.array([[np.nan], [np.inf], [-np.inf], [20.0]], dtype=np.float32)
-    y, status = evaluated(table.code([], UNITS), X, tmp_path)
-    np.testing.assert_array_equal(status, [10, 10, 10, 0])
-    assert np.all(y[:3] == UNTOUCHED)
 
 
 def test_the_header_says_what_goes_in_and_comes_out():
