@@ -31,10 +31,10 @@ MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 FARTHEST_ROW = 1e100
 # More than these tell no two doubles apart, and give back no other double.
 MOST_DIGITS = 17
-# What a prediction may have beyond the range of the target: half a standard deviation at least,
-# whatever the limit of inputs, for peaks between rows; of rules that bend a quarter of the range at
-# most. A line has no peaks between rows.
-_LEAST_MARGIN, _MOST_OF_RANGE = 0.5, 0.25
+# What a prediction may have beyond the range of the target: of a line so many standard deviations
+# at least, whatever the limit of inputs; of rules that bend, for peaks between rows, this part of
+# the range.
+_LEAST_MARGIN, _PART_OF_RANGE = 0.5, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,10 +68,9 @@ class TargetRange:
 
         They are those that were asked for, or infinite, where the tangent is followed without end.
         """
-        margin = max_extrapolation * self.spread
+        margin = max(max_extrapolation, _LEAST_MARGIN) * self.spread
         if not is_line and np.isfinite(max_extrapolation):
-            margin = np.minimum(margin, _MOST_OF_RANGE * (self.maximum - self.minimum))
-        margin = np.maximum(margin, _LEAST_MARGIN * self.spread)
+            margin = _PART_OF_RANGE * (self.maximum - self.minimum)
         low, high = self.minimum - margin, self.maximum + margin
         return np.stack([np.maximum(low, self.lower), np.minimum(high, self.upper)])
 

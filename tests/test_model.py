@@ -204,12 +204,12 @@ TARGET = TargetRange(np.array([-0.5]), np.array([0.5]), np.array([0.4]))
 
 
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
-@pytest.mark.parametrize(("limit", "margin"), [(0.0, 0.2), (0.5, 0.2), (0.6, 0.24), (1.0, 0.25)])
-def test_outputs_are_held_beside_the_range_of_the_target(policy, limit, margin):
+@pytest.mark.parametrize("limit", [0.0, 0.5, 2.0])
+def test_outputs_are_held_beside_the_range_of_the_target(policy, limit):
     free = build(scattered(), out_of_bounds=policy, max_extrapolation=limit)
     X = np.random.default_rng(4).uniform(-4.0, 4.0, (500, 3))
     said, answer = free.predict(X), replace(free, target=TARGET).predict(X)
-    low, high = -0.5 - margin, 0.5 + margin
+    low, high = -0.75, 0.75
     assert (said < low).any()
     assert (said > high).any()
     assert_array_equal(answer, np.clip(said, low, high))
@@ -221,8 +221,7 @@ def test_no_row_however_far_is_answered_beyond_the_limits():
     y = np.sin(X[:, 0]) + 0.1 * g.standard_normal(200)
     estimator = ANFISRegressor(3).fit(X, y, sample_weight=weight)
     own = y[weight > 0]
-    deviation = np.sqrt(np.cov(y, fweights=weight, ddof=0))
-    limits = [own.min() - 0.5 * deviation, own.max() + 0.5 * deviation]
+    limits = [own.min() - 0.25 * np.ptp(own), own.max() + 0.25 * np.ptp(own)]
     assert_allclose(estimator.model_.output_limits[:, 0], limits, rtol=1e-12)
     anywhere = estimator.model_.predict(g.standard_t(0.5, (2000, 3)))
     assert anywhere.min() >= limits[0]

@@ -25,15 +25,15 @@ def test_policies_in_words():
 @pytest.mark.parametrize("is_line", [False, True])
 @pytest.mark.parametrize("max_extrapolation", [0.0, 0.5, 0.7, 2.0, np.inf])
 @pytest.mark.parametrize(("offset", "scale"), [(0.0, 1.0), (10.0, 2.0), (-1e3, 1e-6)])
-def test_limits_are_the_range_and_a_margin_in_deviations(max_extrapolation, is_line, offset, scale):
+def test_limits_are_the_range_and_a_margin(max_extrapolation, is_line, offset, scale):
     y = np.random.default_rng(0).standard_normal((50, 2)) * [1.0, 5.0]
     own = TargetRange(y.min(axis=0), y.max(axis=0), y.std(axis=0))
     moved = offset + scale * y
-    # As far as inputs are followed, but half a deviation at the least, and where there is an end
-    # to it and rules that bend, a quarter of the range at most.
+    # Of a line as far as inputs are followed, but half a deviation at the least; of rules that
+    # bend, where there is an end to it, a quarter of the range.
     margin = max(max_extrapolation, 0.5) * moved.std(axis=0)
     if not is_line and max_extrapolation < np.inf:
-        margin = np.minimum(margin, 0.25 * np.ptp(moved, axis=0))
+        margin = 0.25 * np.ptp(moved, axis=0)
     found = own.change_units(offset, np.full(2, scale)).limits(max_extrapolation, is_line)
     assert_allclose(found, [moved.min(axis=0) - margin, moved.max(axis=0) + margin], rtol=1e-9)
 
@@ -42,8 +42,8 @@ def test_limits_are_the_range_and_a_margin_in_deviations(max_extrapolation, is_l
 def test_limits_that_were_asked_for_come_first(max_extrapolation):
     own = TargetRange(np.array([0.0, 0.0]), np.array([4.0, 4.0]), np.array([1.0, 1.0]))
     asked = own.within(np.array([-0.2, -9.0]), np.array([np.inf, 4.1]), np.empty((0, 2)))
-    end = np.inf if max_extrapolation == np.inf else 4.5
-    low = -9.0 if max_extrapolation == np.inf else -0.5
+    end = np.inf if max_extrapolation == np.inf else 5.0
+    low = -9.0 if max_extrapolation == np.inf else -1.0
     found = asked.limits(max_extrapolation, is_line=False)
     assert_allclose(found, [[-0.2, low], [end, 4.1]], rtol=1e-12)
     moved = asked.change_units(np.array([1.0, 0.0]), np.array([2.0, 0.1]))
@@ -55,13 +55,14 @@ def test_what_is_known_beyond_what_was_seen_counts_as_seen():
     own = TargetRange(np.array([0.0]), np.array([4.0]), np.array([1.0]))
     nothing = np.array([-np.inf]), np.array([np.inf])
     found = own.within(*nothing, np.array([[6.0], [-2.0]])).limits(0.5, is_line=False)
-    assert_allclose(found, [[-2.5], [6.5]], rtol=1e-12)
+    assert_allclose(found, [[-4.0], [8.0]], rtol=1e-12)
     found = own.within(np.array([5.0]), np.array([np.inf]), np.empty((0, 1)))
-    assert_allclose(found.limits(0.5, is_line=False), [[5.0], [5.5]], rtol=1e-12)
+    assert_allclose(found.limits(0.5, is_line=False), [[5.0], [6.25]], rtol=1e-12)
     found = own.within(np.array([-np.inf]), np.array([-3.0]), np.empty((0, 1)))
-    assert_allclose(found.limits(0.5, is_line=False), [[-3.5], [-3.0]], rtol=1e-12)
+    assert_allclose(found.limits(0.5, is_line=False), [[-4.75], [-3.0]], rtol=1e-12)
 
 
-def test_target_that_is_constant_is_left_half_of_its_unit():
+def test_rules_go_nowhere_beyond_a_constant_target_and_a_line_half_of_its_unit():
     own = TargetRange(np.array([3.0]), np.array([3.0]), np.array([1.0]))
-    assert_allclose(own.limits(2.0, is_line=False), [[2.5], [3.5]], rtol=1e-12)
+    assert_allclose(own.limits(2.0, is_line=False), [[3.0], [3.0]], rtol=1e-12)
+    assert_allclose(own.limits(0.0, is_line=True), [[2.5], [3.5]], rtol=1e-12)

@@ -391,7 +391,7 @@ def test_a_target_that_is_constant_has_no_deviation(rng):
 
 
 def test_limits_are_not_told_as_those_of_the_rows(rng):
-    """They leave half a deviation on either side."""
+    """They leave half a deviation on either side of a line."""
     X = rng.uniform(size=(60, 1))
     model = ANFISRegressor(n_mfs=1).fit(X, np.repeat([0.0, 1.0], 30))
     assert "No prediction leaves these limits: y, -0.25 to 1.25." in export_text(model)
