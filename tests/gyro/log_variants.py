@@ -124,7 +124,7 @@ def _time_form(log, table, header, units, told, rng, story):
         table["time"] = seconds * UNITS["time"][units["time"]][0]
     form = str(rng.choice(["", "", "%Y-%m-%d %H:%M:%S", "%d.%m.%Y %H:%M:%S", "%H:%M:%S"]))
     if form:
-        moments = pd.Timestamp("2026-03-01 08:00") + pd.to_timedelta(seconds, unit="s")
+        moments = pd.Timestamp("2026-03-01 20:00") + pd.to_timedelta(seconds, unit="s")
         table["time"], units["time"], told["time"] = moments.strftime(form), "clock", True
         header["time"] = str(rng.choice(["Time", "Timestamp", "Uhrzeit"]))
         story.append(f"clock {form}")
