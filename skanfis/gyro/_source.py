@@ -230,18 +230,12 @@ def header_place(rows):
     n_fields = len(rows[first]) if first < len(rows) else len(rows[start])
     fits = [k for k in range(start, first) if len(rows[k]) == n_fields]
     place = fits[-1] if fits else start
-    names = rows[place]
-    units = [unit_in(cell.strip(" []()")) for cell in names]
-    if len(fits) > 1 and sum(map(bool, units)) > 1 and all(
-        unit or not cell.strip(" []()-") for unit, cell in zip(units, names, strict=True)
-    ):  # fmt: skip
-        above, place = rows[fits[-2]], fits[-2]
-        told = [cell.strip(" []()-") for cell in names]
-        names = [
-            f"{name} [{unit}]" if unit else name for name, unit in zip(above, told, strict=True)
-        ]
-        return place, fits[-1] + 1, names
-    return place, place + 1, names
+    units = [cell.strip(" []()-") for cell in rows[place]]
+    n_units = sum(unit_in(unit) is not None for unit in units)
+    if len(fits) > 1 and n_units > 1 and n_units == sum(map(bool, units)):
+        above = zip(rows[fits[-2]], units, strict=True)
+        return fits[-2], place + 1, [f"{name} [{unit}]" if unit else name for name, unit in above]
+    return place, place + 1, rows[place]
 
 
 def _find_encoding(path):

@@ -91,7 +91,7 @@ Elapsed (min),Gyro Temp (°F),Gyro (deg/hr)«,Stage (deg/s)»,Chamber Setpoint (
     # Counts of a board, and the truth with its unit: the scale factor is learnt.
     "raw board": Instrument("utf-8", "\n", """\
 ms,temp_raw_C,adc_gyro«,encoder_dps»,vdd_mV
-{t[ms]:.12g},{T[C]:.12g},{y[counts]:.0f}«,{r[deg/s]:.12g}»,{vdd:.12g}""", False),
+{t[ms]:.12g},{T[C]:.12g},{y[counts]:.0f}«,{r[deg/s]:.12g}»,{vdd:.12g}"""),
 }  # fmt: skip
 
 

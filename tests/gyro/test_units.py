@@ -115,11 +115,12 @@ def test_all_files_tell_what_the_first_leaves_open(tmp_path, truth):
     found = reading(tmp_path, log, NAMES, (1, 1, 1, 1), paths=4)
     assert found.units["temperature"] == "degC"
     assert "taken as degC (10 to 50; degF?" in found.assumed["temperature"]
-    fahrenheit = reading(tmp_path, log.assign(temperature=log["temperature"] + 5), NAMES,
-                         (1, 1.8, 1, 1), (0, 32, 0, 0), paths=4)  # fmt: skip
+    # The last one hot: all is read again, in another unit than that of the first.
+    hotter = log.assign(temperature=log["temperature"].to_numpy()[::-1] + 5.0)
+    fahrenheit = reading(tmp_path, hotter, NAMES, (1, 1.8, 1, 1), (0, 32, 0, 0), paths=4)
     assert fahrenheit.units["temperature"] == "degF"
     assert "taken as degF (59 to 131; degC?" in fahrenheit.assumed["temperature"]
-    np.testing.assert_allclose(fahrenheit.log["temperature"], log["temperature"] + 5, atol=1e-9)
+    np.testing.assert_allclose(fahrenheit.log["temperature"], hotter["temperature"], atol=1e-9)
 
 
 @pytest.mark.parametrize(
