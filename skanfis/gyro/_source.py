@@ -284,7 +284,7 @@ class Clock:
     """
 
     def __init__(self, sample):
-        texts = _texts(sample).dropna()[:_CLOCK_ROWS]
+        texts = _plain(sample).dropna()[:_CLOCK_ROWS]
         fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
         best = max(_FORMATS, key=lambda form: fits[form])
         self.form = best if 2 * fits[best] > len(texts) else ""
@@ -292,7 +292,7 @@ class Clock:
 
     def seconds(self, column):
         """Seconds since 1970, or since the midnight before the first row; NaN for no time."""
-        seconds = _moments(_texts(column), self.form)
+        seconds = _moments(_plain(column), self.form)
         known = np.flatnonzero(np.isfinite(seconds))
         if known.size:
             seconds[known] = self._going_on(seconds[known], column.iloc[known])
@@ -322,8 +322,12 @@ def dated(dates, times):
     return _texts(dates).str.cat(_texts(times), sep=" ")
 
 
+def _plain(column):
+    """Texts with single blanks between words, and decimal points."""
+    return _texts(column).str.replace(r",?\s+", " ", regex=True).str.replace(",", ".")
+
+
 def _moments(texts, form):
-    texts = texts.str.replace(r",?\s+", " ", regex=True).str.replace(",", ".")
     if form == CLOCK:
         clocks = texts.where(
             texts.str.fullmatch(r"[0-9]{1,6}(:[0-9]{1,2}){2}(\.[0-9]*)?", na=False)

@@ -202,7 +202,7 @@ def physics_json(log, tmp_path_factory):
 
 def test_other_estimators_are_not_written(log, tmp_path):
     path = tmp_path / "never.json"
-    for estimator in (LinearRegression(), ResidualRegressor(LinearRegression())):
+    for estimator in (LinearRegression(), ResidualRegressor(LinearRegression(), quick(1))):
         estimator.fit(np.random.default_rng(0).random((30, 4)), np.arange(30.0))
         with pytest.raises(TypeError):
             GyroCompensator(estimator, INPUTS).write_json(path)
