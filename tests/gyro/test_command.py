@@ -39,18 +39,14 @@ def log():
 
 
 @pytest.fixture
-def run(tmp_path, capsys):
-    """What runs the command on a log; it gives the exit code, and what is said on both streams."""
+def run(tmp_path, say):
+    """The same for a log, which is written first if it is a table."""
 
     def run(log, typed="", output=tmp_path / "out"):
         if isinstance(log, pd.DataFrame):
             log.to_csv(tmp_path / "log.csv", index=False)
             log = tmp_path / "log.csv"
-        try:
-            code = main([str(log), *typed.split(), "--output", str(output)])
-        except SystemExit as stopped:
-            code = stopped.code
-        return code, *capsys.readouterr()
+        return say(log, *typed.split(), "--output", output)
 
     return run
 
@@ -187,12 +183,12 @@ def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind,
 
 
 @pytest.mark.usefixtures("no_report")
-def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
+def test_progress_and_summary(tmp_path, log, say, monkeypatch):
     monkeypatch.chdir(tmp_path)
     log[log["run"] < 3].to_csv("log.csv", index=False)
-    typed = "--inputs temperature output --limits residual_rms=90deg/s residual_rms=1e-9deg/s"
-    assert main(["log.csv", *typed.split()]) == 0
-    out, err = capsys.readouterr()
+    limits = ["residual_rms=90deg/s", "residual_rms=1e-9deg/s"]
+    code, out, err = say("log.csv", "--inputs", "temperature", "output", "--limits", *limits)
+    assert code == 0
     assert "specification  1 of 2 limits are kept; not kept: residual rms" in out
     assert (tmp_path / "log-compensator" / "report.html").exists()
     for text in ("reading", "270 rows, 3 runs", "fold 3 of 3", "done"):
@@ -320,8 +316,8 @@ def test_options_that_make_no_sense(tmp_path, log, typed, message, run):
     assert names_in(tmp_path) == ["log.csv"]
 
 
-def test_help_names_every_option(run):
-    code, told, _ = run("log.csv", "--help")
+def test_help_names_every_option(say):
+    code, told, _ = say("--help")
     assert code == 0
     for text in ("exit codes", "--apply MODEL", *make_parser()._option_string_actions):
         assert text in told
@@ -330,14 +326,14 @@ def test_help_names_every_option(run):
 @pytest.mark.usefixtures("no_report")
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")
 @pytest.mark.parametrize("apply", [False, True])
-def test_a_log_whose_name_is_not_utf8(calibrated, tmp_path, apply, monkeypatch, capsys):
+def test_a_log_whose_name_is_not_utf8(calibrated, tmp_path, apply, monkeypatch, say):
     monkeypatch.chdir(tmp_path)
     path = os.fsdecode(b"raw\xff.csv")
     shutil.copy(calibrated / "raw.csv", path)
     how = f"--apply {calibrated / 'out' / 'compensator.json'}" if apply else SMALL
-    assert main([path, *f"{RAW} --columns rate=table {how}".split()]) == 0
-    told = "".join(capsys.readouterr())
-    assert "raw\\udcff" in told
+    code, *told = say(path, *f"{RAW} --columns rate=table {how}".split())
+    told = "".join(told)
+    assert (code, "raw\\udcff" in told) == (0, True)
     told.encode("utf-8")
     assert len(list(tmp_path.iterdir())) == 2
 

@@ -30,26 +30,6 @@ def table(folder, log, name="log.csv", **options):
 
 
 @pytest.mark.parametrize(
-    ("part", "unit", "values", "expected"),
-    [
-        ("time", "ms", [0, 1500], [0.0, 1.5]),
-        ("time", "min", [0, 2], [0.0, 120.0]),
-        ("temperature", "K", [273.15, 300.0], [0.0, 26.85]),
-        ("temperature", "degF", [32.0, 212.0], [0.0, 100.0]),
-        ("rate", "rad/s", [0.0, np.pi], [0.0, 180.0]),
-        ("rate", "deg/h", [0.0, 3600.0], [0.0, 1.0]),
-        ("output", "mrad/s", [0.0, 1000 * np.pi], [0.0, 180.0]),
-        ("output", "counts", [0.0, 7.0], [0.0, 7.0]),
-    ],
-)
-def test_units_are_converted(tmp_path, part, unit, values, expected):
-    frame = pd.DataFrame({"time": [0, 1], "temperature": 20, "output": 1, "rate": 1})
-    frame[part] = values
-    read = read_log(table(tmp_path, frame), units={part: unit})
-    np.testing.assert_allclose(read[part], expected, atol=1e-12)
-
-
-@pytest.mark.parametrize(
     ("device", "run", "labels"),
     [
         (["a", "a", "b", "b"], [1, 2, 1, 2], ["a / 1", "a / 2", "b / 1", "b / 2"]),

@@ -61,7 +61,7 @@ def outcome(case, logs, folder):
         each["time"] = each["time"].diff().where(run == run.shift(), 0.0)
     for part in set(clean) - {"run"}:
         off = np.abs(log[part] - clean[part]).max()
-        if not off <= 1e-4 * np.abs(clean[part]).max():
+        if not off <= 1e-6 * np.abs(clean[part]).max():
             return "wrong", f"{part} off by {off:.3g}"
     return "read", ""
 
