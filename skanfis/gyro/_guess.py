@@ -195,7 +195,7 @@ class _Column:
         numbers = as_numbers(values, decimal)
         self.aligned = np.where(np.isfinite(numbers), numbers, np.nan)
         self.numbers = numbers[np.isfinite(numbers)]
-        self.is_time = False
+        self.is_time = values.dtype.kind in "mM"
         if self.numbers.size <= 0.5 * len(values):
             self.numbers = np.empty(0)
             self.is_time = Clock(values).form != ""

@@ -345,6 +345,7 @@ def test_a_file_of_excel_with_lines_above_the_header(tmp_path, truth):
     same(reading, truth)
     np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-5)
     assert reading.name_row(0).endswith("row 4")
+    assert reading.assumed == {}
     assert {"of 2 sheets 'data' is read", "2 rows above the header are passed over"} <= set(
         reading.notes
     )
