@@ -1,6 +1,4 @@
-"""``--apply`` gives what the compensator gives, however the log is read, and names bad rows."""
-
-import re
+"""``--apply`` gives what the compensator gives, however the log is read."""
 
 import numpy as np
 import pandas as pd
@@ -82,30 +80,3 @@ def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatc
         np.testing.assert_allclose(
             pieces["rate_compensated"], direct["rate_compensated"], rtol=1e-9, atol=1e-11
         )
-
-
-BAD = {
-    "time": (249, 0.0, r"line 251.*time does not increase"),
-    "temperature": (299, 1e4, r"line 301.*not plausible"),
-    "output": (203, 1e9, r"line 205.*not plausible"),
-    "rate": (0, 0.0, "time in a larger unit than s"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_rows_are_named_by_their_place_in_the_file(
-    log, model, case, tmp_path, monkeypatch, say
-):
-    monkeypatch.setattr("skanfis.gyro.log._ROWS", 50)
-    row, value, said = BAD[case]
-    table = one_run(log).assign(run="only")
-    table.loc[row, case] = value
-    if case == "rate":
-        # Of its time a ten-thousandth: no 50 rows heat by 5 degrees, the run does.
-        table = table.assign(time=table["time"] / 1e4, temperature=table.index / 15.0)
-    path = tmp_path / "log.csv"
-    table.to_csv(path, index=False)
-    code, _, err = say("--apply", model, path, "--output", tmp_path / "x.csv")
-    assert code == 3
-    assert re.search(said, err.replace("\n", " "))
-    assert not (tmp_path / "x.csv").exists()
