@@ -174,22 +174,16 @@ def test_stamps_of_today_that_fall_by_little_are_told_apart(log):
         check_log(log.assign(time=times))
 
 
-@pytest.mark.parametrize(
-    ("part", "inputs"),
-    [
-        *(("output", ["temperature", "output"]), ("temperature", ["temperature"])),
-        *(("time", ["time"]), ("time", ["temperature_rate"])),
-    ],
-)
-def test_a_log_without_one_of_the_inputs_is_refused(log, part, inputs):
-    with pytest.raises(LogError, match=f"the log has no {part}"):
-        check_log(log.drop(columns=part), inputs=inputs)
-
-
-@pytest.mark.parametrize("factor", [1e-40, 1e40])
-def test_a_raw_signal_beyond_any_converter_is_refused(log, factor):
-    with pytest.raises(LogError, match="counts are not plausible"):
-        check_log(log.assign(output=factor * log["output"]), units={"output": "counts"})
+def test_a_log_without_an_input_or_beyond_any_converter_is_refused(log):
+    for part, name in (
+        *(("output", "output"), ("temperature", "temperature")),
+        *(("time", "time"), ("time", "temperature_rate")),
+    ):
+        with pytest.raises(LogError, match=f"the log has no {part}"):
+            check_log(log.drop(columns=part), inputs=[name])
+    for factor in (1e-40, 1e40):
+        with pytest.raises(LogError, match="counts are not plausible"):
+            check_log(scaled("output", factor)(log), units={"output": "counts"})
 
 
 def test_a_log_at_rest_is_told_from_one_that_moves(log):
