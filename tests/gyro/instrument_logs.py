@@ -139,5 +139,5 @@ def in_units(rate):
         "rad/s": np.radians(rate),
         "deg/h": 3600.0 * rate,
         "mdeg/s": 1e3 * rate,
-        "counts": -27e3 * rate,
+        "counts": -27e5 * rate,
     }
