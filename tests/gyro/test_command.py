@@ -63,8 +63,9 @@ def no_report(monkeypatch, few_rivals):
 
 @pytest.fixture
 def no_pictures(monkeypatch):
-    """A report of words and tables."""
+    """A report of words and tables; of other pictures nothing is painted."""
     monkeypatch.setattr("skanfis.gyro._results._PICTURES", {})
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
 
 
 def raw(log, kelvin=273.15):
