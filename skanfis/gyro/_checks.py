@@ -92,10 +92,9 @@ def check_log(
     if len(log) < (_FEWEST_ROWS if len(inputs) else 1):
         rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
         raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
-    for name in inputs:
-        for part in ("time", "temperature") if name == "temperature_rate" else (name,):
-            if part not in log:
-                raise LogError(f"the log has no {part}.")
+    for part in columns_of(inputs):
+        if part not in log:
+            raise LogError(f"the log has no {part}.")
     runs = log["run"] if "run" in log else np.zeros(len(log))
     check_rows(log, units, pd.factorize(runs, use_na_sentinel=False)[0])
     n_runs = log["run"].nunique() if "run" in log and len(inputs) else 1
@@ -117,6 +116,12 @@ def check_log(
     if "output" in inputs and "rate" in log:
         _check_output_follows_rate(log, units)
     return log
+
+
+def columns_of(inputs):
+    """Columns of a log that the inputs of a compensator are made of."""
+    made = {"temperature_rate": ("time", "temperature")}
+    return dict.fromkeys(part for name in inputs for part in made.get(name, (name,)))
 
 
 def check_rows(log, units, runs):

@@ -172,7 +172,7 @@ def _guess(source, request, layout, first):
         moments = {k: Clock(dated(sample[k], sample[place])) for k in texts if k not in taken}
         layout.dates = [k for k, clock in moments.items() if clock.form][:1]
     _settle_units(columns, layout, of_first)
-    layout.notes += _sentences(layout)
+    layout.notes.append(_sentence(layout))
 
 
 class _Column:
@@ -195,7 +195,7 @@ class _Column:
         numbers = as_numbers(values, decimal)
         self.aligned = np.where(np.isfinite(numbers), numbers, np.nan)
         self.numbers = numbers[np.isfinite(numbers)]
-        self.is_time = False
+        self.is_time = values.dtype.kind in "mM"
         if self.numbers.size <= 0.5 * len(values):
             self.numbers = np.empty(0)
             self.is_time = Clock(values).form != ""
@@ -254,8 +254,6 @@ def _settle_axis(columns, layout):
         return
     rate = columns[layout.places["rate"]].aligned
     own = [columns[layout.places["output"]], *others]
-    if not rate.size or any(not column.aligned.size for column in own):
-        return
     table = pd.DataFrame({column.place: column.aligned for column in own})
     follows = table.corrwith(pd.Series(rate)).abs() > _FOLLOWS
     if follows.sum() == 1:
@@ -282,8 +280,8 @@ def _settle_units(columns, layout, of_first):
     layout.assumed = [part for part in PARTS if part in found]
 
 
-def _sentences(layout):
-    """Which columns were taken in which units, in words, and which of these were assumed."""
+def _sentence(layout):
+    """Which columns were taken in which units, in words."""
     told = []
     for part in (part for part in PARTS if part in layout.places):
         name, unit = layout.name(part), layout.units.get(part, "")
@@ -294,7 +292,7 @@ def _sentences(layout):
             + "".join(f" on {layout.header[k]!r}" for k in layout.dates if part == "time")
             + (f" ({others} would do too)" if others else "")
         )
-    yield f"columns: {'; '.join(told)}. Say otherwise with --columns and --units"
+    return f"columns: {'; '.join(told)}. Say otherwise with --columns and --units"
 
 
 def _place(source, name, taken):

@@ -230,18 +230,12 @@ def header_place(rows):
     n_fields = len(rows[first]) if first < len(rows) else len(rows[start])
     fits = [k for k in range(start, first) if len(rows[k]) == n_fields]
     place = fits[-1] if fits else start
-    names = rows[place]
-    units = [unit_in(cell.strip(" []()")) for cell in names]
-    if len(fits) > 1 and sum(map(bool, units)) > 1 and all(
-        unit or not cell.strip(" []()-") for unit, cell in zip(units, names, strict=True)
-    ):  # fmt: skip
-        above, place = rows[fits[-2]], fits[-2]
-        told = [cell.strip(" []()-") for cell in names]
-        names = [
-            f"{name} [{unit}]" if unit else name for name, unit in zip(above, told, strict=True)
-        ]
-        return place, fits[-1] + 1, names
-    return place, place + 1, names
+    units = [cell.strip(" []()-") for cell in rows[place]]
+    n_units = sum(unit_in(unit) is not None for unit in units)
+    if len(fits) > 1 and n_units > 1 and n_units == sum(map(bool, units)):
+        above = zip(rows[fits[-2]], units, strict=True)
+        return fits[-2], place + 1, [f"{name} [{unit}]" if unit else name for name, unit in above]
+    return place, place + 1, rows[place]
 
 
 def _find_encoding(path):
@@ -290,7 +284,7 @@ class Clock:
     """
 
     def __init__(self, sample):
-        texts = _texts(sample).dropna()[:_CLOCK_ROWS]
+        texts = _plain(sample).dropna()[:_CLOCK_ROWS]
         fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
         best = max(_FORMATS, key=lambda form: fits[form])
         self.form = best if 2 * fits[best] > len(texts) else ""
@@ -298,7 +292,7 @@ class Clock:
 
     def seconds(self, column):
         """Seconds since 1970, or since the midnight before the first row; NaN for no time."""
-        seconds = _moments(_texts(column), self.form)
+        seconds = _moments(_plain(column), self.form)
         known = np.flatnonzero(np.isfinite(seconds))
         if known.size:
             seconds[known] = self._going_on(seconds[known], column.iloc[known])
@@ -328,8 +322,12 @@ def dated(dates, times):
     return _texts(dates).str.cat(_texts(times), sep=" ")
 
 
+def _plain(column):
+    """Texts with single blanks between words, and decimal points."""
+    return _texts(column).str.replace(r",?\s+", " ", regex=True).str.replace(",", ".")
+
+
 def _moments(texts, form):
-    texts = texts.str.replace(r",?\s+", " ", regex=True).str.replace(",", ".")
     if form == CLOCK:
         clocks = texts.where(
             texts.str.fullmatch(r"[0-9]{1,6}(:[0-9]{1,2}){2}(\.[0-9]*)?", na=False)

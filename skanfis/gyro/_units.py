@@ -142,7 +142,8 @@ def _of_rates(values, units):
     """Units of the output and the rate, which tell one another where the gyro turns."""
     output, rate = (values.get(part, np.empty(0)) for part in ("output", "rate"))
     own, true = units.get("output"), units.get("rate")
-    if (own or not output.size) and (true or not rate.size):
+    lacking = [part for part in ("output", "rate") if part in values and part not in units]
+    if not lacking:
         return [{}]
     known = np.isfinite(output) & np.isfinite(rate) if output.size and rate.size else []
     turns = np.any(known) and np.ptp(rate[known]) > 0.0
@@ -163,11 +164,8 @@ def _of_rates(values, units):
             < _AS_THE_RATE[1]
         ]
         pairs = pairs or [(own or "counts", other) for other in rates]
-    found = []
-    for each, other in pairs:
-        new = {} if own or not output.size else {"output": each}
-        found.append(new | ({} if true or not rate.size else {"rate": other}))
-    return found
+    readings = [{"output": each, "rate": other} for each, other in pairs]
+    return [{part: reading[part] for part in lacking} for reading in readings]
 
 
 def _of_rate(rate):

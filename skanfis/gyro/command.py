@@ -23,7 +23,7 @@ import pandas as pd
 from ..inspection.labels import printable
 from ..inspection.text import counted
 from ._calibration import Recipe, calibrate
-from ._checks import LABELS, check_at_rest, check_log
+from ._checks import LABELS, check_at_rest, check_log, columns_of
 from ._columns import SIGNALS
 from ._headline import errors_and_verdict, of_rates, rules_text
 from ._options import PROGRAM, check_kind, check_once, make_parser, request_of
@@ -128,9 +128,7 @@ def _where_from_and_to(options):
 
 def _read(options, paths, tell):
     """The reading of a checked log, and what the options ask of it. What was found out is told."""
-    required = ["temperature", "output"]
-    if {"time", "temperature_rate"} & set(options.inputs or ()):
-        required.append("time")
+    required = dict.fromkeys(["temperature", "output", *columns_of(options.inputs or ())])
     reading = read(paths, request_of(options, required), tell=tell, most_rows=_MOST_ROWS)
     if reading.assumed:
         reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
@@ -253,9 +251,7 @@ def _apply(options, tell):
     target = options.output or Path(f"{Path(paths[0]).stem}-compensated.csv")
     _refuse_existing([target], options.force, [*paths, options.apply])
     compensator = _compensator_of(options)
-    needed = {"output"} | set(compensator.inputs) - {"temperature_rate"}
-    if "temperature_rate" in compensator.inputs:
-        needed |= {"time", "temperature"}
+    needed = {"output", *columns_of(compensator.inputs)}
     units = dict(compensator.units)
     if units.get("output") in SIGNALS and "output" not in compensator.assumed:
         del units["output"]  # which is asked for again

@@ -29,6 +29,21 @@ def coarse_report():
 
 
 @pytest.fixture
+def say(capsys):
+    """What gives words to the command: its exit code, and what it says on both streams."""
+    from skanfis.gyro.command import main
+
+    def say(*words):
+        try:
+            code = main([str(word) for word in words])
+        except SystemExit as stopped:
+            code = stopped.code
+        return code, *capsys.readouterr()
+
+    return say
+
+
+@pytest.fixture
 def few_rivals(monkeypatch):
     """Of what is simpler than rules the simplest alone; test_calibration.py asks for the others."""
     every = _simpler.kinds

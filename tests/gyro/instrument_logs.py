@@ -5,210 +5,139 @@ last lines that are cut, are read in test_natural_logs.py. Where neither the hea
 settle the units, a log is ambiguous.
 """
 
-import io
+import re
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from .log_variants import Variant
 
-EXACT = {"rad/s": np.pi / 180.0, "deg/h": 3600.0, "mdeg/s": 1e3, "counts": 131.0, "mV": -12.5}
+
+class Instrument(NamedTuple):
+    """How a log looks: lines above, the header, and a row; what is in «» is not there at rest.
+
+    A row has its number n, the clock t and the moment, the temperature T, the output y, that of
+    axes that do not turn (a, b), and the rate r.
+    """
+
+    encoding: str
+    end: str
+    text: str
+    is_determined_at_rest: bool = True
+    decimal: str = "."
 
 
-class Case:
-    """A clean log to be written, and what is drawn for it."""
+INSTRUMENTS = {
+    # A data logger that scans channels: facts above, a scan number, alarms beside values.
+    "scan logger": Instrument("utf-16", "\r\n", """\
+Name:,Bench 3
+Acquisition Date:,3/1/2026 8:00:00 AM
+Instrument:,34970A
 
-    def __init__(self, source, log, rng):
-        self.source, self.rng = source, rng
-        start = 7200.0 * log["run"].astype(float) if "run" in log else 0.0
-        self.time = (log["time"] + start).to_numpy()  # runs tell themselves apart by long gaps
-        self.heat, self.gyro = (log[part].to_numpy() for part in ("temperature", "output"))
-        self.rate = log["rate"].to_numpy() if "rate" in log else None
-        self.rows = np.arange(len(log))
+Total Channels:,3
 
-    def pick(self, *choices):
-        return choices[int(self.rng.integers(len(choices)))]
-
-    def moments(self, form):
-        return (pd.Timestamp("2026-03-01 07:58:00") + pd.to_timedelta(self.time, "s")).strftime(
-            form
-        )
-
-    def columns(self, time, heat, gyro, rate):
-        """Pairs of a name and values; without a rate table none of it."""
-        found = [time, heat, gyro, *([rate] if self.rate is not None else [])]
-        return dict(found)
-
-    def noise(self, size=1.0):
-        return size * self.rng.normal(size=self.time.size)
-
-
-def lines_of(columns, separator, decimal=".", digits=10, quote="", tail=""):
-    """Header and rows of a table as text."""
-    texts = []
-    for values in columns.values():
-        if isinstance(values[0], str):
-            texts.append(list(values))
-        else:
-            texts.append([f"{value:.{digits}g}".replace(".", decimal) for value in values])
-    header = separator.join(f"{quote}{name}{quote}" for name in columns) + tail
-    return [header, *(separator.join(row) + tail for row in zip(*texts, strict=True))]
-
-
-def scan_logger(c):
-    """A data logger that scans channels: facts above, a scan number, alarms beside values."""
-    columns = c.columns(
-        ("Elapsed (s)", c.time),
-        ("101 <Gyro temp> (C)", c.heat),
-        ("102 <Gyro output> (deg/s)", c.gyro),
-        ("Table rate (deg/s)", c.rate),
-    )
-    columns = {"Scan": np.arange(1.0, c.time.size + 1.0)} | columns | {"Alarm": 0.0 * c.time}
-    above = ["Name:,Bench 3", "Acquisition Date:,3/1/2026 8:00:00 AM", "Instrument:,34970A", "",
-             "Total Channels:,3", ""]  # fmt: skip
-    return ".csv", "\r\n".join([*above, *lines_of(columns, ",")]), "utf-16", True
-
-
-def temperature_logger(c):
-    """A title, quoted names with serial numbers, dates with AM and PM."""
-    form = c.pick("%m/%d/%y %I:%M:%S %p", "%m/%d/%Y %H:%M:%S")
-    columns = c.columns(("Date Time, GMT+00:00", list(c.moments(form))), ("Temp, °C", c.heat),
-                        ("Gyro, deg/s", c.gyro), ("Ref rate, deg/s", c.rate))  # fmt: skip
-    columns = {"#": np.arange(1.0, c.time.size + 1.0)} | columns
-    text = "\n".join(['"Plot Title: gyro 7"', *lines_of(columns, ",", quote='"')])
-    return ".csv", text, "utf-8-sig", True
-
-
-def matlab_table(c):
-    unit = c.pick("rad/s", "deg/s")
-    factor, word = EXACT.get(unit, 1.0), unit.replace("/s", "ps").replace("degps", "dps")
-    columns = c.columns(
-        ("t_s", c.time),
-        ("T_degC", c.heat),
-        (f"gyro_{word}", factor * c.gyro),
-        (f"rate_ref_{word}", None if c.rate is None else factor * c.rate),
-    )
-    return ".txt", "\n".join(lines_of(columns, c.pick(",", "\t"), digits=15)), "utf-8", True
-
-
-def inertial_tool(c):
-    """Comment lines with two slashes, three axes, tabs."""
-    factor, axis = EXACT["rad/s"], c.pick("X", "Y", "Z")
-    gyro = {f"Gyr_{other} [rad/s]": 1e-4 * c.noise() for other in "XYZ"}
-    gyro[f"Gyr_{axis} [rad/s]"] = factor * c.gyro
-    if c.rate is None:
-        gyro = {f"Gyr_{axis} [rad/s]": factor * c.gyro}
-    columns = {"PacketCounter": np.arange(c.time.size) % 65536.0, "Time [s]": c.time, **gyro,
-               "Temperature [°C]": c.heat}  # fmt: skip
-    if c.rate is not None:
-        columns["Turntable [deg/s]"] = c.rate
-    above = ["// General information:", "//  Device ID: 0168", "//  Sample rate: 100.0 Hz"]
-    return ".txt", "\r\n".join([*above, *lines_of(columns, "\t")]), "utf-8", True
-
-
-def flight_controller(c):
-    """Whole microseconds, axes, no units but in the name of the clock; the rate tells the other."""
-    unit = c.pick("rad/s", "deg/s")
-    axis, factor = c.pick("X", "Y", "Z"), EXACT.get(unit, 1.0)
-    columns = {"TimeUS": np.round(1e6 * c.time + 4.2e7)}
-    columns |= {f"Gyr{other}": 1e-4 * c.noise() for other in "XYZ"}
-    columns[f"Gyr{axis}"] = factor * c.gyro
-    columns["T"] = c.heat
-    if c.rate is None:
-        columns = {name: values for name, values in columns.items() if name[:3] != "Gyr"}
-        columns["Gyr"] = factor * c.gyro
-    else:
-        columns["table_deg_s"] = c.rate
-    return ".csv", "\n".join(lines_of(columns, ",", digits=14)), "utf-8", c.rate is not None
-
-
-def array_program(c):
-    """Blanks between numbers in full, the names behind a hash."""
-    columns = c.columns(("time_s", c.time), ("temp_degC", c.heat), ("gyro_deg_s", c.gyro),
-                        ("rate_deg_s", c.rate))  # fmt: skip
-    table = pd.DataFrame(columns)
-    file = io.StringIO()
-    form = c.pick("%.18e", "%12.6f")
-    np.savetxt(
-        file, table.to_numpy(), fmt=form, header=" ".join(columns), comments=c.pick("# ", "% ", "")
-    )
-    return ".txt", file.getvalue(), "utf-8", True
-
-
-def aligned(c):
-    """Columns aligned by blanks, units on a line of their own."""
-    columns = c.columns(
-        ("Time", c.time), ("Temperature", c.heat), ("Gyro", c.gyro), ("Rate", c.rate)
-    )
-    units = ["[s]", "[degC]", "[deg/s]", "[deg/s]"][: len(columns)]
-    rows = ["".join(f"{name:>16}" for name in columns), "".join(f"{unit:>16}" for unit in units)]
-    rows += ["".join(f"{v:16.7f}" for v in row) for row in zip(*columns.values(), strict=True)]
-    return ".dat", "\n".join(rows), "utf-8", True
-
-
-def german_spreadsheet(c):
-    unit, factor = c.pick(("°/s", 1.0), ("°/h", 3600.0))
-    columns = c.columns(
-        ("Zeit [s]", c.time),
-        ("Temperatur [°C]", c.heat),
-        (f"Kreisel [{unit}]", factor * c.gyro),
-        ("Drehtisch [°/s]", c.rate),
-    )
-    tail = c.pick("", ";")
-    return ".csv", "\r\n".join(lines_of(columns, ";", ",", tail=tail)), "cp1252", True
-
-
-def american_chamber(c):
-    """Minutes and degrees Fahrenheit; a set point beside the temperature."""
-    columns = c.columns(("Elapsed (min)", c.time / 60.0), ("Gyro Temp (°F)", 1.8 * c.heat + 32.0),
-                        ("Gyro (deg/hr)", 3600.0 * c.gyro), ("Stage (deg/s)", c.rate))  # fmt: skip
-    columns["Chamber Setpoint (°F)"] = np.round(1.8 * c.heat + 32.0, -1)
-    return ".csv", "\r\n".join(lines_of(columns, ",", digits=12)), "utf-8", True
-
-
-def database(c):
-    """Moments by ISO 8601, lines of kinds above, empty first columns."""
-    columns = c.columns(
-        ("_time", list(c.moments("%Y-%m-%dT%H:%M:%SZ"))),
-        ("temperature_celsius", c.heat),
-        ("gyro_mdps", 1e3 * c.gyro),
-        ("reference_rate_mdps", None if c.rate is None else 1e3 * c.rate),
-    )
-    above = ["#datatype," + ",".join(["dateTime:RFC3339", *["double"] * (len(columns) - 1)]),
-             "#default" + "," * len(columns)]  # fmt: skip
-    rows = lines_of(columns, ",")
-    return ".csv", "\r\n".join([*above, *("," + row for row in rows)]), "utf-8", True
-
-
-def raw_board(c):
-    """Counts of a board, and the truth with its unit: the scale factor is learnt."""
-    if c.rate is None:
-        return matlab_table(c)
-    columns = {"ms": 1e3 * c.time, "temp_raw_C": c.heat, "adc_gyro": np.round(-27e3 * c.gyro),
-               "encoder_dps": c.rate, "vdd_mV": 3300.0 + c.noise()}  # fmt: skip
-    return ".log", "\n".join(lines_of(columns, ",", digits=12)), "utf-8", True
-
-
-MAKERS = [
-    scan_logger,
-    temperature_logger,
-    matlab_table,
-    inertial_tool,
-    flight_controller,
-    array_program,
-    aligned,
-    german_spreadsheet,
-    american_chamber,
-    database,
-    raw_board,
-]
+Scan,Elapsed (s),101 <Gyro temp> (C),102 <Gyro output> (deg/s),«Table rate (deg/s),»Alarm
+{n},{t[s]:.10g},{T[C]:.10g},{y[deg/s]:.10g},«{r[deg/s]:.10g},»0"""),
+    # A title, quoted names with commas, dates with AM and PM.
+    "temperature logger": Instrument("utf-8-sig", "\n", """\
+"Plot Title: gyro 7"
+"#","Date Time, GMT+00:00","Temp, °C","Gyro, deg/s"«,"Ref rate, deg/s"»
+{n},{moment:%m/%d/%y %I:%M:%S %p},{T[C]:.10g},{y[deg/s]:.10g}«,{r[deg/s]:.10g}»"""),
+    "MATLAB table": Instrument("utf-8", "\n", """\
+t_s,T_degC,gyro_radps«,rate_ref_radps»
+{t[s]:.15g},{T[C]:.15g},{y[rad/s]:.15g}«,{r[rad/s]:.15g}»"""),
+    # Comment lines with two slashes, three axes, tabs; a counter that begins anew.
+    "inertial tool": Instrument("utf-8", "\r\n", """\
+// General information:
+//  Device ID: 0168
+//  Sample rate: 100.0 Hz
+PacketCounter\tTime [s]\t«Gyr_X [rad/s]\t»Gyr_Y [rad/s]\t«Gyr_Z [rad/s]\t»Temp [°C]«\tTable [deg/s]»
+{counter}\t{t[s]:.10g}\t«{a:.10g}\t»{y[rad/s]:.10g}\t«{b:.10g}\t»{T[C]:.10g}«\t{r[deg/s]:.10g}»"""),
+    # Whole microseconds, axes, no units but in the name of the clock; the rate tells the other.
+    "flight controller": Instrument("utf-8", "\n", """\
+TimeUS,Gyr«X,GyrY,GyrZ»,T«,table_deg_s»
+{t[us]:.0f},{y[rad/s]:.14g}«,{a:.14g},{b:.14g}»,{T[C]:.14g}«,{r[deg/s]:.14g}»""", False),
+    # Blanks between numbers in full, the names behind the sign of a comment.
+    "array program": Instrument("utf-8", "\n", """\
+% time_s temp_degC gyro_deg_s« rate_deg_s»
+{t[s]:.18e} {T[C]:.18e} {y[deg/s]:.18e}« {r[deg/s]:.18e}»"""),
+    # Columns aligned by blanks, units on a line of their own.
+    "aligned": Instrument("utf-8", "\n", """\
+            Time     Temperature            Gyro«            Rate»
+             [s]          [degC]         [deg/s]«         [deg/s]»
+{t[s]:16.7f}{T[C]:16.7f}{y[deg/s]:16.7f}«{r[deg/s]:16.7f}»"""),
+    # A sign between columns at the end of each line too.
+    "German spreadsheet": Instrument("cp1252", "\r\n", """\
+Zeit [s];Temperatur [°C];Kreisel [°/h]«;Drehtisch [°/s]»;
+{t[s]:.10g};{T[C]:.10g};{y[deg/h]:.10g}«;{r[deg/s]:.10g}»;""", True, ","),
+    "German logger": Instrument("utf-16", "\n", """\
+Zeit;Temperatur [°C];Kreisel«;Drehtisch soll [deg/s]»
+{moment:%Y-%m-%dT%H:%M:%S.%f+01:00};{T[C]:.10g};{y[deg/s]:.10g}«;{r[deg/s]:.10g}»""", False, ","),
+    # Times of day past midnight; columns that are of no part.
+    "Windows logger": Instrument("cp1252", "\n", """\
+Time,Temp (°C),gyro_dps«,rate_true_deg_s»,temp_trend,seq
+{moment:%H:%M:%S.%f},{T[C]:.10g},{y[deg/s]:.10g}«,{r[deg/s]:.10g}»,1,{n}"""),
+    # Minutes and degrees Fahrenheit; a set point beside the temperature.
+    "American chamber": Instrument("utf-8", "\r\n", """\
+Elapsed (min),Gyro Temp (°F),Gyro (deg/hr)«,Stage (deg/s)»,Chamber Setpoint (°F)
+{t[min]:.12g},{T[F]:.12g},{y[deg/h]:.12g}«,{r[deg/s]:.12g}»,{T[F]:.0f}"""),
+    # Moments by ISO 8601, lines of kinds above, empty first columns.
+    "database": Instrument("utf-8", "\r\n", """\
+#datatype,dateTime:RFC3339,double,double«,double»
+#default,,,«,»
+,_time,temperature_celsius,gyro_mdps«,reference_rate_mdps»
+,{moment:%Y-%m-%dT%H:%M:%SZ},{T[C]:.10g},{y[mdeg/s]:.10g}«,{r[mdeg/s]:.10g}»"""),
+    # Counts of a board, and the truth with its unit: the scale factor is learnt.
+    "raw board": Instrument("utf-8", "\n", """\
+ms,temp_raw_C,adc_gyro«,encoder_dps»,vdd_mV
+{t[ms]:.12g},{T[C]:.12g},{y[counts]:.0f}«,{r[deg/s]:.12g}»,{vdd:.12g}"""),
+}  # fmt: skip
 
 
 def variant(number, logs, seed=0):
     """The variant of a number; the same for the same seed."""
-    rng = np.random.default_rng([seed, 77, number])
-    maker, source = MAKERS[number % len(MAKERS)], str(rng.choice(list(logs)))
-    case = Case(source, logs[source], rng)
-    suffix, content, encoding, is_determined = maker(case)
-    content = content.encode(encoding) if isinstance(content, str) else content
-    return Variant(number, source, suffix, content, is_determined, case.rows, maker.__name__)
+    n_instruments, noise = len(INSTRUMENTS), np.random.default_rng([seed, 77, number])
+    name = list(INSTRUMENTS)[number % n_instruments]
+    source = list(logs)[(number + number // n_instruments) % len(logs)]
+    log, instrument = logs[source], INSTRUMENTS[name]
+    is_at_rest = "rate" not in log
+    text = re.sub("«.*?»" if is_at_rest else "[«»]", "", instrument.text)
+    above, _, form = text.rpartition("\n")
+    rows = [form.format(**row).replace(".", instrument.decimal) for row in rows_of(log, noise)]
+    content = instrument.end.join([*above.split("\n"), *rows]).encode(instrument.encoding)
+    is_determined = instrument.is_determined_at_rest or not is_at_rest
+    return Variant(number, source, ".csv", content, is_determined, np.arange(len(log)), name)
+
+
+def rows_of(log, noise):
+    """What a row of an instrument may be made of, in every unit."""
+    start = 7200.0 * log["run"].astype(float) if "run" in log else 0.0
+    time = log["time"] + start  # runs tell themselves apart by long gaps
+    moments = pd.Timestamp("2026-03-01 19:58") + pd.to_timedelta(time, "s")
+    rates = log["rate"] if "rate" in log else np.zeros(len(log))
+    columns = time, moments, log["temperature"], log["output"], rates
+    for n, (t, moment, heat, output, rate) in enumerate(zip(*columns, strict=True), 1):
+        a, b = 1e-4 * noise.normal(size=2)
+        yield {
+            "n": n,
+            "counter": (n + 65_000) % 65_536,
+            "moment": moment,
+            "t": {"s": t, "ms": 1e3 * t, "us": 1e6 * t + 4.2e7, "min": t / 60.0},
+            "T": {"C": heat, "F": 1.8 * heat + 32.0},
+            "y": in_units(output),
+            "a": a,
+            "b": b,
+            "r": in_units(rate),
+            "vdd": 3300.0 + 1e4 * a,
+        }
+
+
+def in_units(rate):
+    return {
+        "deg/s": rate,
+        "rad/s": np.radians(rate),
+        "deg/h": 3600.0 * rate,
+        "mdeg/s": 1e3 * rate,
+        "counts": -27e5 * rate,
+    }

@@ -73,7 +73,7 @@ def variant(number, logs, seed=0):
     """The variant of a number; the same for the same seed."""
     rng = np.random.default_rng([seed, number])
     source = str(rng.choice(list(logs)))
-    log, story = logs[source], []
+    log = logs[source]
     parts = [part for part in NAMES if part in log]
     units = {part: str(rng.choice(list(UNITS[part]))) for part in parts}
     if source == "rest":
@@ -89,22 +89,22 @@ def variant(number, logs, seed=0):
         factor, offset = UNITS[part][units[part]]
         table[part] = log[part].to_numpy() * factor + offset
         header[part] = _name(part, units[part], told[part], rng)
-    table, header, rows = _time_form(log, table, header, units, told, rng, story)
-    if "run" in log and (rng.random() < 0.6 or "time" not in table):
+    _time_form(log, table, header, units, told, rng)
+    if "run" in log and rng.random() < 0.6:
         table["run"], header["run"] = log["run"].to_numpy(), str(rng.choice(["run", "Cycle"]))
     if nameless:
         header = {part: f"A{k}" for k, part in enumerate(header)}
     frame = pd.DataFrame(table)
     if source != "rest" and rng.random() < 0.2 and not nameless and told["output"]:
-        _add_axes(frame, header, rng, story)
+        _add_axes(frame, header, rng)
     for name in rng.choice(EXTRAS, rng.integers(0, 3), replace=False):
         frame[name], header[name] = rng.integers(0, 5, len(frame)), str(name)
-    frame, rows = _rows(frame, rows, rng, story)
+    frame, rows = _rows(frame, rng)
     frame = frame[list(rng.permutation(list(frame)))]
     is_determined = not nameless and not headless and _is_settled(log, units, told, source)
-    story += [f"units {units}", f"told {told}", "nameless" * nameless, "headless" * headless]
-    suffix, content = _written(frame, [header[name] for name in frame], headless, rng, story)
-    return Variant(number, source, suffix, content, is_determined, rows, "; ".join(story))
+    suffix, content = _written(frame, [header[name] for name in frame], headless, rng)
+    story = f"units {units}; told {told}"
+    return Variant(number, source, suffix, content, is_determined, rows, story)
 
 
 def _name(part, unit, is_told, rng):
@@ -116,22 +116,20 @@ def _name(part, unit, is_told, rng):
     return form.format(name, spelt.replace("/", "_per_") if form == "{}_{}" else spelt)
 
 
-def _time_form(log, table, header, units, told, rng, story):
+def _time_form(log, table, header, units, told, rng):
     """The clock as numbers or as a date; runs follow one another on one clock or begin anew."""
-    seconds, rows = log["time"].to_numpy(), np.arange(len(log))
+    seconds = log["time"].to_numpy()
     if "run" in log and rng.random() < 0.5:
         seconds = seconds + 7200.0 * log["run"].astype(float).to_numpy()
         table["time"] = seconds * UNITS["time"][units["time"]][0]
     form = str(rng.choice(["", "", "%Y-%m-%d %H:%M:%S", "%d.%m.%Y %H:%M:%S", "%H:%M:%S"]))
     if form:
-        moments = pd.Timestamp("2026-03-01 08:00") + pd.to_timedelta(seconds, unit="s")
+        moments = pd.Timestamp("2026-03-01 20:00") + pd.to_timedelta(seconds, unit="s")
         table["time"], units["time"], told["time"] = moments.strftime(form), "clock", True
         header["time"] = str(rng.choice(["Time", "Timestamp", "Uhrzeit"]))
-        story.append(f"clock {form}")
-    return table, header, rows
 
 
-def _add_axes(frame, header, rng, story):
+def _add_axes(frame, header, rng):
     name = header["output"]
     axes = ["gyro_x", "gyro_y", "gyro_z"]
     tail = name.partition("[")[2].partition("(")[0] or None
@@ -144,13 +142,12 @@ def _add_axes(frame, header, rng, story):
         if other != true:
             frame[other] = 1e-3 * size * rng.normal(size=len(frame))
             header[other] = f"{other} [{tail}"
-    story.append(f"axes, {true}")
 
 
-def _rows(frame, rows, rng, story):
+def _rows(frame, rng):
     """Values that are missing, rows that are lost, occur twice, or begin with the last."""
     kind = str(rng.choice(["", "", "", "cells", "lost", "twice", "reversed"]))
-    frame = frame.astype(object)
+    frame, rows = frame.astype(object), np.arange(len(frame))
     if kind == "cells":
         lacking = np.sort(rng.choice(np.arange(5, len(frame) - 5), 6, replace=False))
         begin = int(rng.integers(5, len(frame) // 3))
@@ -170,7 +167,6 @@ def _rows(frame, rows, rng, story):
         numbers = time if time.map(type).ne(str).all() else pd.Series(range(len(time)))
         if (np.diff(numbers.astype(float)) > 0).all() and ":" not in str(time.iloc[0])[2:3]:
             frame = frame[::-1]
-    story.append(kind)
     return frame, rows
 
 
@@ -195,14 +191,13 @@ def _is_settled(log, units, told, source):
     return bool(sure and (size > 38.4 or (source == "levels" and units["rate"] != "deg/s")))
 
 
-def _written(frame, header, headless, rng, story):
+def _written(frame, header, headless, rng):
     """The suffix and bytes of a file."""
     if not headless and rng.random() < 0.05:
         table = frame.set_axis(header, axis=1)
         if not any(table[name].map(type).eq(str).any() for name in table):
             buffer = io.BytesIO()
             table.astype(float).to_parquet(buffer)
-            story.append("parquet")
             return ".parquet", buffer.getvalue()
     separator = str(rng.choice([",", ",", ";", "\t", "|"]))
     decimal = "," if separator != "," and rng.random() < 0.4 else "."
@@ -219,7 +214,6 @@ def _written(frame, header, headless, rng, story):
     for row in frame.itertuples(index=False):
         writer.writerow([_cell(value, decimal) for value in row])
     text = "".join(line + end for line in lines) + buffer.getvalue()
-    story.append(f"{separator!r} {decimal!r} {encoding} {len(lines)} lines above")
     return str(rng.choice([".csv", ".txt", ".dat"])), text.encode(encoding, "replace")
 
 

@@ -1,6 +1,4 @@
-"""``--apply`` gives what the compensator gives, however the log is read, and names bad rows."""
-
-import re
+"""``--apply`` gives what the compensator gives, however the log is read."""
 
 import numpy as np
 import pandas as pd
@@ -8,7 +6,6 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
-from skanfis.gyro.command import main
 from skanfis.gyro.compensator import features
 from skanfis.gyro.log import read_log
 
@@ -57,16 +54,16 @@ def one_run(log):
 
 
 @pytest.mark.parametrize("kind", [labelled, interleaved, told_by_the_clock, one_run])
-def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatch, capsys):
+def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatch, say):
     path = tmp_path / "log.csv"
     kind(log).to_csv(path, index=False)
     tables, said = [], []
     for rows in (100_000, 197):
         monkeypatch.setattr("skanfis.gyro.log._ROWS", rows)
         target = tmp_path / f"rates{rows}.csv"
-        assert main(["--apply", str(model), str(path), "--output", str(target)]) == 0
+        code, out, err = say("--apply", model, path, "--output", target)
+        assert code == 0
         tables.append(pd.read_csv(target))
-        out, err = capsys.readouterr()
         notes = [line.partition("note:")[2] for line in err.splitlines() if "note:" in line]
         said.append(out.splitlines()[1:] + notes)
     whole, pieces = tables
@@ -83,29 +80,3 @@ def test_pieces_give_what_the_whole_gives(log, model, kind, tmp_path, monkeypatc
         np.testing.assert_allclose(
             pieces["rate_compensated"], direct["rate_compensated"], rtol=1e-9, atol=1e-11
         )
-
-
-BAD = {
-    "time": (249, 0.0, r"line 251.*time does not increase"),
-    "temperature": (299, 1e4, r"line 301.*not plausible"),
-    "output": (203, 1e9, r"line 205.*not plausible"),
-    "rate": (0, 0.0, "time in a larger unit than s"),
-}
-
-
-@pytest.mark.parametrize("case", BAD)
-def test_bad_rows_are_named_by_their_place_in_the_file(
-    log, model, case, tmp_path, monkeypatch, capsys
-):
-    monkeypatch.setattr("skanfis.gyro.log._ROWS", 50)
-    row, value, said = BAD[case]
-    table = one_run(log).assign(run="only")
-    table.loc[row, case] = value
-    if case == "rate":
-        # Of its time a ten-thousandth: no 50 rows heat by 5 degrees, the run does.
-        table = table.assign(time=table["time"] / 1e4, temperature=table.index / 15.0)
-    path = tmp_path / "log.csv"
-    table.to_csv(path, index=False)
-    assert main(["--apply", str(model), str(path), "--output", str(tmp_path / "x.csv")]) == 3
-    assert re.search(said, capsys.readouterr().err.replace("\n", " "))
-    assert not (tmp_path / "x.csv").exists()

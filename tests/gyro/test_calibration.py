@@ -30,11 +30,11 @@ def log_of(error, seed=0):
     return pd.DataFrame(columns)
 
 
-def folds_of(log, n_folds=3):
+def folds_of(log, n_folds=2):
     return list(GroupKFold(n_folds).split(log, groups=log["run"]))
 
 
-def split_of(log, n_folds=3):
+def split_of(log, n_folds=2):
     labels = log["run"].astype(str).to_numpy(dtype=object)
     return Split("run", folds_of(log, n_folds), labels, "runs held out")
 

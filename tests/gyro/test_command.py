@@ -2,9 +2,10 @@
 
 import io
 import os
+import re
 import shutil
 import sys
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import joblib
 import numpy as np
@@ -18,43 +19,53 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, command
+from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, _simpler, command
 from skanfis.gyro._options import make_parser
 from skanfis.gyro.command import main
 
 pytestmark = pytest.mark.usefixtures("given_weights", "coarse_report")
 
-RENAMED = ["--columns", "time=t_ms", "temperature=T", "output=counts", "rate=table"]
-UNITS = ["--units", "time=ms", "temperature=K", "output=counts"]
+RAW = "--columns time=t_ms temperature=T output=counts --units time=ms temperature=K output=counts"
 FACTOR = -27_000.0
 FILES = ["compensator.joblib", "compensator.json", "report.html", "rules.txt"]
-
-
 # A fit of the smallest kind, where it is not the question.
-SMALL = ["--inputs", "temperature", "output", "--terms", "1,2"]
-MEASURED = ("time", "temperature", "output", "rate", "run")
-
-
-def write_log(path, log, columns=MEASURED):
-    log[list(columns)].to_csv(path, index=False)
-    return str(path)
+SMALL = "--inputs temperature output --terms 1,2"
 
 
 @pytest.fixture(scope="module")
 def log():
-    return make_ofog(n_devices=1, n_runs=5, duration=900.0, random_state=0)
+    log = make_ofog(n_devices=1, n_runs=5, duration=900.0, random_state=0)
+    return log[["time", "temperature", "output", "rate", "run"]]
+
+
+@pytest.fixture
+def run(tmp_path, say):
+    """The same for a log, which is written first if it is a table."""
+
+    def run(log, typed="", output=tmp_path / "out"):
+        if isinstance(log, pd.DataFrame):
+            log.to_csv(tmp_path / "log.csv", index=False)
+            log = tmp_path / "log.csv"
+        return say(log, *typed.split(), "--output", output)
+
+    return run
+
+
+def names_in(folder):
+    return sorted(path.name for path in folder.iterdir())
 
 
 @pytest.fixture
 def no_report(monkeypatch, few_rivals):
     """Leave out the report and what it compares with, which take longer than all else together."""
-    monkeypatch.setattr("skanfis.gyro.command.report_page", lambda results, title: title)
+    monkeypatch.setattr(command, "report_page", lambda results, title: title)
 
 
 @pytest.fixture
 def no_pictures(monkeypatch):
-    """A report of words and tables."""
+    """A report of words and tables; of other pictures nothing is painted."""
     monkeypatch.setattr("skanfis.gyro._results._PICTURES", {})
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
 
 
 def raw(log, kelvin=273.15):
@@ -70,21 +81,21 @@ def raw(log, kelvin=273.15):
 
 
 @pytest.fixture(scope="module")
-def calibrated(tmp_path_factory, log, given_weights, coarse_report):
-    """A folder after one calibration from raw columns; without pictures."""
+def calibrated(tmp_path_factory, log, given_weights):
+    """A folder after one calibration from raw columns; without a report."""
     folder = tmp_path_factory.mktemp("calibrated")
-    table = raw(log).assign(table=log["rate"])
-    path = write_log(folder / "raw.csv", table, table.columns)
-    arguments = [path, *RENAMED, *UNITS, "--output", str(folder / "out"), "--terms", "1,2,1,3"]
+    raw(log).assign(table=log["rate"]).to_csv(folder / "raw.csv", index=False)
+    typed = f"{RAW} --columns rate=table --terms 1,2,1,3 --c c99 --write rules".split()
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("skanfis.gyro._results._PICTURES", {})
-        assert main([*arguments, "--c", "c99", "--write", "rules"]) == 0
+        patch.setattr(command, "report_page", lambda results, title: title)
+        every = _simpler.kinds
+        patch.setattr(_simpler, "kinds", lambda *given: islice(every(*given), 2))
+        assert main([str(folder / "raw.csv"), *typed, "--output", str(folder / "out")]) == 0
     return folder
 
 
 def test_it_writes_what_it_says_and_the_compensator_knows_units(calibrated, log):
-    found = sorted(path.name for path in (calibrated / "out").iterdir())
-    assert found == sorted([*FILES, "compensator.c", "compensator.h"])
+    assert names_in(calibrated / "out") == sorted([*FILES, "compensator.c", "compensator.h"])
     compensator = GyroCompensator.read_json(calibrated / "out" / "compensator.json")
     slope = np.polyfit(log["rate"], FACTOR * log["output"], 1)[0]
     assert compensator.scale_factor == pytest.approx(slope, rel=1e-9)
@@ -97,38 +108,32 @@ def test_it_writes_what_it_says_and_the_compensator_knows_units(calibrated, log)
     pd.testing.assert_frame_equal(again, compensated, check_exact=True)
 
 
-def test_what_is_refused_once_there_is_a_compensator(calibrated, tmp_path, log, capsys):
-    path = write_log(tmp_path / "log.csv", log)
+def test_what_is_refused_once_there_is_a_compensator(calibrated, tmp_path, log, run):
     out = calibrated / "out"
     (tmp_path / "model.json").write_bytes(b"\x80\x04\x95")
     for model, told in (
         (out / "compensator.json", "calibrated for an output in counts; this is in deg/s"),
         (tmp_path / "model.json", "is no gyro compensator"),
     ):
-        with pytest.raises(SystemExit, match="2"):
-            main(["--apply", str(model), path, "--units", "temperature=degC", "time=s"])
-        assert told in capsys.readouterr().err
-    arguments = [str(calibrated / "raw.csv"), *RENAMED, *UNITS, "--output"]
+        code, _, err = run(log, f"--apply {model} --units temperature=degC time=s")
+        assert (code, told in err) == (2, True)
     before = (out / "report.html").stat().st_mtime_ns
-    assert main([*arguments, str(out)]) == 4
-    assert "exists already" in capsys.readouterr().err
-    assert main([*arguments, str(out / "rules.txt"), "--force"]) == 4
-    assert "is a file; --output is the folder" in capsys.readouterr().err
-    model = str(out / "compensator.json")
-    assert main([*arguments, str(out / "rules.txt"), "--apply", model]) == 4
+    for typed, output, told in (
+        ("", out, "exists already"),
+        ("--force", out / "rules.txt", "is a file; --output is the folder"),
+        (f"--apply {out / 'compensator.json'}", out / "rules.txt", "exists already"),
+    ):
+        code, _, err = run(calibrated / "raw.csv", f"{RAW} --columns rate=table {typed}", output)
+        assert (code, told in err) == (4, True)
     assert (out / "report.html").stat().st_mtime_ns == before
 
 
-def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path, log, capsys):
-    hot = raw(log, kelvin=293.15)
-    path = write_log(tmp_path / "hot.csv", hot, hot.columns)
-    target = tmp_path / "hot-rates.csv"
-    model = str(calibrated / "out" / "compensator.json")
-    arguments = [path, *RENAMED[:-1], *UNITS, "--output", str(target)]
-    assert main(["--apply", model, *arguments]) == 0
+def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path, log, run):
+    typed, target = f"{RAW} --apply {calibrated / 'out' / 'compensator.json'}", tmp_path / "r.csv"
+    code, out, _ = run(raw(log, kelvin=293.15), typed, target)
+    assert code == 0
     outside = log["temperature"] + 20.0 > log["temperature"].max()
     assert (pd.read_csv(target)["status"].to_numpy() & 1 != 0)[outside.to_numpy()].all()
-    out = capsys.readouterr().out
     assert "out of range" in out
     assert "before" not in out
 
@@ -143,12 +148,11 @@ def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path
         ("line", "a straight line", "c99"),
     ],
 )
-def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind, c, capsys):
-    path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
-    arguments = [path, "--inputs", "temperature", "output", "--terms", "1,1", "--c", c]
-    assert main([*arguments, "--write", write, "--output", str(out)]) == 0
-    said = capsys.readouterr().out
-    assert f"written is     {kind}, as" in said
+def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind, c, run):
+    log = log[log["run"] < 4]
+    code, said, _ = run(log, f"--inputs temperature output --terms 1,1 --c {c} --write {write}")
+    assert (code, f"written is     {kind}, as" in said) == (0, True)
+    out = tmp_path / "out"
     compensator = GyroCompensator.read_json(out / "compensator.json")
     X, rate = log[["temperature", "output"]], log["rate"]
     error = log["output"] - rate
@@ -180,12 +184,12 @@ def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind,
 
 
 @pytest.mark.usefixtures("no_report")
-def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
+def test_progress_and_summary(tmp_path, log, say, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    path = write_log(tmp_path / "log.csv", log[log["run"] < 3])
-    limits = ["--limits", "residual_rms=90deg/s", "residual_rms=1e-9deg/s"]
-    assert main([path, "--inputs", "temperature", "output", *limits]) == 0
-    out, err = capsys.readouterr()
+    log[log["run"] < 3].to_csv("log.csv", index=False)
+    limits = ["residual_rms=90deg/s", "residual_rms=1e-9deg/s"]
+    code, out, err = say("log.csv", "--inputs", "temperature", "output", "--limits", *limits)
+    assert code == 0
     assert "specification  1 of 2 limits are kept; not kept: residual rms" in out
     assert (tmp_path / "log-compensator" / "report.html").exists()
     for text in ("reading", "270 rows, 3 runs", "fold 3 of 3", "done"):
@@ -196,15 +200,12 @@ def test_progress_and_summary(tmp_path, log, capsys, monkeypatch):
 
 
 @pytest.mark.usefixtures("no_report")
-def test_physics_and_policy(tmp_path, log, capsys):
-    log = log[log["run"] < 3]
-    path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
-    arguments = [path, "--physics", "--terms", "1,2,1,1", "--outside", "nan", "--quiet"]
-    arguments += ["--write", "rules"]
-    assert main([*arguments, "--output", str(out), "--c", "c99"]) == 0
-    assert capsys.readouterr().err == ""
-    found = sorted(path.name for path in out.iterdir())
-    assert found == sorted([*FILES, "compensator.c", "compensator.h"])
+def test_physics_and_policy(tmp_path, log, run):
+    log, out = log[log["run"] < 3], tmp_path / "out"
+    typed = "--physics --terms 1,2,1,1 --outside nan --quiet --write rules --c c99"
+    code, _, err = run(log, typed)
+    assert (code, err) == (0, "")
+    assert names_in(out) == sorted([*FILES, "compensator.c", "compensator.h"])
     rules = (out / "rules.txt").read_text(encoding="utf-8")
     assert rules.startswith("rate [deg/s] = arcsin(output [deg/s]")
     assert "THEN rate beyond the law is " in rules
@@ -216,86 +217,109 @@ def test_physics_and_policy(tmp_path, log, capsys):
 
 
 @pytest.mark.usefixtures("no_report")
-def test_targets_are_written_or_refused_by_name(tmp_path, log, capsys):
-    path, out = write_log(tmp_path / "log.csv", log), tmp_path / "out"
-    arguments = [path, *SMALL, "--quiet", "--output", str(out), "--target", "rate-table"]
-    assert main([*arguments, "--target", "px4:x"]) == 5
-    told = capsys.readouterr().out
+def test_targets_are_written_or_refused_by_name(tmp_path, log, run):
+    typed, out = f"{SMALL} --quiet --write line", tmp_path / "out"
+    code, told, _ = run(log, f"{typed} --target rate-table --target px4:x")
+    assert code == 5
     assert "target         rate-table: it differs from the model by " in told
     assert "REFUSED        px4:x: the model needs temperature and output, and this target" in told
-    found = sorted(path.name for path in out.iterdir())
-    assert found == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
+    assert names_in(out) == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
     # What an earlier run has written goes with it, what is not the command's stays.
     for name in ("compensator.c", "px4.params", "notes.txt"):
         (out / name).write_text("old")
-    assert main([*arguments, "--force"]) == 0
-    assert sorted(path.name for path in out.iterdir()) == sorted([*found, "notes.txt"])
-    assert main(arguments) == 4
+    assert run(log, f"{typed} --force")[0] == 0
+    assert names_in(out) == sorted([*FILES, "notes.txt"])
+    assert run(log, typed)[0] == 4
 
 
 def one_run_without_levels(log):
     rate = log["output"] + np.random.default_rng(0).normal(size=len(log))
     warming = np.linspace(0.0, 40.0, len(log))
-    return log.assign(run=1, time=10.0 * np.arange(len(log)), rate=rate, temperature=warming)
+    clock = 10.0 * np.arange(len(log))
+    return log.assign(run=1, device=1, time=clock, rate=rate, temperature=warming)
+
+
+def groups_apart(log):
+    """Three runs, each warmest, coldest or fastest to warm from its first row on."""
+    apart = log[log["run"] < 3].groupby("run").head(20).copy()
+    apart["temperature"] = (20.0 * apart["run"]).where(apart["run"] < 2, 10.0)
+    apart[["output", "rate"]] += 200.0 * (apart[["run"]] == 2).to_numpy()
+    return apart
 
 
 @pytest.mark.parametrize(
-    ("spoil", "message"),
+    ("spoil", "typed", "message"),
     [
         (
             lambda log: log.assign(time=log["time"].round(-2)),
+            "",
             "log.csv, line 3, column 'time': time does not increase",
         ),
-        (lambda log: log.assign(temperature=20.0), "column 'temperature': the temperature spans 0"),
-        (one_run_without_levels, "could not be checked: the log has 1 device(s), 1 run(s)"),
+        (
+            lambda log: log.assign(temperature=20.0),
+            "",
+            "column 'temperature': the temperature spans 0",
+        ),
+        (
+            one_run_without_levels,
+            "",
+            r"could not be checked: the log has 1 device\(s\), 1 run\(s\)",
+        ),
+        (
+            groups_apart,
+            "--terms 1,1 --inputs temperature output --groups run",
+            "every row lies outside the range",
+        ),
+        (
+            # A glitch that hides all else is named by its line.
+            lambda log: log.assign(output=(1e4 * log["output"]).where(log.index != 100, 2**31 - 1)),
+            "--units output=counts",
+            r"log.csv, line 102, column 'output': does not follow the rate .* the wrong one\? No "
+            r"other row supports the output of 2.147e\+09 at a rate of",
+        ),
     ],
 )
-def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, message, capsys):
-    spoiled = spoil(log)
-    path = write_log(tmp_path / "log.csv", spoiled, spoiled.columns)
-    assert main([path, "--output", str(tmp_path / "out"), "--quiet"]) == 3
-    err = capsys.readouterr().err
-    assert message in err
+def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, message, run):
+    code, _, err = run(spoil(log), f"{typed} --quiet")
+    assert code == 3
+    assert re.search(message, err)
     assert err.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("typed", "message"),
     [
-        (["--columns", "time"], "'time' must be of the form PART=..."),
-        (["--columns", "speed=v"], "columns: there is no 'speed'"),
-        (["--columns", "time=a", "time=b"], "time is given twice"),
-        (["--units", "time=year"], "time has no unit 'year'"),
-        (["--terms", "2,x"], "must be search, or numbers"),
-        (["--terms", "2,2"], "has 2 numbers for 4 inputs: time, temperature, "),
-        (["--terms", "2", "--inputs", "time", "output"], "has 1 number for 2 inputs: time, output"),
-        (["--terms", "2,2", "--inputs", "output"], "has 2 numbers for 1 input: output."),
-        (["--physics", "--inputs", "temperature"], "needs the output"),
-        (["--inputs", "rate"], "invalid choice: 'rate'"),
-        (["--terms", "99999999,1,1,1"], "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
-        (["--terms", "9" * 9000], "must be search, or numbers"),
-        (["--inputs", "time", "time"], "--inputs: time is given twice"),
-        (["--scale-factor", "131"], "is for a raw signal at one rate"),
-        (["--target", "px4"], "'px4' must be one of: in C table"),
-        (["--target", "ardupilot:x:0"], "(1 to 3)"),
-        (["--target", "table", "table:q15"], "--target: table is given twice"),
-        (["--limits", "bias=5"], "bias takes deg/s or deg/h; found ''"),
+        ("--columns time", "'time' must be of the form PART=..."),
+        ("--columns speed=v", "columns: there is no 'speed'"),
+        ("--columns time=a time=b", "time is given twice"),
+        ("--units time=year", "time has no unit 'year'"),
+        ("--terms 2,x", "must be search, or numbers"),
+        ("--terms 2,2", "has 2 numbers for 4 inputs: time, temperature, "),
+        ("--terms 2 --inputs time output", "has 1 number for 2 inputs: time, output"),
+        ("--terms 2,2 --inputs output", "has 2 numbers for 1 input: output."),
+        ("--physics --inputs temperature", "needs the output"),
+        ("--inputs rate", "invalid choice: 'rate'"),
+        ("--terms 99999999,1,1,1", "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
+        (f"--terms {'9' * 9000}", "must be search, or numbers"),
+        ("--inputs time time", "--inputs: time is given twice"),
+        ("--scale-factor 131", "is for a raw signal at one rate"),
+        ("--target px4", "'px4' must be one of: in C table"),
+        ("--target ardupilot:x:0", "(1 to 3)"),
+        ("--target table table:q15", "--target: table is given twice"),
+        ("--limits bias=5", "bias takes deg/s or deg/h; found ''"),
     ],
 )
-def test_options_that_make_no_sense(tmp_path, log, arguments, message, capsys):
-    path = write_log(tmp_path / "log.csv", log)
-    with pytest.raises(SystemExit) as caught:
-        main([path, "--output", str(tmp_path / "out"), *arguments])
-    assert caught.value.code == 2
-    assert message in capsys.readouterr().err
-    assert sorted(tmp_path.iterdir()) == [tmp_path / "log.csv"]
+def test_options_that_make_no_sense(tmp_path, log, typed, message, run):
+    code, _, err = run(log, typed)
+    assert code == 2
+    assert message in err
+    assert names_in(tmp_path) == ["log.csv"]
 
 
-def test_help_names_every_option(capsys):
-    with pytest.raises(SystemExit, match="0"):
-        main(["--help"])
-    told = capsys.readouterr().out
+def test_help_names_every_option(say):
+    code, told, _ = say("--help")
+    assert code == 0
     for text in ("exit codes", "--apply MODEL", *make_parser()._option_string_actions):
         assert text in told
 
@@ -303,41 +327,39 @@ def test_help_names_every_option(capsys):
 @pytest.mark.usefixtures("no_report")
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")
 @pytest.mark.parametrize("apply", [False, True])
-def test_a_log_whose_name_is_not_utf8(calibrated, tmp_path, apply, monkeypatch, capsys):
+def test_a_log_whose_name_is_not_utf8(calibrated, tmp_path, apply, monkeypatch, say):
     monkeypatch.chdir(tmp_path)
     path = os.fsdecode(b"raw\xff.csv")
     shutil.copy(calibrated / "raw.csv", path)
-    how = ["--apply", str(calibrated / "out" / "compensator.json")] if apply else SMALL
-    assert main([path, *RENAMED, *UNITS, *how]) == 0
-    told = "".join(capsys.readouterr())
-    assert "raw\\udcff" in told
+    how = f"--apply {calibrated / 'out' / 'compensator.json'}" if apply else SMALL
+    code, *told = say(path, *f"{RAW} --columns rate=table {how}".split())
+    told = "".join(told)
+    assert (code, "raw\\udcff" in told) == (0, True)
     told.encode("utf-8")
     assert len(list(tmp_path.iterdir())) == 2
 
 
-def test_an_output_that_cannot_be_written_is_found_out_first(tmp_path, log, capsys):
-    path = write_log(tmp_path / "log.csv", log)
-    assert main([path, "--output", str(tmp_path / "log.csv" / "out" / "x")]) == 1
-    err = capsys.readouterr().err
+def test_an_output_that_cannot_be_written_is_found_out_first(tmp_path, log, run):
+    code, _, err = run(log, output=tmp_path / "log.csv" / "out" / "x")
+    assert code == 1
     assert "Not a directory" in err or "File exists" in err
     assert "reading" not in err
 
 
 @pytest.mark.usefixtures("no_report")
-def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, capsys):
+def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, run):
     def fail(*_):
         raise OSError(28, "No space left on device")
 
-    path, out = write_log(tmp_path / "log.csv", log[log["run"] < 3]), tmp_path / "new" / "out"
-    arguments = [path, *SMALL, "--output", str(out), "--quiet"]
     monkeypatch.setattr(command, "rules_text", fail)
-    assert main(arguments) == 1
-    assert capsys.readouterr().err.count("\n") == 1
-    assert sorted(tmp_path.iterdir()) == [tmp_path / "log.csv"]
+    log, out = log[log["run"] < 3], tmp_path / "new" / "out"
+    code, _, err = run(log, f"{SMALL} --quiet", out)
+    assert (code, err.count("\n")) == (1, 1)
+    assert names_in(tmp_path) == ["log.csv"]
     # Files of before stay as they are, even with --force.
     out.mkdir(parents=True)
     (out / "report.html").write_text("old")
-    assert main([*arguments, "--force"]) == 1
+    assert run(log, f"{SMALL} --force", out)[0] == 1
     assert [(p.name, p.read_text()) for p in out.iterdir()] == [("report.html", "old")]
 
 
@@ -354,61 +376,33 @@ def test_an_encoding_of_the_terminal_that_lacks_signs(tmp_path, log, monkeypatch
     told = io.TextIOWrapper(io.BytesIO(), "ascii", "backslashreplace", write_through=True)
     monkeypatch.setattr(sys, "stdout", io.TextIOWrapper(io.BytesIO(), "ascii", "strict"))
     monkeypatch.setattr(sys, "stderr", told)
-    path = write_log(tmp_path / "log-°.csv", log.drop(columns="rate"), MEASURED[:3])
-    assert main([path]) == 3
+    log[["time", "temperature", "output"]].to_csv(tmp_path / "log-°.csv", index=False)
+    assert main([str(tmp_path / "log-°.csv")]) == 3
     assert rb"log-\xb0.csv" in told.buffer.getvalue()
 
 
-def test_groups_that_never_overlap_cannot_be_checked(tmp_path, log, capsys):
-    # Three runs, each warmest, coldest or fastest to warm from its first row on.
-    apart = log[log["run"] < 3].groupby("run").head(20).copy()
-    apart["temperature"] = (20.0 * apart["run"]).where(apart["run"] < 2, 10.0)
-    apart["output"] += 200.0 * (apart["run"] == 2)
-    apart["rate"] += 200.0 * (apart["run"] == 2)
-    path, out = write_log(tmp_path / "log.csv", apart), tmp_path / "out"
-    arguments = [path, "--terms", "1,1", "--inputs", "temperature", "output", "--groups", "run"]
-    assert main([*arguments, "--output", str(out), "--quiet"]) == 3
-    assert "every row lies outside the range" in capsys.readouterr().err
-    assert not out.exists()
-
-
 @pytest.mark.usefixtures("no_report")
-def test_a_compensation_that_makes_it_worse_says_so(tmp_path, log, capsys):
+def test_a_compensation_that_makes_it_worse_says_so(log, run):
     # Each of five runs has an offset, and their mean is zero: that of the others is minus a quarter
     # of one's own, and time tells nothing.
-    spoilt = log.copy()
-    runs = spoilt["run"].unique()
-    offsets = dict(zip(runs, [1.0, -1.0, 1.0, -1.0, 0.0], strict=True))
-    spoilt["output"] = spoilt["rate"] + spoilt["run"].map(offsets)
-    path = write_log(tmp_path / "log.csv", spoilt)
-    arguments = ["--inputs", "time", "--groups", "run", "--output", str(tmp_path / "out")]
-    assert main([path, *arguments, "--terms", "1", "--write", "rules"]) == 0
-    out, err = capsys.readouterr()
+    offsets = log["run"].map(dict(enumerate([1.0, -1.0, 1.0, -1.0, 0.0])))
+    typed = "--inputs time --groups run --terms 1 --write rules"
+    code, out, err = run(log.assign(output=log["rate"] + offsets), typed)
+    assert code == 0
     worse = "the compensation makes held-out rows in range worse, from 0.8944 to 1.118"
     assert f"WARNING        {worse}" in out
     assert err.endswith("done, but see the warnings\n")
 
 
 @pytest.mark.usefixtures("no_pictures", "few_rivals")
-def test_a_glitch_is_named_by_its_line(tmp_path, log, capsys):
-    spoilt = log.copy()
-    spoilt.loc[100, "output"] += 140.0
-    path, out = write_log(tmp_path / "log.csv", spoilt), tmp_path / "out"
-    assert main([path, *SMALL, "--output", str(out), "--quiet"]) == 0
-    page = (out / "report.html").read_text(encoding="utf-8")
-    last = capsys.readouterr().out.splitlines()[-1]
-    assert last.startswith(f"WARNING        {path}, line 102: the output of")
+def test_a_glitch_is_named_by_its_line(tmp_path, log, run):
+    spoilt = log.assign(output=log["output"] + 140.0 * (log.index == 100))
+    code, out, _ = run(spoilt, SMALL)
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    warning = f"WARNING        {tmp_path / 'log.csv'}, line 102: the output of"
+    assert (code, out.splitlines()[-1].startswith(warning)) == (0, True)
     # In the headline: before the first section.
     assert page.index("line 102") < page.index("<section>")
-
-
-def test_a_glitch_that_hides_all_else_is_named_by_its_line(tmp_path, log, capsys):
-    counts = (1e4 * log["output"]).where(log.index != 100, 2**31 - 1)
-    path = write_log(tmp_path / "log.csv", log.assign(output=counts))
-    assert main([path, "--units", "output=counts", "--quiet"]) == 3
-    said = capsys.readouterr().err
-    assert "log.csv, line 102, column 'output': does not follow the rate" in said
-    assert "the wrong one? No other row supports the output of 2.147e+09 at a rate of" in said
 
 
 def thermal_cycle(*turns, n_rows=300, lag=0.05):
@@ -424,17 +418,15 @@ def thermal_cycle(*turns, n_rows=300, lag=0.05):
 
 
 @pytest.mark.usefixtures("no_report")
-def test_a_thermal_cycle_at_rest(tmp_path, capsys):
-    thermal_cycle(20, -20, 60, -20, 60, 20).to_csv(tmp_path / "mems.csv", index=False)
-    out = tmp_path / "out"
-    arguments = [str(tmp_path / "mems.csv"), "--terms", "3,1", "--write", "rules"]
-    assert main([*arguments, "--output", str(out)]) == 0
-    said = capsys.readouterr().out
+def test_a_thermal_cycle_at_rest(tmp_path, run):
+    typed = "--terms 3,1 --write rules"
+    code, said, _ = run(thermal_cycle(20, -20, 60, -20, 60, 20), typed)
+    assert code == 0
     assert "whole legs between turning points of the temperature held out (5 legs" in said
     assert "taken as at rest" in said
     assert "time = 'Timestamp [ms]' in ms; temperature = 'Temp'" in said
     assert "output = 'gyro_x_dps' in deg/s ('gyro_y_dps' would do too)" in said
-    compensator = GyroCompensator.read_json(out / "compensator.json")
+    compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
     assert compensator.inputs == ("temperature", "temperature_rate")
     log = pd.DataFrame({"time": [0.0, 1e4], "temperature": 10.0, "output": 0.31})
     # Neither warming nor cooling: between the two.
@@ -442,36 +434,31 @@ def test_a_thermal_cycle_at_rest(tmp_path, capsys):
 
 
 @pytest.mark.usefixtures("no_report")
-def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(tmp_path, capsys):
+def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(run):
     log = thermal_cycle(20, -20, 60, 20).rename(columns={"gyro_y_dps": "rate [dps]"})
     log["rate [dps]"] *= 0.05
-    path, options = tmp_path / "mems.csv", ["--write", "constant"]
-    log.to_csv(path, index=False)
-    assert main([str(path), *options, "--output", str(tmp_path / "out")]) == 0
+    code, said, _ = run(log, "--write constant --terms 1,1")
     told = f"is {log['rate [dps]'].abs().max():.3g} deg/s at most and not used (if it is the gyro's"
-    assert told in capsys.readouterr().out
-    log.assign(gyro_x_dps=3).to_csv(path, index=False)
-    assert main([str(path), *options]) == 3
-    assert "all values are 3" in (said := capsys.readouterr().err)
+    assert (code, told in said) == (0, True)
+    still = log.assign(gyro_x_dps=3)
+    code, _, said = run(still, "--force")
+    assert (code, "all values are 3" in said) == (3, True)
     assert "--columns output=NAME" in said
-    log.drop(columns="rate [dps]").assign(gyro_x_dps=3).to_csv(path, index=False)
-    assert main([str(path), *options]) == 3
-    assert "'gyro_x_dps' is taken for the output, no column for the true rate" in (
-        said := capsys.readouterr().err
-    )
+    code, _, said = run(still.drop(columns="rate [dps]"), "--force")
+    assert code == 3
+    assert "'gyro_x_dps' is taken for the output, no column for the true rate" in said
     assert "the output is 3 throughout: no gyro gives that." in said
 
 
 @pytest.mark.usefixtures("no_report")
-def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_path, capsys):
+def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_path, run):
     log = thermal_cycle(-20, 60, -20)
     log["gyro_x_lsb"] = (131.0 * log["gyro_x_dps"]).round()
-    log.drop(columns=["gyro_x_dps", "gyro_y_dps"]).to_csv(tmp_path / "mems.csv", index=False)
-    arguments = [str(tmp_path / "mems.csv"), "--terms", "3,1", "--output", str(tmp_path / "out")]
-    assert main(arguments) == 3
-    assert "does not tell its scale factor" in capsys.readouterr().err
-    assert main([*arguments, "--scale-factor", "131"]) == 0
-    said = capsys.readouterr().out
+    log = log.drop(columns=["gyro_x_dps", "gyro_y_dps"])
+    code, _, said = run(log, "--terms 3,1")
+    assert (code, "does not tell its scale factor" in said) == (3, True)
+    code, said, _ = run(log, "--terms 3,1 --scale-factor 131")
+    assert code == 0
     assert "pieces of the legs" in said
     assert "whether a cycle repeats, so few cannot show" in said
     # What is safe is written, and pieces have one number.
@@ -485,20 +472,16 @@ def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_p
 
 
 @pytest.mark.usefixtures("no_report")
-def test_a_scale_factor_needs_rates_that_the_output_follows_whatever_the_inputs(
-    tmp_path, log, capsys
-):
-    steady, jitter = log.assign(rate=50.0), 1e-3 * np.random.default_rng(0).normal(size=len(log))
-    steady["output"] = 131.0 * (50.0 + 0.01 * log["temperature"])
-    options = ["--inputs", "temperature", "--units", "output=counts", "--terms", "2"]
-    options += ["--output", str(tmp_path / "out")]
-    path = write_log(tmp_path / "log.csv", steady.assign(rate=50.0 + jitter))
-    assert main([path, *options]) == 3
-    assert "'output': does not follow the rate" in capsys.readouterr().err
-    path = write_log(tmp_path / "log.csv", steady)
-    assert main([path, *options]) == 3
-    assert "one rate, as at rest, does not tell its scale factor" in capsys.readouterr().err
-    assert main([path, *options, "--scale-factor", "131"]) == 0
+def test_a_scale_factor_needs_rates_that_the_output_follows_whatever_the_inputs(tmp_path, log, run):
+    steady = log.assign(rate=50.0, output=131.0 * (50.0 + 0.01 * log["temperature"]))
+    jitter = 1e-3 * np.random.default_rng(0).normal(size=len(log))
+    typed = "--inputs temperature --units output=counts --terms 2"
+    code, _, said = run(steady.assign(rate=50.0 + jitter), typed)
+    assert (code, "'output': does not follow the rate" in said) == (3, True)
+    code, _, said = run(steady, typed)
+    told = "one rate, as at rest, does not tell its scale factor"
+    assert (code, told in said) == (3, True)
+    assert run(steady, f"{typed} --scale-factor 131")[0] == 0
     compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
     assert compensator.scale_factor == 131.0
     rates = compensator.apply(steady)["rate_compensated"]
@@ -506,29 +489,29 @@ def test_a_scale_factor_needs_rates_that_the_output_follows_whatever_the_inputs(
 
 
 @pytest.mark.usefixtures("no_report")
-def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, capsys):
+def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, run):
     log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
     noise = np.random.default_rng(0).normal(size=len(log))
     table = log[["time", "temperature", "rate"]].assign(gyro_x=noise, gyro_y=log["output"])
     (tmp_path / "logs").mkdir()
-    for run, part in table.groupby(log["run"]):
-        part.to_csv(tmp_path / "logs" / f"run{run}.csv", index=False)
-    out, where = tmp_path / "out", str(tmp_path / "logs" / "*.csv")
-    arguments = [where, "--terms", "1,1,2", "--inputs", "time", "temperature", "output"]
-    wrong = ["--columns", "output=gyro_x", "--output", str(out)]
-    assert main([*arguments, *wrong]) == 3
-    assert "the log, column 'gyro_x' (output): does not follow the rate" in capsys.readouterr().err
-    wrong = ["--columns", "output=gyro_y", "rate=gyro_x", "--units", "output=deg/s", "rate=deg/s"]
-    assert main([*arguments, *wrong, "--output", str(out)]) == 3
-    assert "or the column 'gyro_x' of the rate, the wrong one?" in capsys.readouterr().err
-    assert main([*arguments, "--output", str(out)]) == 0
-    said, told = capsys.readouterr()
-    assert "read 4 of 4" in told
+    for number, part in table.groupby(log["run"]):
+        part.to_csv(tmp_path / "logs" / f"run{number}.csv", index=False)
+    where, typed = tmp_path / "logs" / "*.csv", "--terms 1,1,2 --inputs time temperature output"
+    for wrong, told in (
+        ("output=gyro_x", "the log, column 'gyro_x' (output): does not follow the rate"),
+        (
+            "output=gyro_y rate=gyro_x --units output=deg/s rate=deg/s",
+            "or the column 'gyro_x' of the rate, the wrong one?",
+        ),
+    ):
+        code, _, said = run(where, f"{typed} --columns {wrong}")
+        assert (code, told in said) == (3, True)
+    code, said, told = run(where, typed)
+    assert (code, "read 4 of 4" in told) == (0, True)
     assert "whole runs held out (4 runs" in said
-    model, target = str(out / "compensator.json"), tmp_path / "rates.csv"
-    arguments = ["--apply", model, "--columns", "output=gyro_y", "--output", str(target)]
-    assert main([where, *arguments]) == 0
+    model, target = tmp_path / "out" / "compensator.json", tmp_path / "rates.csv"
+    assert run(where, f"--apply {model} --columns output=gyro_y", target)[0] == 0
     rates = pd.read_csv(target)
     whole = GyroCompensator.read_json(model).apply(log)
     np.testing.assert_allclose(rates["rate_compensated"], whole["rate_compensated"], atol=1e-9)
-    assert rates["run"].tolist() == [f"run{run}" for run in log["run"]]
+    assert rates["run"].tolist() == [f"run{number}" for number in log["run"]]

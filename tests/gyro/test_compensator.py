@@ -75,11 +75,10 @@ def test_rows_out_of_range_are_flagged_and_follow_the_policy(log, policy):
         np.testing.assert_allclose(compensated["rate_compensated"], expected, rtol=1e-12)
 
 
-def test_rows_hardly_covered_are_flagged(log):
-    compensator = fitted(log)
+def test_rows_hardly_covered_are_flagged(log, compensator):
     far = log.assign(temperature=log["temperature"] + 200.0)
     assert (compensator.apply(far)["status"] == 1 + 4).all()
-    careless = GyroCompensator(compensator.estimator, INPUTS, scale_factor=FACTOR, min_coverage=0.0)
+    careless = replace(compensator, min_coverage=0.0)
     assert (careless.apply(far)["status"] == 1).all()
 
 
@@ -202,7 +201,7 @@ def physics_json(log, tmp_path_factory):
 
 def test_other_estimators_are_not_written(log, tmp_path):
     path = tmp_path / "never.json"
-    for estimator in (LinearRegression(), ResidualRegressor(LinearRegression())):
+    for estimator in (LinearRegression(), ResidualRegressor(LinearRegression(), quick(1))):
         estimator.fit(np.random.default_rng(0).random((30, 4)), np.arange(30.0))
         with pytest.raises(TypeError):
             GyroCompensator(estimator, INPUTS).write_json(path)

@@ -45,45 +45,6 @@ def moments(truth, form):
     return (start + pd.to_timedelta(truth["clock"], unit="s")).dt.strftime(form)
 
 
-WRITTEN = {
-    "ISO 8601, UTF-16, semicolons, decimal commas": (
-        "%Y-%m-%dT%H:%M:%S.%f+01:00",
-        ("Zeit", "Temperatur [°C]", "Kreisel", "Drehtisch soll [deg/s]"),
-        {"sep": ";", "decimal": ",", "encoding": "utf-16"},
-    ),
-    "clock over midnight, Windows": (
-        "%H:%M:%S.%f",
-        ("Time", "Temp (°C)", "gyro_dps", "rate_true_deg_s"),
-        {"encoding": "cp1252"},
-    ),
-    "day, tabs": ("%d.%m.%Y %H:%M:%S", ("Logged", "T[degC]", "Output", "table"), {"sep": "\t"}),
-    "month first, halves of the day": (
-        "%m/%d/%Y %I:%M:%S %p",
-        ("date_time", "thermistor_C", "GYRO", "Ref_Rate"),
-        {},
-    ),
-}
-
-
-@pytest.mark.parametrize("kind", WRITTEN)
-def test_a_log_of_one_kind_is_read_as_it_was_meant(tmp_path, truth, kind):
-    form, names, how = WRITTEN[kind]
-    columns = [moments(truth, form), truth["temperature"], truth["output"], truth["rate"]]
-    table = pd.DataFrame(dict(zip(names, columns, strict=True)))
-    table = table.assign(temp_trend=1, seq=range(300))
-    table.to_csv(tmp_path / "log.csv", index=False, **how)
-    reading = found(tmp_path / "log.csv")
-    same(reading, truth)
-    steps = np.diff(reading.log["time"]) - np.diff(truth["clock"])
-    np.testing.assert_allclose(steps, 0.0, atol=1e-5)
-    # The hour without power between runs of ten minutes.
-    assert (reading.log["run"].astype(int) == truth["run"].astype(int) + 1).all()
-    told = "; ".join(reading.notes)
-    for said in (f"temperature = {names[1]!r}", "split into 5 runs", "--columns"):
-        assert said in told
-    assert not set(reading.assumed) & {"time", "temperature"}
-
-
 def test_lines_above_the_header_and_a_clock_past_midnight(tmp_path, truth):
     lines = ["Bench 7;operator X", "", "Datum;Uhrzeit;Temp [°C];Gyro [mrad/s];Table"]
     days, clocks = moments(truth, "%Y-%m-%d"), moments(truth, "%H:%M:%S")
@@ -94,7 +55,12 @@ def test_lines_above_the_header_and_a_clock_past_midnight(tmp_path, truth):
     reading = found(tmp_path / "log.txt")
     same(reading, truth)
     np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]))
-    assert reading.units["output"] == "mrad/s"
+    # The hour without power between runs of ten minutes.
+    assert (reading.log["run"].astype(int) == truth["run"].astype(int) + 1).all()
+    told = "; ".join(reading.notes)
+    for said in ("temperature = 'Temp [°C]' in degC", "split into 5 runs", "--columns"):
+        assert said in told
+    assert (reading.units["output"], set(reading.assumed)) == ("mrad/s", {"rate"})
     assert reading.name_row(10) == f"{tmp_path / 'log.txt'}, line 14"
 
 
@@ -379,6 +345,7 @@ def test_a_file_of_excel_with_lines_above_the_header(tmp_path, truth):
     same(reading, truth)
     np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-5)
     assert reading.name_row(0).endswith("row 4")
+    assert reading.assumed == {}
     assert {"of 2 sheets 'data' is read", "2 rows above the header are passed over"} <= set(
         reading.notes
     )

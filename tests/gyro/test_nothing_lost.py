@@ -18,7 +18,7 @@ pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, LogError, _source, read_log
-from skanfis.gyro.command import _staged, main
+from skanfis.gyro.command import _staged
 
 from ..quick import quick
 
@@ -39,43 +39,41 @@ def files(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("target", ["log.csv", "model.json", "../{here}/log.csv"])
-def test_apply_never_replaces_what_it_reads(files, tmp_path, target, capsys):
+def test_apply_never_replaces_what_it_reads(files, tmp_path, target, say):
     before = [(tmp_path / name).read_bytes() for name in ("log.csv", "model.json")]
     target = target.format(here=tmp_path.name)
     for force in ([], ["--force"]):
-        assert main(["--apply", "model.json", "log.csv", "--output", target, *force]) == 4
-        assert "is what is read; --force does not replace it" in capsys.readouterr().err
+        code, _, err = say("--apply", "model.json", "log.csv", "--output", target, *force)
+        assert (code, "is what is read; --force does not replace it" in err) == (4, True)
     assert [(tmp_path / name).read_bytes() for name in ("log.csv", "model.json")] == before
     (tmp_path / "log-compensated.csv").write_text("old")
-    assert main(["--apply", "model.json", "log.csv", "--force"]) == 0
+    assert say("--apply", "model.json", "log.csv", "--force")[0] == 0
     assert "old" not in (tmp_path / "log-compensated.csv").read_text()
 
 
 @pytest.mark.parametrize("name", ["rules.txt", "px4.params"])
-def test_a_calibration_never_replaces_its_log(files, tmp_path, name, capsys):
+def test_a_calibration_never_replaces_its_log(files, tmp_path, name, say):
     (tmp_path / "out").mkdir()
     (tmp_path / "log.csv").rename(tmp_path / "out" / name)
-    assert main([f"out/{name}", "--output", "out", "--force"]) == 4
-    assert f"{name} is what is read" in capsys.readouterr().err
+    code, _, err = say(f"out/{name}", "--output", "out", "--force")
+    assert (code, f"{name} is what is read" in err) == (4, True)
 
 
 @pytest.mark.usefixtures("files")
-def test_the_folder_is_called_after_the_first_file_of_a_pattern(tmp_path, capsys):
+def test_the_folder_is_called_after_the_first_file_of_a_pattern(tmp_path, say):
     (tmp_path / "log-compensator").write_text("")
-    assert main(["l*.csv"]) == 4
-    assert "log-compensator is a file" in capsys.readouterr().err
+    code, _, err = say("l*.csv")
+    assert (code, "log-compensator is a file" in err) == (4, True)
 
 
-def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, capsys):
+def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, say):
     arguments = ["--apply", "model.joblib", "log.csv", "--quiet"]
-    with pytest.raises(SystemExit, match="2"):
-        main(arguments)
-    told = capsys.readouterr().err
-    assert "loading model.joblib runs the code that is in it" in told
+    code, _, told = say(*arguments)
+    assert (code, "loading model.joblib runs the code that is in it" in told) == (2, True)
     assert "--trust says that its maker is trusted" in told
     assert not (tmp_path / "log-compensated.csv").exists()
-    assert main([*arguments, "--trust"]) == 0
-    assert "runs the code" in capsys.readouterr().err
+    code, _, told = say(*arguments, "--trust")
+    assert (code, "runs the code" in told) == (0, True)
     rates = pd.read_csv("log-compensated.csv")
     np.testing.assert_allclose(rates["rate_compensated"], files["output"] - 0.5)
     Path("damaged.joblib").write_bytes(b"{}")
@@ -85,33 +83,31 @@ def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, capsys):
         ("damaged.joblib", "is no file of joblib, or a damaged one"),
         ("model.json", "JSON needs none"),
     ):
-        with pytest.raises(SystemExit, match="2"):
-            main(["--apply", model, "log.csv", "--trust", "--force"])
-        assert message in capsys.readouterr().err
+        code, _, told = say("--apply", model, "log.csv", "--trust", "--force")
+        assert (code, message in told) == (2, True)
 
 
 @pytest.mark.usefixtures("files")
-def test_apply_refuses_options_of_a_calibration_by_name(tmp_path, capsys):
+def test_apply_refuses_options_of_a_calibration_by_name(tmp_path, say):
     for typed, told in (
         ("--apply model.json --terms 1 --write law", "--terms, --write: of no use with --apply."),
         ("--apply model.json --scale-factor 3", "--scale-factor: of no use with --apply."),
         ("--trust", "--trust: of no use without --apply."),
     ):
-        with pytest.raises(SystemExit, match="2"):
-            main(["log.csv", *typed.split()])
-        assert told in capsys.readouterr().err
+        code, _, err = say("log.csv", *typed.split())
+        assert (code, told in err) == (2, True)
     assert not list(tmp_path.glob("log-compen*"))
 
 
-def test_apply_tells_errors_of_flagged_rows_apart(files, tmp_path, capsys):
+def test_apply_tells_errors_of_flagged_rows_apart(files, tmp_path, say):
     # The model takes 0.5 off; three rows are hotter than all that it has seen.
     hot = np.arange(len(files)) < 3
     log = files.assign(
         rate=files["output"] - np.where(hot, 2.5, 1.5), temperature=files["temperature"] + 99 * hot
     )
     log.to_csv(tmp_path / "new.csv", columns=["temperature", "output", "rate"], index=False)
-    assert main(["--apply", "model.json", "new.csv"]) == 0
-    out = capsys.readouterr().out
+    code, out, _ = say("--apply", "model.json", "new.csv")
+    assert code == 0
     assert "1.5 deg/s before, 1 after (rows with status 0)" in out
     assert "2.5 deg/s before, 2 after (the flagged rows)" in out
     assert "3 rows out of range (temperature in 3)" in out

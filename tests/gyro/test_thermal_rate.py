@@ -1,7 +1,6 @@
 """Thermal features: closed forms, the recursion in C, causality, runs."""
 
-import shutil
-import subprocess
+import ctypes
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,8 @@ from sklearn.base import clone
 from sklearn.exceptions import NotFittedError
 
 from skanfis.gyro import ThermalRate
+
+from ..export.c_compiler import gcc, needs_compiler
 
 
 @pytest.fixture
@@ -36,39 +37,32 @@ def test_rate_of_a_ramp_comes_up_with_the_time_constant(steps):
     assert_allclose(rate, -0.02 * (1 - np.exp(-(time - time[0]) / 30)), rtol=1e-9)
 
 
-@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@needs_compiler
 def test_the_lines_in_c_give_the_same(log, tmp_path):
     page = Path(__file__).parents[2] / "docs" / "gyro_data.rst"
     lines = page.read_text(encoding="utf-8").partition("code-block:: c\n")[2].splitlines()
     update = "".join(line for line in lines if line.endswith(";"))
     assert update.count(";") == 2
-    run = log[log["run"] == "b"]
-    source = tmp_path / "recursion.c"
-    source.write_text(
-        """
+    source = """
 #include <math.h>
-#include <stdio.h>
-int main(void) {
-    double tau = 33.0, rate = 0.0, previous, time, t, temperature, h;
-    scanf("%lf %lf", &time, &previous);
-    while (scanf("%lf %lf", &t, &temperature) == 2) {
-        h = t - time; time = t;
-"""
-        + update
-        + r"""
-        printf("%.17g\n", rate);
+void rates(const double *t, const double *T, double *rates, int n)
+{
+    double tau = 33.0, rate = 0.0, previous = T[0];
+    for (int k = 1; k < n; ++k) {
+        double h = t[k] - t[k - 1], temperature = T[k];
+        UPDATE
+        rates[k] = rate;
     }
-    return 0;
 }
-""",
-        encoding="utf-8",
-    )
-    program = tmp_path / "recursion"
-    subprocess.run(["cc", source, "-o", program, "-lm"], check=True)
-    lines = "\n".join(f"{t!r} {T!r}" for t, T in run[["t", "T"]].to_numpy().tolist())
-    printed = subprocess.run([program], input=lines, capture_output=True, text=True, check=True)
-    rate = ThermalRate(33.0, time=0).fit_transform(run[["t", "T"]].to_numpy())
-    assert_allclose(np.array(printed.stdout.split(), dtype=float), rate.ravel()[1:], rtol=1e-12)
+"""
+    (tmp_path / "rates.c").write_text(source.replace("UPDATE", update), encoding="utf-8")
+    gcc(["-shared", "-fPIC", "rates.c", "-o", "rates.so", "-lm"], tmp_path)
+    function = ctypes.CDLL(str(tmp_path / "rates.so")).rates
+    function.argtypes = [*[np.ctypeslib.ndpointer(float)] * 3, ctypes.c_int]
+    columns = log.loc[log["run"] == "b", ["t", "T"]].to_numpy()
+    found = np.zeros(len(columns))
+    function(*columns.T.copy(), found, len(found))
+    assert_allclose(found, ThermalRate(33.0, time=0).fit_transform(columns).ravel(), rtol=1e-12)
 
 
 FEATURE = ThermalRate(20.0, time="t", run="run")

@@ -17,20 +17,18 @@ def truth():
     return make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=3)
 
 
-def reading(tmp_path, truth, names, scales, offsets=(0.0,) * 4, paths=1):
-    """What is read of time, temp, gyro and rate in other units, without a word on them."""
-    columns = [truth["time"], truth["temperature"], truth["output"], truth["rate"]]
-    table = pd.DataFrame(
-        {
-            name: scale * column + offset
-            for name, column, scale, offset in zip(names, columns, scales, offsets, strict=True)
-        }
-    )
+def read_table(tmp_path, table, require=PARTS, paths=1):
     found = []
     for number, rows in enumerate(np.array_split(np.arange(len(table)), paths)):
         found.append(tmp_path / f"log{number}.csv")
         table.iloc[rows].to_csv(found[-1], index=False)
-    return read(found, Request(require=PARTS, guess=True))
+    return read(found, Request(require=require, guess=True))
+
+
+def reading(tmp_path, truth, names, scales, offsets=(0.0,) * 4, paths=1):
+    """What is read of time, temp, gyro and rate in other units, without a word on them."""
+    table = truth[["time", *PARTS]] * list(scales) + list(offsets)
+    return read_table(tmp_path, table.set_axis(names, axis=1), paths=paths)
 
 
 NAMES = ("time", "temp", "gyro", "rate")
@@ -115,11 +113,12 @@ def test_all_files_tell_what_the_first_leaves_open(tmp_path, truth):
     found = reading(tmp_path, log, NAMES, (1, 1, 1, 1), paths=4)
     assert found.units["temperature"] == "degC"
     assert "taken as degC (10 to 50; degF?" in found.assumed["temperature"]
-    fahrenheit = reading(tmp_path, log.assign(temperature=log["temperature"] + 5), NAMES,
-                         (1, 1.8, 1, 1), (0, 32, 0, 0), paths=4)  # fmt: skip
+    # The last one hot: all is read again, in another unit than that of the first.
+    hotter = log.assign(temperature=log["temperature"].to_numpy()[::-1] + 5.0)
+    fahrenheit = reading(tmp_path, hotter, NAMES, (1, 1.8, 1, 1), (0, 32, 0, 0), paths=4)
     assert fahrenheit.units["temperature"] == "degF"
     assert "taken as degF (59 to 131; degC?" in fahrenheit.assumed["temperature"]
-    np.testing.assert_allclose(fahrenheit.log["temperature"], log["temperature"] + 5, atol=1e-9)
+    np.testing.assert_allclose(fahrenheit.log["temperature"], hotter["temperature"], atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -132,23 +131,19 @@ def test_all_files_tell_what_the_first_leaves_open(tmp_path, truth):
 )
 def test_a_bias_alone_tells_no_unit(tmp_path, output, readings):
     heat = np.linspace(20.0, 60.0, 200)
-    table = {"temp_c": heat, "gyro": np.resize(output, 200)}
-    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
+    table = pd.DataFrame({"temp_c": heat, "gyro": np.resize(output, 200)})
     with pytest.raises(UsageError, match=readings):
-        read([tmp_path / "log.csv"], Request(require=("temperature", "output"), guess=True))
+        read_table(tmp_path, table, require=("temperature", "output"))
 
 
 def test_the_rate_of_the_earth_is_known(tmp_path):
     heat = np.linspace(20.0, 60.0, 200)
-    table = {"temp_c": heat, "gyro_deg_h": 15.0 + 0.1 * heat, "rate": 15.041}
-    pd.DataFrame(table).to_csv(tmp_path / "log.csv", index=False)
-    found = read([tmp_path / "log.csv"], Request(require=PARTS, guess=True))
-    assert found.units["rate"] == "deg/h"
+    table = pd.DataFrame({"temp_c": heat, "gyro_deg_h": 15.0 + 0.1 * heat, "rate": 15.041})
+    assert read_table(tmp_path, table).units["rate"] == "deg/h"
 
 
 @pytest.mark.parametrize("rows", [1, 2])
 def test_a_row_or_two_and_columns_without_numbers_tell_nothing(tmp_path, rows):
     table = {"time": [1.0, 2.0], "temp": ["", ""], "gyro": [1.0, ""], "rate": [2.0, 3.0]}
-    pd.DataFrame(table)[:rows].to_csv(tmp_path / "log.csv", index=False)
     with pytest.raises((LogError, UsageError)):
-        read([tmp_path / "log.csv"], Request(require=("output",), guess=True))
+        read_table(tmp_path, pd.DataFrame(table)[:rows], require=("output",))
