@@ -211,7 +211,7 @@ class _Formula:
         """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
         numbers, logs, slopes = self.numbers, [], []
         for terms in numbers.terms:
-            positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
+            positions = numbers.term_input[terms.start : terms.start + len(terms.constants)]
             formula = FORMULAS[terms.family].of
             value, slope = formula(z.columns(positions), terms.constants.T)
             logs.append(value())
@@ -228,9 +228,9 @@ class _Formula:
 
     def _by_rule(self, one, z):
         """The constants times ``one`` plus what slopes make of z, (n_rows, n_rules, n_outputs)."""
-        n_rules, n_outputs, n_basis = self.numbers.coefficients.shape
-        sloped = [z.columns(self.numbers.slope_inputs)] * (n_basis > 1)
-        by_output = self.numbers.coefficients.reshape(-1, n_basis).T
+        n_rules, n_outputs, n_basis = self.numbers.consequents.shape
+        sloped = [z.columns(self.numbers.slope_input)] * (n_basis > 1)
+        by_output = self.numbers.consequents.reshape(-1, n_basis).T
         return (self._joined(one, *sloped) @ by_output).reshape(n_rules, n_outputs)
 
     def _joined(self, *columns):

@@ -1,11 +1,11 @@
 """The .c file: constant tables, and the functions that read them.
 
-The order of work is that of ``skanfis.model``. A grid normalises each input by itself and
-multiplies shares: one exponential per term, not per rule and input. A tree parts the strength that
-comes to a node, from the root on: one exponential per node, nothing to normalise. "linear" is
-worked out only outside the box, by the derivative along the way back.
+The functions are in ``templates``; here is what decides on their lines, and what they cost. The
+order of work is that of ``skanfis.model``. "linear" is worked out only outside the box, by the
+derivative along the way back.
 """
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -61,7 +61,7 @@ class Source:
     def __init__(self, model, dialect, min_coverage, saturate=None, is_part=False):
         self.dialect, self.is_part, self.policy = dialect, is_part, model.out_of_bounds
         numbers: Any = Numbers(model, dialect.dtype)
-        self.numbers, self.model, self.n_terms = numbers, numbers.model, model.antecedent.n_terms
+        self.numbers, self.model = numbers, numbers.model
         # Rules that come from elsewhere have no data to be near to or far from.
         self.min_coverage = None if model.support is None else min_coverage
         self.limits = read_limits(saturate, numbers)
@@ -69,26 +69,32 @@ class Source:
         self.held = numbers.output_limits
         if self.limits is not None:
             self.held = self.limits.T if self.held is None else np.clip(self.held, *self.limits.T)
-        self.is_grid, self.n_slopes = numbers.counts is not None, numbers.slope_inputs.size
-        self.is_tree = numbers.nodes is not None
-        # Logarithms of terms, and the zero of "none".
-        self.n_logarithms = self.n_terms + int((numbers.rule_terms == self.n_terms).any())
         self.facts = self._facts()
-        # Places at which tangents are found.
-        self.n_groups = 1 + int(max(numbers.tangent_group)) if "moves" in self.facts else 1
+        self.sizes = self._sizes()
 
     def _facts(self):
-        """What decides which lines there are."""
-        numbers = self.numbers
+        """What decides which lines of ``templates`` there are."""
+        numbers, n_terms = self.numbers, self.model.antecedent.n_terms
+        is_grid, is_one, is_tree = (
+            bool(numbers.counts),
+            numbers.counts == (),
+            numbers.nodes is not None,
+        )
         covers, answers = self.min_coverage is not None, self.policy not in SILENT
         # The tangent of a constant is the constant; one of no length is its start.
-        is_constant = not self.n_terms and not self.n_slopes
-        linear = self.policy == "linear" and not is_constant and bool(numbers.reach.any())
+        varies = n_terms > 0 or numbers.slope_input.size > 0
+        linear = self.policy == "linear" and varies and bool(numbers.reach.any())
         moves = linear and numbers.tangent_group is not None
         facts = {
-            # Strengths, of terms that a table has of every rule, have to be made to sum to one.
-            "normal": not self.is_tree and numbers.counts != (),
-            "slopes": self.n_slopes > 0,
+            # How strengths are found: those of one rule without terms are one.
+            "one": is_one,
+            "grid": is_grid,
+            "tree": is_tree,
+            "sums": not (is_one or is_grid or is_tree),
+            "normal": not (is_one or is_tree),
+            "none": not (is_one or is_tree) and (numbers.rule_terms == n_terms).any(),
+            "terms": n_terms > 0,
+            "slopes": numbers.slope_input.size > 0,
             "covers": covers,
             # Rows outside the box get no answer; are less covered; are followed along the tangent.
             "silent": not answers,
@@ -99,27 +105,123 @@ class Source:
             "moves": moves,
             "beyond": linear or (covers and answers),
             "held": self.held is not None,
-            # Limits that were asked for hold what is no number, too.
-            "saturates": self.limits is not None,
-            "clips": self.limits is None and self.held is not None,
         }
         return {fact for fact, holds in facts.items() if holds}
+
+    def _sizes(self):
+        """How many there are, as ``templates`` has them."""
+        facts, n_rules, n_terms = self.facts, self.model.n_rules, self.model.antecedent.n_terms
+        n_nodes = n_terms // 2 if "tree" in facts else 0
+        return {
+            "n_rules": n_rules,
+            "n_terms": n_terms,
+            "n_nodes": n_nodes,
+            "n_places": self.numbers.rule_terms.shape[1],
+            "n_slopes": self.numbers.slope_input.size,
+            # Logarithms of terms, and the zero of "none"; strengths of rules, and of nodes.
+            "n_logarithms": (n_terms + ("none" in facts)) * ("normal" in facts),
+            "n_strengths": n_rules + n_nodes,
+            # Places at which tangents are found.
+            "n_groups": 1 + int(max(self.numbers.tangent_group)) if "moves" in facts else 1,
+        }
+
+    def body(self):
+        """What follows the lines that include other files."""
+        macros = f"{self.dialect.functions()}\n"
+        tables = [self.dialect.table(name, values) for name, values in self.tables.items()]
+        return "\n".join([macros, *tables, *self._memberships(), self._functions])
+
+    @cached_property
+    def _functions(self):
+        """The functions that read the tables."""
+        dialect, sizes = self.dialect, self.sizes
+        text = kept_lines(templates.FUNCTIONS, self.facts)
+        for place, template in (
+            ("$finite_input", templates.FINITE_INPUT),
+            ("$rejection", templates.rejection(self.policy, dialect.std)),
+            ("$strengths", self._strengths("share")),
+            ("$slopes", self._strengths("slope")),
+        ):
+            text = text.replace(place, template.strip("\n"))
+        # What the place of a row is told by: z, the shares of a grid's terms, and the strengths.
+        taken = ["z", "l", "w"] if "grid" in self.facts else ["z", "w"]
+        is_on_some = 0 < sizes["n_slopes"] < self.model.n_inputs
+        return dialect.write(
+            f"{text}\n",
+            **sizes,
+            # int has 16 bits at least.
+            int="long" if max(sizes["n_rules"], sizes["n_terms"]) > 32767 else "int",
+            linkage="static " if self.is_part else "",
+            limit=dialect.number(self.min_coverage or 0.0),
+            given=", ".join(f"const {dialect.real} *{name}" for name in taken),
+            taken=", ".join(taken),
+            slope_input=f"{dialect.name}_slope_input[j]" if is_on_some else "j",
+        )
+
+    def _strengths(self, what):
+        """The lines of the template STRENGTHS, for "share" or "slope"."""
+        numbers, facts = self.numbers, {*self.facts, what}
+
+        def each(template, parts):
+            text = kept_lines(template, facts)
+            return "\n".join(self.dialect.write(text, **words) for words in parts)
+
+        tables = [
+            {"table": k, "family": one.family.name, "count": len(one.constants)}
+            | {"at": f"{one.start} + i" if one.start else "i"}
+            for k, one in enumerate(numbers.terms)
+        ]
+        counts = zip(numbers.block_starts, numbers.counts or (), strict=True)
+        inputs = [{"start": start, "count": count} for start, count in counts]
+        text = kept_lines(templates.STRENGTHS, facts)
+        text = text.replace("$terms", each(templates.TERMS, tables))
+        return text.replace("$shares", each(templates.SHARES, inputs))
+
+    def _is_read(self, name):
+        """Whether the functions read a table of this name, or call a function."""
+        return re.search(rf"\b{self.dialect.name}_{name}\b", self._functions) is not None
+
+    @cached_property
+    def tables(self):
+        """Of the numbers, by their names, those that the functions read as constant tables."""
+        found = vars(self.numbers) | {
+            f"terms{k}": one.constants for k, one in enumerate(self.numbers.terms)
+        }
+        if self.held is not None:
+            found["output_low"], found["output_high"] = self.held
+        return {name: values for name, values in found.items() if self._is_read(name)}
+
+    def _memberships(self):
+        """Functions of the families in use."""
+        for family in dict.fromkeys(terms.family for terms in self.numbers.terms):
+            for what, suffix in (("Logarithm", ""), ("Derivative of the logarithm", "_slope")):
+                if self._is_read(family.name + suffix):
+                    yield self.dialect.write(
+                        templates.MEMBERSHIP,
+                        what=what,
+                        family=family.name,
+                        suffix=suffix,
+                        lines=Body(family, self.dialect, bool(suffix)).text,
+                    )
 
     @cached_property
     def cost(self):
         """CCost of the row that takes most."""
-        numbers, itemsize, facts = self.numbers, self.numbers.dtype.itemsize, self.facts
-        n_inputs, of_value = self.model.n_inputs, numbers.coefficients.size
-        operations = self._strengths_cost()
-        operations += [0, 0, of_value, 0]
+        numbers, facts, sizes = self.numbers, self.facts, self.sizes
+        n_inputs, n_outputs, itemsize = (
+            self.model.n_inputs,
+            self.model.n_outputs,
+            numbers.dtype.itemsize,
+        )
+        of_value, strengths = numbers.consequents.size, self._cost_of_strengths()
+        operations = strengths + np.array([0, 0, of_value, 0])
         if "linear" in facts:
             # Twice per coefficient: where the tangent starts, and along it.
-            tangent = self._strengths_cost(is_slope=True)
+            tangent = self._cost_of_strengths(is_slope=True) + strengths * ("moves" in facts)
             tangent += [0, 0, 2 * of_value, 0]
-            tangent += self._strengths_cost() * ("moves" in facts)
-            operations += self.n_groups * tangent
+            operations += sizes["n_groups"] * tangent
             # The scale: per input what it adds and what it divides, and it is taken back.
-            operations += [0, 0, n_inputs + self.model.n_outputs, n_inputs]
+            operations += [0, 0, n_inputs + n_outputs, n_inputs]
         if "fades" in facts:
             # Per input its deviation and the square, then the exponential of half their sum.
             operations += [1, 0, 2 * n_inputs + 2, 0]
@@ -127,9 +229,11 @@ class Source:
         asked = int("covers" in facts and 1 + np.count_nonzero(numbers.support[:, 0]))
         # The factor's triangle, its square, share and strength.
         operations += [asked, 0, asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5), 0]
-        main, own = self.arrays()
-        n_held = sum(main.values()) + ("linear" in facts) * sum(own.values())
         exponentials, logarithms, multiply_adds, divisions = map(int, operations)
+        # Arrays of inputs, z and e; l and w, and of slopes t and s; sum and change.
+        linear, moves = "linear" in facts, "moves" in facts
+        n_held = (1 + ("beyond" in facts) + 2 * moves) * n_inputs + (1 + linear) * n_outputs
+        n_held += (1 + linear + moves) * (sizes["n_logarithms"] + sizes["n_strengths"])
         return CCost(
             exponentials=exponentials,
             logarithms=logarithms,
@@ -139,175 +243,28 @@ class Source:
             table_bytes=sum(
                 values.size
                 * (itemsize if values.dtype.kind == "f" else INDEX_BYTES[index_type(values)])
-                for values in self.tables().values()
+                for values in self.tables.values()
             ),
             stack_bytes=n_held * itemsize,
         )
 
-    def _strengths_cost(self, is_slope=False):
-        """Exponentials, logarithms, multiplications and divisions of what ``_strengths`` writes."""
-        numbers, counts = self.numbers, self.numbers.counts
-        if self.is_tree:
+    def _cost_of_strengths(self, is_slope=False):
+        """Exponentials, logarithms, multiplications and divisions of strengths, or of slopes."""
+        numbers, facts, sizes = self.numbers, self.facts, self.sizes
+        if "tree" in facts:
             # The place on the sigmoid, its other side, and what goes above and below.
-            return self.n_terms // 2 * np.array([1, 0, 4 + is_slope, 1])
+            return sizes["n_nodes"] * np.array([1, 0, 4 + is_slope, 1])
         operations = np.zeros(4, dtype=int)
         for terms in numbers.terms:
             of_term = Body(terms.family, self.dialect, is_slope).cost
             operations += len(terms.constants) * np.array(of_term)
-        n_shares = self.n_terms if self.is_grid else self.model.n_rules
+        n_shares = sizes["n_rules" if "sums" in facts else "n_terms"]
         if is_slope:
             # Along e, and less their mean.
-            operations += [0, 0, self.n_terms + n_shares, 0]
+            operations += [0, 0, sizes["n_terms"] + n_shares, 0]
             return operations
         # Of a grid, products of shares; one division for each sum.
-        products = numbers.rule_terms.size if counts else 0
-        n_sums = len(counts) if self.is_grid else 1
-        operations += [n_shares, 0, n_shares + products, n_sums]
+        n_products = numbers.rule_terms.size if "grid" in facts else 0
+        n_sums = 1 if "sums" in facts else len(numbers.counts)
+        operations += [n_shares, 0, n_shares + n_products, n_sums]
         return operations
-
-    def body(self):
-        """What follows the lines that include other files."""
-        dialect, indices = self.dialect, ["r", "o"]
-        main, tangent = self.arrays()
-        indices += ["j"] * (self.n_slopes > 0) + ["k"] * ("normal" in self.facts)
-        # What the place of a row is told by: z, the shares of a grid's terms, and the strengths.
-        taken = ["z", "l", "w"] if self.numbers.counts else ["z", "w"]
-        words = {
-            "rejection": templates.rejection(self.policy, dialect.std).strip("\n"),
-            "finite_input": templates.FINITE_INPUT.strip("\n"),
-            "linkage": "static " if self.is_part else "",
-            "taken": ", ".join(taken),
-            "tangent_given": "const $real *at, const $real *way, $int g"
-            if "moves" in self.facts
-            else ", ".join(f"const $real *{name}" for name in [*taken, "e"]),
-            "n_groups": self.n_groups,
-            "tangent_indices": ", ".join(["i"] * (self.n_terms > 0) + indices),
-            "tangent_arrays": _declared(tangent),
-            "arrays": _declared(main),
-            "indices": ", ".join(["i", *indices]),
-            "limit": dialect.number(self.min_coverage or 0.0),
-            "strengths_inside": self._strengths("l", "w", ""),
-            "strengths_slope": self._strengths("t", "s", "_slope"),
-            "add_support": self._over_rules(templates.ADD_SUPPORT),
-            "add_rules": self._over_rules(templates.ADD_RULE),
-            "add_changes": self._over_rules(templates.ADD_CHANGE),
-        }
-        # These hold words of the dialect themselves.
-        text = dialect.write(kept_lines(templates.FUNCTIONS, self.facts) + "\n", **words)
-        # int has 16 bits at least.
-        is_long = max(self.model.n_rules, self.n_terms) > 32767
-        functions = dialect.write(text, int="long" if is_long else "int")
-        tables = [dialect.table(name, values) for name, values in self.tables().items()]
-        return "\n".join([dialect.functions() + "\n", *tables, *self._memberships(), functions])
-
-    def tables(self):
-        """Constant tables by their names: numbers of the type, or positions."""
-        numbers, facts = self.numbers, self.facts
-        found = {"low": numbers.low, "high": numbers.high, "reference": numbers.reference}
-        if "beyond" in facts:
-            found["inverse_spread"] = numbers.inverse_spread
-        if "linear" in facts:
-            found["reach"] = numbers.reach
-        if "moves" in facts:
-            found["tangent_at"] = numbers.tangent_at
-            found["tangent_group"] = numbers.tangent_group
-        if "held" in facts:
-            found["output_low"], found["output_high"] = self.held
-        if self.is_tree:
-            found["nodes"], found["node_input"], found["node_ends"] = numbers.nodes
-        else:
-            found |= {f"terms{k}": terms.constants for k, terms in enumerate(numbers.terms)}
-        if "covers" in facts:
-            found["support"] = numbers.support
-        found |= {"offset": numbers.offset, "consequents": numbers.coefficients}
-        if self.n_terms and not self.is_tree:
-            found["term_input"] = numbers.term_inputs
-        if "normal" in facts:
-            found["rule_terms"] = numbers.rule_terms
-        if 0 < self.n_slopes < self.model.n_inputs:
-            found["slope_input"] = numbers.slope_inputs
-        return found
-
-    def arrays(self):
-        """Arrays on the stack and their lengths: of the main function, and of the tangent."""
-        main, tangent = {"z": self.model.n_inputs, "sum": self.model.n_outputs}, {}
-        if "beyond" in self.facts:
-            main["e"] = self.model.n_inputs
-        if "linear" in self.facts:
-            main["change"] = self.model.n_outputs
-        if "normal" in self.facts:
-            main["l"] = tangent["t"] = self.n_logarithms
-        # Of a tree those of its leaves, then of its nodes.
-        main["w"] = tangent["s"] = self.model.n_rules + self.is_tree * self.n_terms // 2
-        if "moves" in self.facts:
-            own = {name: main[name] for name in ("l", "w") if name in main}
-            tangent |= own | {"z": self.model.n_inputs, "e": self.model.n_inputs}
-        return main, tangent
-
-    def _memberships(self):
-        """Functions of the families in use."""
-        if self.is_tree:
-            return
-        for family in {terms.family: None for terms in self.numbers.terms}:
-            for suffix in ["", "_slope"] if "linear" in self.facts else [""]:
-                what = "Derivative of the logarithm" if suffix else "Logarithm"
-                head = f"/* {what} of a membership: {family.name}. */\n"
-                head += f"static $real $name_{family.name}{suffix}($real x, const $real *p)\n{{\n"
-                body = _indented(Body(family, self.dialect, bool(suffix)).lines)
-                yield f"{self.dialect.write(head)}{body}\n}}\n"
-
-    def _strengths(self, logarithms, rules, slope):
-        """Terms, then strengths; or the derivatives of their logarithms along e."""
-        if self.is_tree:
-            sizes = {"n_nodes": self.n_terms // 2, "n_rules": self.model.n_rules}
-            body = kept_lines(templates.TREE, {"slope" if slope else "share"})
-            body = self.dialect.write(body, rules=rules, first="0.0R" if slope else "1.0R", **sizes)
-            return _indented(body.splitlines())
-        numbers, lines = self.numbers, []
-        if numbers.counts == ():
-            return _indented([f"{rules}[0] = {'0.0R' if slope else '1.0R'};"])
-        for k, terms in enumerate(numbers.terms):
-            at = _at(terms.start, "i")
-            value = (
-                f"$name_{terms.family.name}{slope}(z[$name_term_input[{at}]], $name_terms{k}[i])"
-            )
-            value += f" * e[$name_term_input[{at}]]" if slope else ""
-            lines += _loop("i", len(terms.constants), [f"{logarithms}[{at}] = {value};"])
-        finish = "$name_centre({0}, {1}, {2});" if slope else "$name_normalise({0}, {2});"
-        for start, count in zip(numbers.block_starts, numbers.counts or (), strict=True):
-            of_input = (f"{logarithms} + {start}", f"l + {start}") if start else (logarithms, "l")
-            lines.append(finish.format(*of_input, count))
-        if self.n_logarithms > self.n_terms:
-            lines.append(f"{logarithms}[{self.n_terms}] = 0.0R;")
-        # Strengths of a grid are products of shares; the rest is sums of logarithms.
-        first, join = ("1.0R", "*=") if self.is_grid and not slope else ("0.0R", "+=")
-        each = f"{rules}[r] {join} {logarithms}[$name_rule_terms[r][k]];"
-        of_rule = [f"{rules}[r] = {first};", *_loop("k", numbers.rule_terms.shape[1], [each])]
-        lines += _loop("r", self.model.n_rules, of_rule)
-        if not self.is_grid:
-            lines.append(finish.format(rules, "w", self.model.n_rules))
-        return _indented(lines)
-
-    def _over_rules(self, template):
-        """What a template does with every rule r."""
-        place = "$name_slope_input[j]" if 0 < self.n_slopes < self.model.n_inputs else "j"
-        body = kept_lines(template, self.facts)
-        body = self.dialect.write(body, n_slopes=self.n_slopes, input=place)
-        return _indented(_loop("r", self.model.n_rules, body.splitlines()))
-
-
-def _at(start, index):
-    return f"{start} + {index}" if start else index
-
-
-def _declared(arrays):
-    return ", ".join(f"{name}[{length}]" for name, length in arrays.items())
-
-
-def _indented(lines):
-    return "\n".join(f"    {line}" for line in lines)
-
-
-def _loop(index, count, body):
-    head = f"for ({index} = 0; {index} < {count}; ++{index}) {{"
-    return [head, *(f"    {line}" for line in body), "}"]

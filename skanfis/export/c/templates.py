@@ -1,6 +1,7 @@
-"""The functions of a .c file, as templates.
+"""The C of a model, as one template: what is there of any model is here.
 
-The words before a "|" say when a line is there: see ``Source.facts`` in ``_source``.
+The words before a "|" are facts (see ``Source`` in ``_source``): a line is written where all of
+them hold. ``$`` words are filled in by ``Dialect.write``.
 """
 
 _REJECT_UNTOUCHED = """
@@ -30,6 +31,67 @@ FINITE_INPUT = """
         if (!(x[i] >= -$MAX && x[i] <= $MAX)) {
             return $NAME_REJECT(y, $NAME_NOT_FINITE);
         }
+"""
+
+MEMBERSHIP = """
+/* $what of a membership: $family. */
+static $real $name_$family$suffix($real x, const $real *p)
+{
+$lines
+}
+"""
+# Logarithms l of the terms of every table, or with "slope" their derivatives t along e.
+TERMS = """
+      |    for (i = 0; i < $count; ++i) {
+share |        l[$at] = $name_$family(z[$name_term_input[$at]], $name_terms$table[i]);
+slope |        t[$at] = e[$name_term_input[$at]]
+slope |            * $name_$family_slope(z[$name_term_input[$at]], $name_terms$table[i]);
+      |    }
+"""
+# Of every input of a grid: shares in the place of logarithms, or their derivatives.
+SHARES = """
+share |    $name_normalise(&l[$start], $count);
+slope |    $name_centre(&t[$start], &l[$start], $count);
+"""
+# Strengths w of rules, or the derivatives s of their logarithms. Those of a grid are products of
+# shares: one exponential per term, not per rule and input. Those of a table are normalised sums of
+# logarithms ("sums"). Of a tree, what comes to node i, w[$n_rules + i], is parted between its two
+# ends, from the root on. What a sigmoid has 80 widths off its cut, 2e-35, no sum of strengths can
+# tell from nothing: odds are held there, and no branch depends on the side on which a row lies.
+STRENGTHS = """
+normal       |$terms
+grid         |$shares
+share none   |    l[$n_terms] = 0.0R;
+slope none   |    t[$n_terms] = 0.0R;
+normal       |    for (r = 0; r < $n_rules; ++r) {
+share grid   |        w[r] = 1.0R;
+share sums   |        w[r] = 0.0R;
+slope normal |        s[r] = 0.0R;
+normal       |        for (k = 0; k < $n_places; ++k) {
+share grid   |            w[r] *= l[$name_rule_terms[r][k]];
+share sums   |            w[r] += l[$name_rule_terms[r][k]];
+slope normal |            s[r] += t[$name_rule_terms[r][k]];
+normal       |        }
+normal       |    }
+share sums   |    $name_normalise(w, $n_rules);
+slope sums   |    $name_centre(s, w, $n_rules);
+share one    |    w[0] = 1.0R;
+slope one    |    s[0] = 0.0R;
+share tree   |    w[$n_rules] = 1.0R;
+slope tree   |    s[$n_rules] = 0.0R;
+tree         |    for (i = 0; i < $n_nodes; ++i) {
+tree         |        const $int k = $name_node_input[i];
+slope tree   |        const $real ahead = e[k] * $name_nodes[i][1];
+tree         |        $real odds, above;
+tree         |        $real u = (z[k] - $name_nodes[i][0]) * $name_nodes[i][1];
+tree         |        u = u < -80.0R ? -80.0R : u;
+tree         |        odds = $EXP(-u);
+tree         |        above = 1.0R / (1.0R + odds);
+share tree   |        w[$name_node_ends[i][0]] = w[$n_rules + i] * above;
+share tree   |        w[$name_node_ends[i][1]] = w[$n_rules + i] * (odds * above);
+slope tree   |        s[$name_node_ends[i][0]] = s[$n_rules + i] + odds * above * ahead;
+slope tree   |        s[$name_node_ends[i][1]] = s[$n_rules + i] - above * ahead;
+tree         |    }
 """
 
 # Near the foot of the only term that speaks its derivative is huge, and all but the mean: what is
@@ -101,26 +163,46 @@ covers        |{
 covers        |    $real covered = 0.0R;
 covers        |    $int r;
 covers        |
-covers        |$add_support
+covers        |    for (r = 0; r < $n_rules; ++r) {
+covers        |        if (covered < enough && $name_support[r][0] > 0.0R) {
+covers        |            covered += w[r] * $name_near(z, $name_support[r]);
+covers        |        }
+covers        |    }
 covers        |    return covered;
 covers        |}
 covers        |
 plain         |/* Adds the derivative of every sum along e. */
 moves         |/* Adds the derivative along the way of inputs of group g, where others but
 moves         |   the first are held elsewhere. */
-linear        |static void $name_tangent($tangent_given, $real *change)
+plain         |static void $name_tangent($given, const $real *e, $real *change)
+moves         |static void $name_tangent(const $real *at, const $real *way, $int g, $real *change)
 linear        |{
-linear        |    $real $tangent_arrays;
-linear        |    $int $tangent_indices;
+linear normal |    $real t[$n_logarithms];
+linear        |    $real s[$n_strengths];
+moves normal  |    $real l[$n_logarithms];
+moves         |    $real w[$n_strengths], z[$NAME_N_INPUTS], e[$NAME_N_INPUTS];
+linear        |    $int r, o;
+linear terms  |    $int i;
+linear slopes |    $int j;
+linear normal |    $int k;
 linear        |
 moves         |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
 moves         |        const $int group = $name_tangent_group[i];
 moves         |        e[i] = group == g ? way[i] : 0.0R;
 moves         |        z[i] = group == 0 || group == g ? at[i] : $name_tangent_at[i];
 moves         |    }
-moves         |$strengths_inside
-linear        |$strengths_slope
-linear        |$add_changes
+moves         |$strengths
+linear        |$slopes
+linear        |    for (r = 0; r < $n_rules; ++r) {
+linear        |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+linear        |            $real f = $name_consequents[r][o][0], ahead = 0.0R;
+linear slopes |            for (j = 0; j < $n_slopes; ++j) {
+linear slopes |                f += $name_consequents[r][o][1 + j] * z[$slope_input];
+linear slopes |                ahead += $name_consequents[r][o][1 + j] * e[$slope_input];
+linear slopes |            }
+linear        |            change[o] += w[r] * (s[r] * f + ahead);
+linear        |        }
+linear        |    }
 linear        |}
 linear        |
               |$rejection
@@ -128,11 +210,16 @@ linear        |
               |$linkageint $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
               |{
               |    /* z: the input, held in the box, about the reference. */
-              |    $real $arrays;
+              |    $real z[$NAME_N_INPUTS], sum[$NAME_N_OUTPUTS], w[$n_strengths];
+ normal       |    $real l[$n_logarithms];
+ beyond       |    $real e[$NAME_N_INPUTS];
+ linear       |    $real change[$NAME_N_OUTPUTS];
  covers       |    $real top = 0.0R, enough = $limit;
  covers       |    $int best = 0;
               |    int status = $NAME_IN_RANGE;
-              |    $int $indices;
+              |    $int i, r, o;
+ slopes       |    $int j;
+ normal       |    $int k;
               |
               |$finite_input
               |        z[i] = x[i];
@@ -150,12 +237,24 @@ linear        |
  silent       |    if (status != $NAME_IN_RANGE) {
  silent       |        return $NAME_REJECT(y, status);
  silent       |    }
-              |$strengths_inside
+              |$strengths
               |
               |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
               |        sum[o] = 0.0R;
               |    }
-              |$add_rules
+              |    for (r = 0; r < $n_rules; ++r) {
+ covers       |        if (w[r] > top) {
+ covers       |            top = w[r];
+ covers       |            best = r;
+ covers       |        }
+              |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+              |            $real f = $name_consequents[r][o][0];
+ slopes       |            for (j = 0; j < $n_slopes; ++j) {
+ slopes       |                f += $name_consequents[r][o][1 + j] * z[$slope_input];
+ slopes       |            }
+              |            sum[o] += w[r] * f;
+              |        }
+              |    }
  beyond       |    if (status != $NAME_IN_RANGE) {
  fades        |        $real distance = 0.0R;
  linear       |        $real scale = 1.0R;
@@ -194,9 +293,8 @@ linear        |
               |    /* Last, so that y may be x. */
               |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
               |        y[o] = $name_offset[o] + sum[o];
- saturates    |        /* Not (y < low): NaN, of a fault, fails every comparison. */
- saturates    |        if (!(y[o] >= $name_output_low[o])) {
- clips        |        if (y[o] < $name_output_low[o]) {
+ held         |        /* Not (y < low): NaN, of a fault, fails every comparison. */
+ held         |        if (!(y[o] >= $name_output_low[o])) {
  held         |            y[o] = $name_output_low[o];
  held         |        }
  held         |        if (y[o] > $name_output_high[o]) {
@@ -205,54 +303,6 @@ linear        |
               |    }
               |    return status;
               |}
-"""
-# From the root on: of what comes to node i, $rules[$n_rules + i], a part goes to either of its two
-# ends; or the derivatives of the logarithms. What a sigmoid has 80 widths off its cut, 2e-35, no
-# sum of strengths can tell from nothing: odds are held there, and no branch depends on the side on
-# which a row lies.
-TREE = """
-      |$rules[$n_rules] = $first;
-      |for (i = 0; i < $n_nodes; ++i) {
-      |    const $int k = $name_node_input[i];
-slope |    const $real ahead = e[k] * $name_nodes[i][1];
-      |    $real odds, above;
-      |    $real u = (z[k] - $name_nodes[i][0]) * $name_nodes[i][1];
-      |    u = u < -80.0R ? -80.0R : u;
-      |    odds = $EXP(-u);
-      |    above = 1.0R / (1.0R + odds);
-share |    w[$name_node_ends[i][0]] = w[$n_rules + i] * above;
-share |    w[$name_node_ends[i][1]] = w[$n_rules + i] * (odds * above);
-slope |    s[$name_node_ends[i][0]] = s[$n_rules + i] + odds * above * ahead;
-slope |    s[$name_node_ends[i][1]] = s[$n_rules + i] - above * ahead;
-      |}
-"""
-ADD_SUPPORT = """
- |if (covered < enough && $name_support[r][0] > 0.0R) {
- |    covered += w[r] * $name_near(z, $name_support[r]);
- |}
-"""
-ADD_RULE = """
-covers |if (w[r] > top) {
-covers |    top = w[r];
-covers |    best = r;
-covers |}
-       |for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-       |    $real f = $name_consequents[r][o][0];
-slopes |    for (j = 0; j < $n_slopes; ++j) {
-slopes |        f += $name_consequents[r][o][1 + j] * z[$input];
-slopes |    }
-       |    sum[o] += w[r] * f;
-       |}
-"""
-ADD_CHANGE = """
-       |for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-       |    $real f = $name_consequents[r][o][0], ahead = 0.0R;
-slopes |    for (j = 0; j < $n_slopes; ++j) {
-slopes |        f += $name_consequents[r][o][1 + j] * z[$input];
-slopes |        ahead += $name_consequents[r][o][1 + j] * e[$input];
-slopes |    }
-       |    change[o] += w[r] * (s[r] * f + ahead);
-       |}
 """
 
 
