@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skanfis.antecedent import RuleTableAntecedent
 from skanfis.membership import FAMILIES, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS
@@ -65,6 +66,11 @@ CASES = tuple(generate())
 FEWEST = tuple(CASES[4 * i + (i + i // 4) % 4] for i in range(len(CASES) // 4))
 # The tree among them clips: one that is followed on its tangent.
 FEWEST += CASES[-2:-1]
+# Rules that look at nothing are their mean.
+FEWEST += tuple(
+    Case("no terms", "rule table", build(RuleTableAntecedent((), np.empty((3, 0), int)), **beyond))
+    for beyond in ({"out_of_bounds": "clip"}, {"out_of_bounds": "linear"})
+)
 assert {case.model.out_of_bounds for case in FEWEST} == set(OUT_OF_BOUNDS)
 
 
