@@ -9,15 +9,13 @@ from fractions import Fraction
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.cluster import KMeans
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import RobustScaler
 
 from skanfis.bounds import bounds
-from skanfis.export import export_c, fold
+from skanfis.export import export_c
 from skanfis.export.c.builder import in_digits
 from skanfis.export.c.dialect import STATUS
-from skanfis.export.c.self_test import size_of_sum
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation
@@ -96,36 +94,6 @@ def around(X, dtype="double", n_rows=2000):
 
 def answers_of(code, X, folder):
     return evaluate_all([code], X, folder, "c99", [1])[0]
-
-
-# Those whose text has least in common with that of the list above, and a pipeline.
-TRAINED = {
-    "pipeline": make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])),
-    "one cluster": quick(partition=KMeans(1), out_of_bounds="linear"),
-    "constant": quick(n_mfs=1, order=0, out_of_bounds="linear"),
-    "scheduled": quick(n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"),
-}
-
-
-@pytest.mark.theory
-@needs_compiler
-@pytest.mark.parametrize(("dtype", "flags"), [("double", SANITIZE), ("float", [])])
-def test_trained_models_answer_as_predict(dtype, flags, tmp_path):
-    X, y = surface(n_outputs=2)
-    for estimator in TRAINED.values():
-        estimator.fit(X, y)
-    Z = around(X, dtype)
-    codes = [
-        export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=None)
-        for place, estimator in enumerate(TRAINED.values())
-    ]
-    answers = evaluate_all(codes, Z, tmp_path, "c99", [2] * len(codes), flags)
-    for (kind, estimator), (found, status) in zip(TRAINED.items(), answers, strict=True):
-        wanted = estimator.predict(Z.astype(float))
-        # Rules that cancel each other take digits with them, in Python too.
-        scale = size_of_sum(fold(estimator), Z, wanted)
-        assert (np.abs(found - wanted) / scale).max() < TOLERANCE[dtype], kind
-        assert set(status) == {STATUS["IN_RANGE"], STATUS["OUT_OF_RANGE"]}, kind
 
 
 @pytest.mark.theory
@@ -354,7 +322,8 @@ def test_units_and_notes_stand_in_the_header():
 @needs_compiler
 def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     X, y = surface()
-    code = export_c(quick(n_mfs=2).fit(X, y), tmp_path / "m")
+    pipeline = make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])).fit(X, y)
+    code = export_c(pipeline, tmp_path / "m")
     flags = ["-std=c89", *STRICT, *SANITIZE, "-DM_SELF_TEST", "-DM_SELF_TEST_MAIN"]
     gcc([*flags, "m.c", "-o", "test", "-lm"], tmp_path)
     assert run(["./test"], tmp_path).returncode == 0

@@ -79,8 +79,6 @@ PIPELINES = {
     "robust": (RobustScaler(), {"n_mfs": 2, "mf": "bell", "out_of_bounds": "nan"}),
     "columns": (COLUMNS, {"partition": KMeans(4, n_init=1, random_state=0)}),
     "two": (make_pipeline(RobustScaler(), StandardScaler()), {"n_mfs": [1, 3, 1], "order": 0}),
-    "constant": (StandardScaler(), {"n_mfs": 1, "order": 0, "out_of_bounds": "linear"}),
-    "scheduled": (StandardScaler(), {"n_mfs": [1, 3, 1], "consequent_features": [2]}),
     "triangles": (
         StandardScaler(),
         {"n_mfs": 3, "mf": ["triangular", "s_shaped", "gaussian"], "out_of_bounds": "linear"},

@@ -177,9 +177,10 @@ class Source:
         text = text.replace("$terms", each(templates.TERMS, tables))
         return text.replace("$shares", each(templates.SHARES, inputs))
 
-    def _is_read(self, name):
-        """Whether the functions read a table of this name, or call a function."""
-        return re.search(rf"\b{self.dialect.name}_{name}\b", self._functions) is not None
+    @cached_property
+    def _named(self):
+        """The tables and functions that the functions name."""
+        return set(re.findall(rf"\b{self.dialect.name}_(\w+)", self._functions))
 
     @cached_property
     def tables(self):
@@ -189,13 +190,13 @@ class Source:
         }
         if self.held is not None:
             found["output_low"], found["output_high"] = self.held
-        return {name: values for name, values in found.items() if self._is_read(name)}
+        return {name: values for name, values in found.items() if name in self._named}
 
     def _memberships(self):
         """Functions of the families in use."""
         for family in dict.fromkeys(terms.family for terms in self.numbers.terms):
             for what, suffix in (("Logarithm", ""), ("Derivative of the logarithm", "_slope")):
-                if self._is_read(family.name + suffix):
+                if family.name + suffix in self._named:
                     yield self.dialect.write(
                         templates.MEMBERSHIP,
                         what=what,
