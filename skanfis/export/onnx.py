@@ -173,20 +173,14 @@ class _Formula:
             far = (followed.abs() * numbers.inverse_spread).sum() + 1.0
             way_out = followed / far
         group = numbers.tangent_group
-        y, ahead = self._rules(z, way_out if group is None else None)
-        y, changes = y + numbers.offset, [ahead]
-        if way_out is not None and group is not None:
-            changes = [
-                self._rules(
-                    z * np.isin(group, (0, g)).astype(float)
-                    + np.where(np.isin(group, (0, g)), 0.0, numbers.tangent_at),
-                    way_out * (group == g).astype(float),
-                )[1]
-                for g in np.unique(group)
-            ]
-        if way_out is not None:
-            for change in changes:
-                y = y + far * change
+        y, change = self._rules(z, way_out if group is None else None)
+        y, changes = y + numbers.offset, [] if change is None else [change]
+        for g in () if group is None or way_out is None else np.unique(group):
+            is_here = np.isin(group, (0, g))
+            there = z * is_here.astype(float) + np.where(is_here, 0.0, numbers.tangent_at)
+            changes.append(self._rules(there, way_out * (group == g).astype(float))[1])
+        for change in changes:
+            y = y + far * change
         if numbers.output_limits is not None:
             low, high = numbers.output_limits
             y = y.at_least(low).at_most(high)

@@ -14,8 +14,8 @@ from sklearn.preprocessing import RobustScaler
 
 from skanfis.bounds import bounds
 from skanfis.export import export_c
-from skanfis.export.c.builder import in_digits
 from skanfis.export.c.dialect import STATUS
+from skanfis.export.c.header import in_digits
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation

@@ -6,10 +6,10 @@ from os import PathLike
 from typing import Any
 
 from ..folding import fold
-from ._source import CCost, Source
-from .builder import header
 from .dialect import Dialect, check_arguments, write_files
+from .header import header
 from .self_test import known_answers, self_test
+from .source import CCost, Source
 
 __all__ = ["CCode", "CCost", "export_c"]
 

@@ -143,15 +143,12 @@ def comment(text):
     """Any name as something that cannot end a comment, continue a line or make a trigraph."""
     text = str(text)
     rest = "..." if len(text) > _LONGEST_COMMENT else ""
-    return _escaped(r"[^ -~]|[*\\]|\?(?=\?)", text[:_LONGEST_COMMENT]) + rest
+    return remark(text[:_LONGEST_COMMENT]) + rest
 
 
 def remark(text):
     """A text of any length for a comment, in which a star may multiply."""
-    return _escaped(r"[^ -~]|\\|\?(?=\?)|\*(?=/)|(?<=/)\*", text)
-
-
-def _escaped(unsafe, text):
+    unsafe = r"[^ -~]|\\|\?(?=\?)|\*(?=/)|(?<=/)\*"
     return re.sub(unsafe, lambda found: f"<U+{ord(found[0]):04X}>", text)
 
 

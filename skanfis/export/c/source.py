@@ -1,8 +1,8 @@
 """The .c file: constant tables, and the functions that read them.
 
-The functions are in ``templates``; here is what decides on their lines, and what they cost. The
-order of work is that of ``skanfis.model``. "linear" is worked out only outside the box, by the
-derivative along the way back.
+The functions are in ``templates``; here is which of their lines there are, how many of each thing,
+and what it costs. The order of work is that of ``skanfis.model``; "linear" is worked out outside
+the box alone, by the derivative along the way back.
 """
 
 import re
@@ -16,7 +16,7 @@ from ...policies import SILENT
 from .._numbers import Numbers
 from . import templates
 from ._expressions import Body
-from .dialect import INDEX_BYTES, index_type, kept_lines, read_limits
+from .dialect import INDEX_BYTES, STATUS, Dialect, index_type, kept_lines, read_limits
 
 
 @dataclass(frozen=True)
@@ -269,3 +269,25 @@ class Source:
         n_sums = 1 if "sums" in facts else len(numbers.counts)
         operations += [n_shares, 0, n_shares + n_products, n_sums]
         return operations
+
+
+class RulesPart(Source):
+    """The rules of a model as static functions of a larger C file, which share its status word.
+
+    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is the prefix of the
+    file and ``suffix``. ``model``, ``low`` and ``high`` are the model and its box in the type of
+    the file.
+    """
+
+    def __init__(self, model, dialect, suffix, min_coverage):
+        own = Dialect(dialect.name + suffix, dialect.real, dialect.std)
+        super().__init__(model, own, min_coverage, is_part=True)
+        self.low, self.high, self._outer = self.numbers.low, self.numbers.high, dialect.name.upper()
+
+    def text(self):
+        """The C code, for after the lines that include other files."""
+        prefix = self.dialect.name.upper()
+        sizes = {"N_INPUTS": self.model.n_inputs, "N_OUTPUTS": self.model.n_outputs}
+        macros = [f"#define {prefix}_{key} {value}\n" for key, value in sizes.items()]
+        macros += [f"#define {prefix}_{key} {self._outer}_{key}\n" for key in STATUS]
+        return f"\n/* Of the rules. */\n{''.join(macros)}\n{self.body()}"
