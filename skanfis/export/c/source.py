@@ -135,32 +135,38 @@ class Source:
     def _functions(self):
         """The functions that read the tables."""
         dialect, sizes = self.dialect, self.sizes
-        text = kept_lines(templates.FUNCTIONS, self.facts)
-        for place, template in (
-            ("$finite_input", templates.FINITE_INPUT),
-            ("$rejection", templates.rejection(self.policy, dialect.std)),
-            ("$strengths", self._strengths("share")),
-            ("$slopes", self._strengths("slope")),
-        ):
-            text = text.replace(place, template.strip("\n"))
+        parts = [
+            kept_lines(templates.TANGENT, self.facts) if "linear" in self.facts else "",
+            templates.rejection(self.policy, dialect.std),
+            kept_lines(templates.PREDICT, self.facts),
+        ]
+        text = "\n\n".join(part.strip("\n") for part in parts if part)
+        text = text.replace("$finite_input", templates.FINITE_INPUT.strip("\n"))
+        text = text.replace("$strengths", self._strengths("share"))
+        text = text.replace("$slopes", self._strengths("slope"))
         # What the place of a row is told by: z, the shares of a grid's terms, and the strengths.
         taken = ["z", "l", "w"] if "grid" in self.facts else ["z", "w"]
         is_on_some = 0 < sizes["n_slopes"] < self.model.n_inputs
-        return dialect.write(
-            f"{text}\n",
-            **sizes,
+        words = sizes | {
             # int has 16 bits at least.
-            int="long" if max(sizes["n_rules"], sizes["n_terms"]) > 32767 else "int",
-            linkage="static " if self.is_part else "",
-            limit=dialect.number(self.min_coverage or 0.0),
-            given=", ".join(f"const {dialect.real} *{name}" for name in taken),
-            taken=", ".join(taken),
-            slope_input=f"{dialect.name}_slope_input[j]" if is_on_some else "j",
-        )
+            "int": "long" if max(sizes["n_rules"], sizes["n_terms"]) > 32767 else "int",
+            "linkage": "static " if self.is_part else "",
+            "limit": dialect.number(self.min_coverage or 0.0),
+            "given": ", ".join(f"const {dialect.real} *{name}" for name in taken),
+            "taken": ", ".join(taken),
+            "slope_input": f"{dialect.name}_slope_input[j]" if is_on_some else "j",
+        }
+        text = dialect.write(f"\n{text}\n", **words)
+        for name, helper in reversed(templates.HELPERS.items()):
+            if f"{dialect.name}_{name}(" in text:
+                text = dialect.write(helper, **words) + text
+        return text.lstrip()
 
     def _strengths(self, what):
-        """The lines of the template STRENGTHS, for "share" or "slope"."""
+        """The lines that find strengths ("share"), or the derivatives of their logarithms."""
         numbers, facts = self.numbers, {*self.facts, what}
+        if "normal" not in facts:
+            return kept_lines(templates.TREE if "tree" in facts else templates.ONE, facts)
 
         def each(template, parts):
             text = kept_lines(template, facts)
@@ -173,7 +179,7 @@ class Source:
         ]
         counts = zip(numbers.block_starts, numbers.counts or (), strict=True)
         inputs = [{"start": start, "count": count} for start, count in counts]
-        text = kept_lines(templates.STRENGTHS, facts)
+        text = kept_lines(templates.TABLE, facts)
         text = text.replace("$terms", each(templates.TERMS, tables))
         return text.replace("$shares", each(templates.SHARES, inputs))
 
