@@ -16,7 +16,7 @@ from ...policies import SILENT
 from .._numbers import Numbers
 from . import templates
 from ._expressions import Body
-from .dialect import INDEX_BYTES, STATUS, Dialect, index_type, kept_lines, read_limits
+from .dialect import STATUS, Dialect, kept_lines, read_limits, table_bytes
 
 
 @dataclass(frozen=True)
@@ -75,26 +75,22 @@ class Source:
     def _facts(self):
         """What decides which lines of ``templates`` there are."""
         numbers, n_terms = self.numbers, self.model.antecedent.n_terms
-        is_grid, is_one, is_tree = (
-            bool(numbers.counts),
-            numbers.counts == (),
-            numbers.nodes is not None,
-        )
+        # Of a grid, one rule has no terms.
+        is_grid, is_one = bool(numbers.counts), numbers.counts == ()
+        is_tree, has_slopes = numbers.nodes is not None, numbers.slope_input.size > 0
         covers, answers = self.min_coverage is not None, self.policy not in SILENT
         # The tangent of a constant is the constant; one of no length is its start.
-        varies = n_terms > 0 or numbers.slope_input.size > 0
+        varies = n_terms > 0 or has_slopes
         linear = self.policy == "linear" and varies and bool(numbers.reach.any())
         moves = linear and numbers.tangent_group is not None
         facts = {
-            # How strengths are found: those of one rule without terms are one.
-            "one": is_one,
             "grid": is_grid,
             "tree": is_tree,
             "sums": not (is_one or is_grid or is_tree),
             "normal": not (is_one or is_tree),
             "none": not (is_one or is_tree) and (numbers.rule_terms == n_terms).any(),
             "terms": n_terms > 0,
-            "slopes": numbers.slope_input.size > 0,
+            "slopes": has_slopes,
             "covers": covers,
             # Rows outside the box get no answer; are less covered; are followed along the tangent.
             "silent": not answers,
@@ -191,9 +187,9 @@ class Source:
     @cached_property
     def tables(self):
         """Of the numbers, by their names, those that the functions read as constant tables."""
-        found = vars(self.numbers) | {
-            f"terms{k}": one.constants for k, one in enumerate(self.numbers.terms)
-        }
+        found = vars(self.numbers).copy()
+        for k, terms in enumerate(self.numbers.terms):
+            found[f"terms{k}"] = terms.constants
         if self.held is not None:
             found["output_low"], found["output_high"] = self.held
         return {name: values for name, values in found.items() if name in self._named}
@@ -215,11 +211,7 @@ class Source:
     def cost(self):
         """CCost of the row that takes most."""
         numbers, facts, sizes = self.numbers, self.facts, self.sizes
-        n_inputs, n_outputs, itemsize = (
-            self.model.n_inputs,
-            self.model.n_outputs,
-            numbers.dtype.itemsize,
-        )
+        n_inputs, n_outputs = self.model.n_inputs, self.model.n_outputs
         of_value, strengths = numbers.consequents.size, self._cost_of_strengths()
         operations = strengths + np.array([0, 0, of_value, 0])
         if "linear" in facts:
@@ -247,12 +239,8 @@ class Source:
             square_roots=asked,
             multiply_adds=multiply_adds,
             divisions=divisions,
-            table_bytes=sum(
-                values.size
-                * (itemsize if values.dtype.kind == "f" else INDEX_BYTES[index_type(values)])
-                for values in self.tables.values()
-            ),
-            stack_bytes=n_held * itemsize,
+            table_bytes=sum(map(table_bytes, self.tables.values())),
+            stack_bytes=n_held * numbers.dtype.itemsize,
         )
 
     def _cost_of_strengths(self, is_slope=False):
@@ -268,13 +256,11 @@ class Source:
         n_shares = sizes["n_rules" if "sums" in facts else "n_terms"]
         if is_slope:
             # Along e, and less their mean.
-            operations += [0, 0, sizes["n_terms"] + n_shares, 0]
-            return operations
+            return operations + np.array([0, 0, sizes["n_terms"] + n_shares, 0])
         # Of a grid, products of shares; one division for each sum.
         n_products = numbers.rule_terms.size if "grid" in facts else 0
         n_sums = 1 if "sums" in facts else len(numbers.counts)
-        operations += [n_shares, 0, n_shares + n_products, n_sums]
-        return operations
+        return operations + np.array([n_shares, 0, n_shares + n_products, n_sums])
 
 
 class RulesPart(Source):
