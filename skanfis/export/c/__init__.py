@@ -1,4 +1,10 @@
-"""A trained model as one C function over constant tables."""
+"""A trained model as one C function over constant tables.
+
+``fold`` takes scalers in, ``_numbers`` rounds and shifts what is written. ``source`` chooses lines
+of ``templates`` by facts of the model; ``dialect`` fills in names, types and numbers. What these
+functions name is written before them: helpers, memberships (from formulas, by ``_expressions``) and
+tables. ``self_test`` and ``header`` complete the files.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -84,10 +84,12 @@ class Source:
         linear = self.policy == "linear" and varies and bool(numbers.reach.any())
         moves = linear and numbers.tangent_group is not None
         facts = {
+            # Rules are a table of terms, whose shares multiply or logarithms add, or a tree's leaves.
+            "table": not (is_one or is_tree),
             "grid": is_grid,
-            "tree": is_tree,
             "sums": not (is_one or is_grid or is_tree),
-            "normal": not (is_one or is_tree),
+            "tree": is_tree,
+            # Some of the table look at fewer terms than others.
             "none": not (is_one or is_tree) and (numbers.rule_terms == n_terms).any(),
             "terms": n_terms > 0,
             "slopes": has_slopes,
@@ -115,7 +117,7 @@ class Source:
             "n_places": self.numbers.rule_terms.shape[1],
             "n_slopes": self.numbers.slope_input.size,
             # Logarithms of terms, and the zero of "none"; strengths of rules, and of nodes.
-            "n_logarithms": (n_terms + ("none" in facts)) * ("normal" in facts),
+            "n_logarithms": (n_terms + ("none" in facts)) * ("table" in facts),
             "n_strengths": n_rules + n_nodes,
             # Places at which tangents are found.
             "n_groups": 1 + int(max(self.numbers.tangent_group)) if "moves" in facts else 1,
@@ -161,7 +163,7 @@ class Source:
     def _strengths(self, what):
         """The lines that find strengths ("share"), or the derivatives of their logarithms."""
         numbers, facts = self.numbers, {*self.facts, what}
-        if "normal" not in facts:
+        if "table" not in facts:
             return kept_lines(templates.TREE if "tree" in facts else templates.ONE, facts)
 
         def each(template, parts):

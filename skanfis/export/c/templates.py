@@ -189,14 +189,14 @@ moves       |   the first are held elsewhere. */
 plain       |static void $name_tangent($given, const $real *e, $real *change)
 moves       |static void $name_tangent(const $real *at, const $real *way, $int g, $real *change)
             |{
-normal      |    $real t[$n_logarithms];
+table       |    $real t[$n_logarithms];
             |    $real s[$n_strengths];
-moves normal|    $real l[$n_logarithms];
+moves table |    $real l[$n_logarithms];
 moves       |    $real w[$n_strengths], z[$NAME_N_INPUTS], e[$NAME_N_INPUTS];
             |    $int r, o;
 terms       |    $int i;
 slopes      |    $int j;
-normal      |    $int k;
+table       |    $int k;
             |
 moves       |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
 moves       |        const $int group = $name_tangent_group[i];
@@ -222,7 +222,7 @@ PREDICT = """
       |{
       |    /* z: the input, held in the box, about the reference. */
       |    $real z[$NAME_N_INPUTS], sum[$NAME_N_OUTPUTS], w[$n_strengths];
-normal|    $real l[$n_logarithms];
+table |    $real l[$n_logarithms];
 beyond|    $real e[$NAME_N_INPUTS];
 linear|    $real change[$NAME_N_OUTPUTS];
 covers|    $real top = 0.0R, enough = $limit;
@@ -230,7 +230,7 @@ covers|    $int best = 0;
       |    int status = $NAME_IN_RANGE;
       |    $int i, r, o;
 slopes|    $int j;
-normal|    $int k;
+table |    $int k;
       |
       |$finite_input
       |        z[i] = x[i];
