@@ -84,7 +84,7 @@ class Source:
         linear = self.policy == "linear" and varies and bool(numbers.reach.any())
         moves = linear and numbers.tangent_group is not None
         facts = {
-            # Rules are a table of terms, whose shares multiply or logarithms add, or a tree's leaves.
+            # Rules are a table of terms, whose shares multiply or logarithms add, or a tree.
             "table": not (is_one or is_tree),
             "grid": is_grid,
             "sums": not (is_one or is_grid or is_tree),
