@@ -41,7 +41,7 @@ class Numbers:
         box = {"minimum": self.low.astype(float), "maximum": self.high.astype(float)}
         self.model = model = replace(model, **box)
         self.terms = tuple(_term_tables(model, reference))
-        self.term_inputs = model.antecedent.term_inputs
+        self.term_input = model.antecedent.term_inputs
         # Terms per input of a grid, and where those of each input start; None where there is none.
         self.counts = model.antecedent.grid_counts
         self.block_starts = np.cumsum([0, *(self.counts or ())])[:-1]
@@ -53,12 +53,12 @@ class Numbers:
         # Of a tree, its nodes from the root on: their constants, inputs, and what is below each.
         self.nodes = None
         if isinstance(model.antecedent, TreeAntecedent):
-            order, ends = model.antecedent.walk
-            self.nodes = self.terms[0].constants[order], self.term_inputs[order], ends
+            order, self.node_ends = model.antecedent.walk
+            self.nodes, self.node_input = self.terms[0].constants[order], self.term_input[order]
         # Coefficients (n_rules, n_outputs, 1 + n_slopes) about an offset, and inputs with slopes.
-        offset, coefficients, self.slope_inputs = _consequents(model, reference)
+        offset, coefficients, self.slope_input = _consequents(model, reference)
         self.offset = _rounded(offset, dtype, "a typical output")
-        self.coefficients = _rounded(coefficients, dtype, "a consequent")
+        self.consequents = _rounded(coefficients, dtype, "a consequent")
         # How far the tangent is followed in each input, so that the sum in deviations is finite.
         self.reach = _reach(model, dtype)
         # Inputs whose tangents are found at one place: those of group 0 and g, where they are; all

@@ -123,30 +123,25 @@ def model_of(document):
     file = _members({"posterior": None} | document, _FILE, "the file")
     n_rules, n_terms = len(file["rules"]), len(file["terms"])
     n_inputs, n_outputs = len(file["inputs"]), len(file["outputs"])
-    names, inputs = _inputs(file["inputs"])
-    output_names, target = _outputs(file["outputs"])
+    inputs, outputs = _inputs(file["inputs"]), _outputs(file["outputs"])
     check_size(n_rules, n_terms, n_inputs, n_outputs)
     groups, initial_groups, term_names = _terms(file["terms"], n_inputs)
     table, rules = _rules(file["rules"], n_terms, n_inputs, n_outputs)
     antecedent = _rule_base(file["rule_base"], groups, table)
     support, posterior = file["support"], file["posterior"]
     if posterior is not None:
-        n_slopes = n_inputs if rules["consequents"].shape[1] > 1 else 0
+        n_slopes = n_inputs if rules["coefficients"].shape[1] > 1 else 0
         posterior = _posterior(posterior, antecedent, n_inputs, n_slopes, n_outputs)
     return TSKModel(
         **inputs,
+        **outputs,
+        **rules,
         antecedent=antecedent,
         initial_antecedent=_rule_base(file["rule_base"], initial_groups, table),
-        coefficients=rules["consequents"],
-        rule_weights=rules["weight"],
-        rule_rows=rules["rows"],
-        input_names=names,
         out_of_bounds=file["out_of_bounds"],
         max_extrapolation=file["max_extrapolation"],
         support=None if support is None else _support(support, n_rules, n_inputs),
         term_names=term_names,
-        output_names=output_names,
-        target=target,
         posterior=posterior,
     )
 
@@ -211,24 +206,24 @@ def _of_version_1(document):
 
 
 def _inputs(inputs):
-    """Names, and what the model has of every input."""
+    """What the model has of every input."""
     found = _columns(inputs, INPUT, "inputs")
     names, arrays = tuple(found.pop("name")), {key: np.array(own) for key, own in found.items()}
-    low, high, at = arrays["minimum"], arrays["maximum"], arrays["tangent_at"]
+    low, high, at = arrays["minimum"], arrays["maximum"], arrays.pop("tangent_at")
     _check_all(low <= high, "inputs[{}]: minimum is above maximum.")
     is_free = np.isnan(at)
     is_within = is_free | ((low <= at) & (at <= high))
     _check_all(is_within, "inputs[{}]: tangent_at is not from minimum to maximum.")
-    return names, arrays | {"tangent_at": None if is_free.all() else at}
+    return arrays | {"input_names": names, "tangent_at": None if is_free.all() else at}
 
 
 def _outputs(outputs):
-    """Names, and the range of the target, which is known of every output or of none."""
+    """Names of the outputs, and the range of the target, which is known of all or of none."""
     found = _columns(outputs, OUTPUT, "outputs")
     names = tuple(found.pop("name"))
     values = [value for column in found.values() for value in column]
     if all(value in (None, -inf, inf) for value in values):
-        return names, None
+        return {"output_names": names}
     if None in values:
         raise ValueError("outputs: minimum, maximum and spread are null of some, but not of all.")
     target = TargetRange(**{key: np.array(column) for key, column in found.items()})
@@ -238,7 +233,7 @@ def _outputs(outputs):
         (target.lower <= target.maximum) & (target.upper >= target.minimum),
         "outputs[{}]: nothing from minimum to maximum is within lower and upper.",
     )
-    return names, target
+    return {"output_names": names, "target": target}
 
 
 def _terms(terms, n_inputs):
@@ -298,8 +293,9 @@ def _rules(rules, n_terms, n_inputs, n_outputs):
     if not abs(weights.sum() - 1.0) <= _ROUNDING:
         raise ValueError(f"rules[].weight: the sum over all rules is {weights.sum():g}, not 1.")
     table = np.array(found["terms"], dtype=int).reshape(len(rules), sizes[0][0])
-    found["consequents"] = np.array(found["consequents"]).transpose(0, 2, 1).copy()
-    return table, {key: np.array(found[key]) for key in ("consequents", "weight", "rows")}
+    coefficients = np.array(found["consequents"]).transpose(0, 2, 1).copy()
+    rows = np.array(found["rows"])
+    return table, {"coefficients": coefficients, "rule_weights": weights, "rule_rows": rows}
 
 
 def _support(items, n_rules, n_inputs):

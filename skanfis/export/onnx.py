@@ -173,20 +173,14 @@ class _Formula:
             far = (followed.abs() * numbers.inverse_spread).sum() + 1.0
             way_out = followed / far
         group = numbers.tangent_group
-        y, ahead = self._rules(z, way_out if group is None else None)
-        y, changes = y + numbers.offset, [ahead]
-        if way_out is not None and group is not None:
-            changes = [
-                self._rules(
-                    z * np.isin(group, (0, g)).astype(float)
-                    + np.where(np.isin(group, (0, g)), 0.0, numbers.tangent_at),
-                    way_out * (group == g).astype(float),
-                )[1]
-                for g in np.unique(group)
-            ]
-        if way_out is not None:
-            for change in changes:
-                y = y + far * change
+        y, change = self._rules(z, way_out if group is None else None)
+        y, changes = y + numbers.offset, [] if change is None else [change]
+        for g in () if group is None or way_out is None else np.unique(group):
+            is_here = np.isin(group, (0, g))
+            there = z * is_here.astype(float) + np.where(is_here, 0.0, numbers.tangent_at)
+            changes.append(self._rules(there, way_out * (group == g).astype(float))[1])
+        for change in changes:
+            y = y + far * change
         if numbers.output_limits is not None:
             low, high = numbers.output_limits
             y = y.at_least(low).at_most(high)
@@ -211,7 +205,7 @@ class _Formula:
         """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
         numbers, logs, slopes = self.numbers, [], []
         for terms in numbers.terms:
-            positions = numbers.term_inputs[terms.start : terms.start + len(terms.constants)]
+            positions = numbers.term_input[terms.start : terms.start + len(terms.constants)]
             formula = FORMULAS[terms.family].of
             value, slope = formula(z.columns(positions), terms.constants.T)
             logs.append(value())
@@ -228,9 +222,9 @@ class _Formula:
 
     def _by_rule(self, one, z):
         """The constants times ``one`` plus what slopes make of z, (n_rows, n_rules, n_outputs)."""
-        n_rules, n_outputs, n_basis = self.numbers.coefficients.shape
-        sloped = [z.columns(self.numbers.slope_inputs)] * (n_basis > 1)
-        by_output = self.numbers.coefficients.reshape(-1, n_basis).T
+        n_rules, n_outputs, n_basis = self.numbers.consequents.shape
+        sloped = [z.columns(self.numbers.slope_input)] * (n_basis > 1)
+        by_output = self.numbers.consequents.reshape(-1, n_basis).T
         return (self._joined(one, *sloped) @ by_output).reshape(n_rules, n_outputs)
 
     def _joined(self, *columns):

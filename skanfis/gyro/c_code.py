@@ -17,7 +17,6 @@ from scipy.stats import qmc
 
 from ..exceptions import OutOfBoundsWarning
 from ..export.c import CCode, export_c
-from ..export.c.builder import RulesPart, cost_lines, header_of, input_lines, policy_line
 from ..export.c.dialect import (
     LONGEST_NAME,
     Dialect,
@@ -27,7 +26,9 @@ from ..export.c.dialect import (
     status_word,
     write_files,
 )
+from ..export.c.header import cost_lines, header_of, input_lines, policy_line
 from ..export.c.self_test import ROWS, TOLERANCE, self_test, size_of_sum
+from ..export.c.source import RulesPart
 from ..export.c.templates import FINITE_INPUT, rejection
 from ..export.folding import found_by_search
 from ..policies import SILENT

@@ -194,16 +194,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
-        """Predict the target by ``estimator_``.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-
-        Returns
-        -------
-        y : ndarray of shape (n_samples,) or (n_samples, n_outputs)
-        """
+        """Predict the target by ``estimator_``, (n_samples,) or (n_samples, n_outputs)."""
         check_is_fitted(self)
         return self.estimator_.predict(X)
 

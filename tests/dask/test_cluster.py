@@ -14,6 +14,7 @@ import dask
 import dask.array as da
 from distributed import Client, LocalCluster
 from distributed.scheduler import KilledWorker
+from distributed.utils import get_mp_context
 
 from skanfis import ANFISRegressor
 from skanfis.dask import DaskANFISRegressor, rows
@@ -55,6 +56,10 @@ def test_a_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkey
 
     monkeypatch.setattr(rows, "reduce_partitions", fifth)
     options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": ":0"}
+    # Workers that are forked from a process which has imported everything, once for both.
+    worker = dask.config.config["distributed"]["worker"]
+    monkeypatch.setitem(worker, "multiprocessing-method", "forkserver")
+    get_mp_context().set_forkserver_preload(["distributed", "skanfis.dask"])
     with LocalCluster(**options) as cluster, Client(cluster) as client:
         blocks = da.from_array(X, chunks=(1000, 2)).blocks
         noted = blocks[1].map_blocks(noting(str(flag)), dtype=float, meta=X[:0])

@@ -1,13 +1,14 @@
 """Fits on dask collections are those of one process, and rows stay where they are."""
 
 import pickle
+from copy import copy
+from functools import cache
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.cluster import KMeans
-from sklearn.exceptions import UndefinedMetricWarning
 from sklearn.metrics import r2_score
 
 pytest.importorskip("dask")
@@ -66,16 +67,15 @@ def assert_same_model(one, other, rtol):
         assert_allclose(a[2], b[2], rtol=0.0, atol=10.0 * rtol)
 
 
-@pytest.mark.parametrize(
-    "chunks", [N_ROWS, 700, (1, 0, N_ROWS - 2, 1, 0)], ids=["one", "even", "odd and empty"]
-)
-def test_coefficients_are_those_of_one_process(few_are_many, chunks):
+def test_coefficients_are_those_of_one_process(few_are_many):
     X, y = data()
     single = ANFISRegressor(n_mfs=3).fit(X, y)
-    spread = DaskANFISRegressor(n_mfs=3).fit(*cut(chunks, X, y))
-    assert_same_model(spread, single, 1e-10)
-    assert spread.n_iter_ == single.n_iter_
-    assert spread.readability_.line == single.readability_.line
+    # One partition, even ones, odd and empty ones.
+    for chunks in (N_ROWS, 700, (1, 0, N_ROWS - 2, 1, 0)):
+        spread = DaskANFISRegressor(n_mfs=3).fit(*cut(chunks, X, y))
+        assert_same_model(spread, single, 1e-10)
+        assert spread.n_iter_ == single.n_iter_
+        assert spread.readability_.line == single.readability_.line
 
 
 def test_search_by_groups_with_weights_is_that_of_one_process(few_are_many, monkeypatch):
@@ -129,9 +129,9 @@ def test_parquet_of_small_files_is_read_partition_by_partition(few_are_many, tmp
     for i in range(8):
         part = table.iloc[i * 750 : (i + 1) * 750].assign(other="text")
         part.to_parquet(tmp_path / f"{i}.parquet")
-    lazy = dd.read_parquet(tmp_path)
-    model = DaskANFISRegressor(n_mfs=2).fit(lazy[NAMES], lazy["error"])
-    single = ANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
+    lazy, given = dd.read_parquet(tmp_path), {"n_mfs": 2, "agreement": 0.1, "alpha": 1e-5}
+    model = DaskANFISRegressor(**given).fit(lazy[NAMES], lazy["error"])
+    single = ANFISRegressor(**given).fit(table[NAMES], table["error"])
     assert_same_model(model, single, 1e-10)
     predicted = model.predict(lazy[NAMES])
     assert isinstance(predicted, dd.Series)
@@ -163,31 +163,40 @@ def test_what_is_lazy_is_what_is_eager(n_outputs):
             method(table)
 
 
-def scores(X, y, chunks, **settings):
-    """That of a cluster, and that of one process; rows beyond the range are far beyond it."""
-    model = DaskANFISRegressor(n_mfs=2, **settings).fit(*data(600))
-    return model.score(*cut(chunks, X, y)), ANFISRegressor.score(model, X, y)
+@cache
+def fitted():
+    """On rows at hand, which it takes as well."""
+    return DaskANFISRegressor(n_mfs=2).fit(*data(600))
 
 
-@pytest.mark.parametrize("value", [0.1, 1e9 + 0.1])
-def test_score_of_a_constant_is_zero(value):
-    X, _ = data(600)
-    assert scores(X, np.full(600, value), (250, 0, 350)) == (0.0, 0.0)
+@cache
+def fitted_on_a_frame():
+    table = frame(300)
+    return DaskANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
 
 
-def test_score_far_from_the_training_mean_loses_no_digits():
+@pytest.mark.parametrize(
+    ("change", "chunks"),
+    [
+        (lambda y: np.full(600, 0.1), (250, 0, 350)),  # of a constant: zero
+        (lambda y: np.full(600, 1e9 + 0.1), (250, 0, 350)),
+        (lambda y: y + 1e9, (250, 1, 349)),  # far from the mean of the training
+    ],
+)
+def test_score_is_that_of_one_process(change, chunks):
     X, y = data(600)
-    found, expected = scores(X, y + 1e9, (250, 1, 349))
-    assert found == pytest.approx(expected, rel=1e-12)
+    y = change(y)
+    expected = ANFISRegressor.score(fitted(), X, y)
+    assert fitted().score(*cut(chunks, X, y)) == pytest.approx(expected, rel=1e-12, abs=0.0)
 
 
 def test_score_of_one_row_is_nan_and_of_no_prediction_refused():
     X, y = data(600)
-    with pytest.warns(UndefinedMetricWarning, match="less than two samples"):
-        assert np.isnan(scores(X[:1], y[:1], 1)).all()
+    assert np.isnan(fitted().score(*cut(1, X[:1], y[:1])))
     X[300] += 1e6
+    model = copy(fitted()).set_params(out_of_bounds="nan")
     with pytest.raises(ValueError, match="y is not finite, or X is out of range"):
-        scores(X, y, 250, out_of_bounds="nan")
+        model.score(*cut(250, X, y))
 
 
 def test_score_after_merge_is_that_of_one_process():
@@ -297,34 +306,28 @@ def test_clusters_taken_as_they_are_need_no_residual(few_are_many):
 
 
 def test_prediction_wants_the_columns_of_training():
-    table = frame(300)
-    model = DaskANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
     with pytest.raises(ValueError, match="must be in the same order"):
-        model.predict(dd.from_pandas(table[NAMES[::-1]], npartitions=2))
-    model = DaskANFISRegressor(n_mfs=2).fit(table[NAMES].to_numpy(), table["error"])
+        fitted_on_a_frame().predict(dd.from_pandas(frame(300)[NAMES[::-1]], npartitions=2))
     with pytest.raises(ValueError, match="expecting 2 features"):
-        model.predict(da.zeros((10, 3)))
+        fitted().predict(da.zeros((10, 3)))
     with pytest.raises(ValueError, match="X has 1 dimensions, and a table has two"):
-        model.predict(da.zeros(10))
+        fitted().predict(da.zeros(10))
 
 
 def test_arrays_without_names_are_warned_of_once_and_not_by_every_block():
-    table = frame(300)
-    model = DaskANFISRegressor(n_mfs=2).fit(table[NAMES], table["error"])
-    X = table[NAMES].to_numpy()
+    model, table = fitted_on_a_frame(), frame(300)[NAMES]
     with pytest.warns(UserWarning, match="X does not have valid feature names") as caught:
-        lazy = model.predict(da.from_array(X, chunks=(100, 2)))
+        lazy = model.predict(da.from_array(table.to_numpy(), chunks=(100, 2)))
     assert len(caught) == 1
-    assert_array_equal(lazy.compute(), model.predict(table[NAMES]))  # a warning would be an error
+    assert_array_equal(lazy.compute(), model.predict(table))  # a warning would be an error
 
 
 def test_plain_estimator_names_the_one_for_dask():
     X, y = data(300)
-    lazy_X, lazy_y = cut(100, X, y)
     with pytest.raises(TypeError, match=r"skanfis\.dask\.DaskANFISRegressor"):
-        ANFISRegressor().fit(lazy_X, lazy_y)
+        ANFISRegressor().fit(*cut(100, X, y))
     with pytest.raises(TypeError, match=r"X\.compute"):
-        ANFISRegressor(n_mfs=1).fit(X, y).predict(lazy_X)
+        ANFISRegressor(n_mfs=1).fit(X, y).predict(*cut(100, X))
 
 
 def test_what_is_known_is_kept_as_in_one_process(few_are_many):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.membership import FAMILIES, Gaussian
 from skanfis.model import TSKModel
 from skanfis.policies import OUT_OF_BOUNDS
@@ -65,6 +66,22 @@ CASES = tuple(generate())
 FEWEST = tuple(CASES[4 * i + (i + i // 4) % 4] for i in range(len(CASES) // 4))
 # The tree among them clips: one that is followed on its tangent.
 FEWEST += CASES[-2:-1]
+
+
+def odd_ones():
+    """Rules that look at nothing, and are their mean; a line, a constant; slopes by some inputs."""
+    nothing, one = RuleTableAntecedent((), np.empty((3, 0), dtype=int)), GridAntecedent((), ())
+    linear = {"out_of_bounds": "linear"}
+    yield Case("no terms, clip", "rule table", build(nothing))
+    yield Case("no terms, linear", "rule table", build(nothing, **linear))
+    yield Case("a line", "grid", build(one, 1, 2, **linear))
+    yield Case("a constant", "grid", build(one, 0, **linear))
+    model = build(random_grid(np.random.default_rng(0), [Gaussian] * 3, (1, 3, 1)), **linear)
+    model.coefficients[:, [1, 3]] = 0.0
+    yield Case("scheduled", "grid", model)
+
+
+FEWEST += tuple(odd_ones())
 assert {case.model.out_of_bounds for case in FEWEST} == set(OUT_OF_BOUNDS)
 
 

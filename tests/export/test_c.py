@@ -9,16 +9,13 @@ from fractions import Fraction
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.cluster import KMeans
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import RobustScaler
 
-from skanfis.antecedent import RuleTableAntecedent
 from skanfis.bounds import bounds
-from skanfis.export import export_c, fold
-from skanfis.export.c.builder import in_digits
+from skanfis.export import export_c
 from skanfis.export.c.dialect import STATUS
-from skanfis.export.c.self_test import size_of_sum
+from skanfis.export.c.header import in_digits
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation
@@ -27,7 +24,7 @@ from skanfis.policies import OUT_OF_BOUNDS
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from .every_model import CASES, FEWEST, full_scale, rows, surface
-from .rule_bases import MODELS, build
+from .rule_bases import MODELS
 
 MIN_COVERAGE = 0.3
 TOLERANCE = {"double": 1e-12, "float": 1e-5}
@@ -99,42 +96,13 @@ def answers_of(code, X, folder):
     return evaluate_all([code], X, folder, "c99", [1])[0]
 
 
-# Those whose text has least in common with that of the list above, and a pipeline.
-TRAINED = {
-    "pipeline": make_pipeline(RobustScaler(), quick(n_mfs=[3, 2, 2])),
-    "one cluster": quick(partition=KMeans(1), out_of_bounds="linear"),
-    "constant": quick(n_mfs=1, order=0, out_of_bounds="linear"),
-    "scheduled": quick(n_mfs=[1, 3, 1], consequent_features=[2], out_of_bounds="linear"),
-}
-
-
-@pytest.mark.theory
-@needs_compiler
-@pytest.mark.parametrize(("dtype", "flags"), [("double", SANITIZE), ("float", [])])
-def test_trained_models_answer_as_predict(dtype, flags, tmp_path):
-    X, y = surface(n_outputs=2)
-    for estimator in TRAINED.values():
-        estimator.fit(X, y)
-    Z = around(X, dtype)
-    codes = [
-        export_c(estimator, name=f"m{place}", dtype=dtype, min_coverage=None)
-        for place, estimator in enumerate(TRAINED.values())
-    ]
-    answers = evaluate_all(codes, Z, tmp_path, "c99", [2] * len(codes), flags)
-    for (kind, estimator), (found, status) in zip(TRAINED.items(), answers, strict=True):
-        wanted = estimator.predict(Z.astype(float))
-        # Rules that cancel each other take digits with them, in Python too.
-        scale = size_of_sum(fold(estimator), Z, wanted)
-        assert (np.abs(found - wanted) / scale).max() < TOLERANCE[dtype], kind
-        assert set(status) == {STATUS["IN_RANGE"], STATUS["OUT_OF_RANGE"]}, kind
-
-
 @pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
 def test_outputs_are_held_between_limits(dtype, std, tmp_path):
     X, y = surface(n_outputs=2)
-    estimator = quick(n_mfs=2, max_iter=5, solver=VariableProjection(tol=1.0)).fit(X, y)
+    rules = quick(n_mfs=[3, 2, 2], max_iter=5, solver=VariableProjection(tol=1.0))
+    estimator = make_pipeline(RobustScaler(), rules).fit(X, y)
     Z = around(X, dtype)
     expected = estimator.predict(Z.astype(float))
     limits = np.quantile(expected, [0.2, 0.7], axis=0).T
@@ -200,7 +168,7 @@ def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
     plane = quick(n_mfs=1, **endless).fit(X, y)
     models = [plane, *(quick(n_mfs=3, mf=mf, **endless).fit(X, y) for mf in MEMBERSHIPS)]
     codes = [export_c(m, name=f"m{k}", dtype=dtype) for k, m in enumerate(models)]
-    answers = evaluate_all(codes, Z, tmp_path, "c99", [1] * len(codes))
+    answers = evaluate_all(codes, Z, tmp_path, "c99", [1] * len(codes), flags=[])
     beyond = (Z != 0.0).any(axis=1)
     for found, status in answers:
         assert np.isfinite(found).all()
@@ -229,9 +197,8 @@ def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
 
 @pytest.mark.theory
 @needs_compiler
-@pytest.mark.parametrize("dtype", ["float", "double"])
-@pytest.mark.parametrize("kind", ["grid", "rule table"])
-def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path):
+@pytest.mark.parametrize(("kind", "dtype"), [("grid", "float"), ("rule table", "double")])
+def test_no_state_no_heap_and_tables_of_the_size_reported(kind, dtype, tmp_path):
     case = next(c for c in CASES if c.partition == kind and c.model.out_of_bounds == "linear")
     code = export_c(case.model, tmp_path / "m", dtype=dtype)
     gcc(["-std=c99", "-Os", "-c", "m.c", "-o", "m.o"], tmp_path)
@@ -258,13 +225,12 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(dtype, kind, tmp_path)
 
 @pytest.mark.theory
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler")
-@pytest.mark.parametrize("dtype", ["float", "double"])
-def test_files_are_cpp_too(dtype, tmp_path):
-    for i, case in enumerate(CASES[::17]):
-        export_c(case.model, tmp_path / f"m{i}", dtype=dtype)
-    (tmp_path / "all.cpp").write_text(
-        "".join(f'#include "m{i}.c"\n' for i in range(len(CASES[::17]))), encoding="ascii"
-    )
+def test_files_are_cpp_too(tmp_path):
+    cases = CASES[::17]
+    for i, case in enumerate(cases):
+        export_c(case.model, tmp_path / f"m{i}", dtype=("float", "double")[i % 2])
+    included = "".join(f'#include "m{i}.c"\n' for i in range(len(cases)))
+    (tmp_path / "all.cpp").write_text(included, encoding="ascii")
     flags = ["-std=c++11", "-Wall", "-Wextra", "-Werror", "-pedantic"]
     gcc([*flags, "-c", "all.cpp", "-o", "all.o"], tmp_path, compiler="g++")
     assert (tmp_path / "all.o").stat().st_size > 0
@@ -425,13 +391,3 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
 def test_bad_argument(arguments, message):
     with pytest.raises(ValueError, match=message):
         export_c(CASES[0].model, **arguments)
-
-
-@needs_compiler
-@pytest.mark.parametrize("policy", ["clip", "linear"])
-def test_rules_that_look_at_nothing_are_their_mean(policy, tmp_path):
-    antecedent = RuleTableAntecedent((), np.empty((3, 0), dtype=int))
-    model = build(antecedent, out_of_bounds=policy)
-    X = rows(np.float64, 50)
-    found, _ = answers_of(export_c(model, name="m", min_coverage=None), X, tmp_path)
-    np.testing.assert_allclose(found, model.predict(X), rtol=1e-12)

@@ -30,7 +30,7 @@ from ..quick import quick, with_few_candidates
 from .fis_files import BY_HAND
 
 ESTIMATORS = {
-    "auto": ANFISRegressor(),
+    "auto": ANFISRegressor(max_rules=2),
     "own subtractive": quick(partition=SubtractiveClustering(radius=0.6)),
     "own fcm": quick(partition=FuzzyCMeans(3)),
     "clusterer": quick(partition=KMeans(3, random_state=0)),
@@ -79,7 +79,7 @@ def compensator():
 MADE = {name: partial(fitted, estimator) for name, estimator in ESTIMATORS.items()}
 MADE |= {
     "learning": lambda: (quick().partial_fit(X, Y), X),
-    "intervals": lambda: (ConformalRegressor(quick()).fit(X, Y[:, 0]), X),
+    "intervals": lambda: (ConformalRegressor(quick(), cv=2).fit(X, Y[:, 0]), X),
     "compensator": compensator,
 }
 

@@ -21,7 +21,7 @@ from skanfis.gyro import (
 )
 from skanfis.gyro.compensator import features
 
-from ..export.json_mutations import mutated_numbers, with_number
+from ..export.mutations import mutated_numbers, with_number
 from ..quick import quick
 
 INPUTS = ("time", "temperature", "temperature_rate", "output")

@@ -12,8 +12,7 @@ from skanfis.export import export_fis, export_json
 from skanfis.export.fis.reader import parse_fis
 from skanfis.export.json_reader import parse_json
 
-from ..export.json_mutations import HOSTILE_NUMBERS, number_paths, with_number
-from ..export.mutations import mutated, seeds
+from ..export.mutations import HOSTILE_NUMBERS, mutated, number_paths, seeds, with_number
 from ..export.rule_bases import rows_of
 from .strategies import frozen_models
 

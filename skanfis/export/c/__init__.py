@@ -1,4 +1,10 @@
-"""A trained model as one C function over constant tables."""
+"""A trained model as one C function over constant tables.
+
+``fold`` takes scalers in, ``_numbers`` rounds and shifts what is written. ``source`` chooses lines
+of ``templates`` by facts of the model; ``dialect`` fills in names, types and numbers. What these
+functions name is written before them: helpers, memberships (from formulas, by ``_expressions``) and
+tables. ``self_test`` and ``header`` complete the files.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -6,10 +12,10 @@ from os import PathLike
 from typing import Any
 
 from ..folding import fold
-from ._source import CCost, Source
-from .builder import header
 from .dialect import Dialect, check_arguments, write_files
+from .header import header
 from .self_test import known_answers, self_test
+from .source import CCost, Source
 
 __all__ = ["CCode", "CCost", "export_c"]
 

@@ -37,26 +37,27 @@ class _Number:
 class Body:
     """A function of x and p: log mu of a family, or its derivative by x.
 
-    ``lines`` are its statements; ``cost`` is how many exponentials, logarithms, multiplications and
+    ``text`` has its statements; ``cost`` is how many exponentials, logarithms, multiplications and
     divisions they have.
     """
 
     def __init__(self, family, dialect, is_slope):
-        self.dialect, self.lines = dialect, []
+        self.dialect = dialect
+        self._lines: list[str] = []
         self._operations: Counter = Counter()
         formula = FORMULAS[family]
         n_constants = len(formula.constants([0.0] * len(family.parameters)))
         p = [_Number(f"p[{k}]", self) for k in range(n_constants)]
         result = formula.of(_Number("x", self), p)[is_slope]()
-        self.lines.append(f"return {result.text};")
+        self.text = "".join([*self._lines, f"    return {result.text};"])
         operations = ("$EXP({0})", "$LOG({0})", "{0} * {1}", "{0} / {1}")
         self.cost = [self._operations[one] for one in operations]
 
     def add(self, template, operands):
         """The number that a new line makes of others."""
         self._operations[template] += 1
-        name, text = f"t{len(self.lines)}", template.format(*map(self.text_of, operands))
-        self.lines.append(self.dialect.write(f"const $real {name} = {text};"))
+        name, text = f"t{len(self._lines)}", template.format(*map(self.text_of, operands))
+        self._lines.append(self.dialect.write(f"    const $real {name} = {text};\n"))
         return _Number(name, self)
 
     def text_of(self, number):

@@ -23,7 +23,7 @@ _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
 # A name in a comment stays on its line.
 _LONGEST_COMMENT = 60
 # Unsigned types of positions, and the bytes that they take nearly everywhere.
-INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
+_INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 _BITS = {
     "IN_RANGE": (0, ""),
     "OUT_OF_RANGE": (1, " /* an input lies outside the range of the training data */"),
@@ -112,7 +112,13 @@ def kept_lines(template, facts):
 def index_type(values):
     """The smallest unsigned type that holds these positions whatever the width of a char is."""
     largest = max(map(int, np.ravel(values)), default=0)
-    return next(kind for kind, n_bytes in INDEX_BYTES.items() if largest < 256**n_bytes)
+    return next(kind for kind, n_bytes in _INDEX_BYTES.items() if largest < 256**n_bytes)
+
+
+def table_bytes(values):
+    """What a table takes in memory."""
+    of_each = values.itemsize if values.dtype.kind == "f" else _INDEX_BYTES[index_type(values)]
+    return values.size * of_each
 
 
 def _literal(value):
@@ -143,15 +149,12 @@ def comment(text):
     """Any name as something that cannot end a comment, continue a line or make a trigraph."""
     text = str(text)
     rest = "..." if len(text) > _LONGEST_COMMENT else ""
-    return _escaped(r"[^ -~]|[*\\]|\?(?=\?)", text[:_LONGEST_COMMENT]) + rest
+    return remark(text[:_LONGEST_COMMENT]) + rest
 
 
 def remark(text):
     """A text of any length for a comment, in which a star may multiply."""
-    return _escaped(r"[^ -~]|\\|\?(?=\?)|\*(?=/)|(?<=/)\*", text)
-
-
-def _escaped(unsafe, text):
+    unsafe = r"[^ -~]|\\|\?(?=\?)|\*(?=/)|(?<=/)\*"
     return re.sub(unsafe, lambda found: f"<U+{ord(found[0]):04X}>", text)
 
 

@@ -1,6 +1,7 @@
-"""The functions of a .c file, as templates.
+"""The C of a model, as templates.
 
-The words before a "|" say when a line is there: see ``Source.facts`` in ``_source``.
+The words before a "|" are facts, see ``Source.facts``: a line is written where all of them hold.
+``$`` words are filled in by ``Dialect.write``. A function or table is written where it is named.
 """
 
 _REJECT_UNTOUCHED = """
@@ -32,227 +33,287 @@ FINITE_INPUT = """
         }
 """
 
+MEMBERSHIP = """
+/* $what of a membership: $family. */
+static $real $name_$family$suffix($real x, const $real *p)
+{
+$lines
+}
+"""
+# Logarithms l of the terms of every table, or with "slope" their derivatives t along e.
+TERMS = """
+      |    for (i = 0; i < $count; ++i) {
+share |        l[$at] = $name_$family(z[$name_term_input[$at]], $name_terms$table[i]);
+slope |        t[$at] = e[$name_term_input[$at]]
+slope |            * $name_$family_slope(z[$name_term_input[$at]], $name_terms$table[i]);
+      |    }
+"""
+# Of every input of a grid: shares in the place of logarithms, or their derivatives.
+SHARES = """
+share |    $name_normalise(&l[$start], $count);
+slope |    $name_centre(&t[$start], &l[$start], $count);
+"""
+# Strengths w of rules, or the derivatives s of their logarithms: of one rule without terms; of a
+# grid, products of shares, so that there is one exponential per term and not per rule and input; of
+# a table, normalised sums of logarithms.
+ONE = """
+share |    w[0] = 1.0R;
+slope |    s[0] = 0.0R;
+"""
+TABLE = """
+           |$terms
+grid       |$shares
+share none |    l[$n_terms] = 0.0R;
+slope none |    t[$n_terms] = 0.0R;
+           |    for (r = 0; r < $n_rules; ++r) {
+share grid |        w[r] = 1.0R;
+share sums |        w[r] = 0.0R;
+slope      |        s[r] = 0.0R;
+           |        for (k = 0; k < $n_places; ++k) {
+share grid |            w[r] *= l[$name_rule_terms[r][k]];
+share sums |            w[r] += l[$name_rule_terms[r][k]];
+slope      |            s[r] += t[$name_rule_terms[r][k]];
+           |        }
+           |    }
+share sums |    $name_normalise(w, $n_rules);
+slope sums |    $name_centre(s, w, $n_rules);
+"""
+# Of a tree what comes to node i, w[$n_rules + i], is parted between its two ends, from the root on:
+# one exponential per node. What a sigmoid has 80 widths off its cut, 2e-35, no sum of strengths can
+# tell from nothing: odds are held there, and no branch depends on the side on which a row lies.
+TREE = """
+share |    w[$n_rules] = 1.0R;
+slope |    s[$n_rules] = 0.0R;
+      |    for (i = 0; i < $n_nodes; ++i) {
+      |        const $int k = $name_node_input[i];
+slope |        const $real ahead = e[k] * $name_nodes[i][1];
+      |        $real odds, above;
+      |        $real u = (z[k] - $name_nodes[i][0]) * $name_nodes[i][1];
+      |        u = u < -80.0R ? -80.0R : u;
+      |        odds = $EXP(-u);
+      |        above = 1.0R / (1.0R + odds);
+share |        w[$name_node_ends[i][0]] = w[$n_rules + i] * above;
+share |        w[$name_node_ends[i][1]] = w[$n_rules + i] * (odds * above);
+slope |        s[$name_node_ends[i][0]] = s[$n_rules + i] + odds * above * ahead;
+slope |        s[$name_node_ends[i][1]] = s[$n_rules + i] - above * ahead;
+      |    }
+"""
+
+# What may be called in the functions below, or in a helper below.
+_NORMALISE = """
+/* Turns n logarithms into shares that add up to one. */
+static void $name_normalise($real *l, $int n)
+{
+    $int i;
+    $real top = l[0], sum = 0.0R;
+    for (i = 1; i < n; ++i) {
+        if (l[i] > top) {
+            top = l[i];
+        }
+    }
+    for (i = 0; i < n; ++i) {
+        l[i] = $EXP(l[i] - top);
+        sum += l[i];
+    }
+    sum = 1.0R / sum;
+    for (i = 0; i < n; ++i) {
+        l[i] *= sum;
+    }
+}
+"""
 # Near the foot of the only term that speaks its derivative is huge, and all but the mean: what is
 # left of it would have no digits; so the strongest term's is subtracted first.
-FUNCTIONS = """
-normal        |/* Turns n logarithms into shares that add up to one. */
-normal        |static void $name_normalise($real *l, $int n)
-normal        |{
-normal        |    $int i;
-normal        |    $real top = l[0], sum = 0.0R;
-normal        |    for (i = 1; i < n; ++i) {
-normal        |        if (l[i] > top) {
-normal        |            top = l[i];
-normal        |        }
-normal        |    }
-normal        |    for (i = 0; i < n; ++i) {
-normal        |        l[i] = $EXP(l[i] - top);
-normal        |        sum += l[i];
-normal        |    }
-normal        |    sum = 1.0R / sum;
-normal        |    for (i = 0; i < n; ++i) {
-normal        |        l[i] *= sum;
-normal        |    }
-normal        |}
-normal        |
-linear normal|/* Subtracts from n derivatives their mean by the n shares. */
-linear normal|static void $name_centre($real *s, const $real *share, $int n)
-linear normal|{
-linear normal|    $int i, top = 0;
-linear normal|    $real most, mean = 0.0R;
-linear normal|    for (i = 1; i < n; ++i) {
-linear normal|        if (share[i] > share[top]) {
-linear normal|            top = i;
-linear normal|        }
-linear normal|    }
-linear normal|    most = s[top];
-linear normal|    for (i = 0; i < n; ++i) {
-linear normal|        s[i] -= most;
-linear normal|        mean += share[i] * s[i];
-linear normal|    }
-linear normal|    for (i = 0; i < n; ++i) {
-linear normal|        s[i] -= mean;
-linear normal|    }
-linear normal|}
-linear normal|
-covers        |/* Of a rule in coverage: its share, falling with the distance from its data. */
-covers        |static $real $name_near(const $real *z, const $real *p)
-covers        |{
-covers        |    const $real *centre = p + 2, *factor = p + 2 + $NAME_N_INPUTS;
-covers        |    $real square = 0.0R, beyond;
-covers        |    int i, k;
-covers        |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
-covers        |        $real t = 0.0R;
-covers        |        for (k = 0; k <= i; ++k) {
-covers        |            t += *factor++ * (z[k] - centre[k]);
-covers        |        }
-covers        |        square += t * t;
-covers        |    }
-covers        |    if (square <= p[1] * p[1]) {
-covers        |        return p[0];
-covers        |    }
-covers        |    beyond = $SQRT(square) - p[1];
-covers        |    return p[0] * $EXP(-0.5R * beyond * beyond);
-covers        |}
-covers        |
-covers        |/* The coverage in the box, or a part of it that is enough. */
-covers        |static $real $name_coverage(const $real *z, const $real *w, $real enough)
-covers        |{
-covers        |    $real covered = 0.0R;
-covers        |    $int r;
-covers        |
-covers        |$add_support
-covers        |    return covered;
-covers        |}
-covers        |
-plain         |/* Adds the derivative of every sum along e. */
-moves         |/* Adds the derivative along the way of inputs of group g, where others but
-moves         |   the first are held elsewhere. */
-linear        |static void $name_tangent($tangent_given, $real *change)
-linear        |{
-linear        |    $real $tangent_arrays;
-linear        |    $int $tangent_indices;
-linear        |
-moves         |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
-moves         |        const $int group = $name_tangent_group[i];
-moves         |        e[i] = group == g ? way[i] : 0.0R;
-moves         |        z[i] = group == 0 || group == g ? at[i] : $name_tangent_at[i];
-moves         |    }
-moves         |$strengths_inside
-linear        |$strengths_slope
-linear        |$add_changes
-linear        |}
-linear        |
-              |$rejection
-              |
-              |$linkageint $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
-              |{
-              |    /* z: the input, held in the box, about the reference. */
-              |    $real $arrays;
- covers       |    $real top = 0.0R, enough = $limit;
- covers       |    $int best = 0;
-              |    int status = $NAME_IN_RANGE;
-              |    $int $indices;
-              |
-              |$finite_input
-              |        z[i] = x[i];
-              |        if (z[i] < $name_low[i]) {
-              |            z[i] = $name_low[i];
-              |            status = $NAME_OUT_OF_RANGE;
-              |        }
-              |        if (z[i] > $name_high[i]) {
-              |            z[i] = $name_high[i];
-              |            status = $NAME_OUT_OF_RANGE;
-              |        }
- beyond       |        e[i] = x[i] - z[i];
-              |        z[i] -= $name_reference[i];
-              |    }
- silent       |    if (status != $NAME_IN_RANGE) {
- silent       |        return $NAME_REJECT(y, status);
- silent       |    }
-              |$strengths_inside
-              |
-              |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-              |        sum[o] = 0.0R;
-              |    }
-              |$add_rules
- beyond       |    if (status != $NAME_IN_RANGE) {
- fades        |        $real distance = 0.0R;
- linear       |        $real scale = 1.0R;
- beyond       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
- fades        |            const $real d = e[i] * $name_inverse_spread[i];
- fades        |            distance += d * d;
- linear       |            if (e[i] > $name_reach[i]) {
- linear       |                e[i] = $name_reach[i];
- linear       |            }
- linear       |            if (e[i] < -$name_reach[i]) {
- linear       |                e[i] = -$name_reach[i];
- linear       |            }
- linear       |            scale += (e[i] < 0.0R ? -e[i] : e[i]) * $name_inverse_spread[i];
- beyond       |        }
- fades        |        /* The coverage falls with the distance: more of it is asked for. */
- fades        |        enough = $limit * $EXP(0.5R * distance);
- linear       |        /* First along a part of the way, since products could overflow. */
- linear       |        for (i = 0; i < $NAME_N_INPUTS; ++i) {
- linear       |            e[i] /= scale;
- linear       |        }
- linear       |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
- linear       |            change[o] = 0.0R;
- linear       |        }
- plain        |        $name_tangent($taken, e, change);
- moves        |        for (i = 0; i < $n_groups; ++i) {
- moves        |            $name_tangent(z, e, i, change);
- moves        |        }
- linear       |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
- linear       |            sum[o] += scale * change[o];
- linear       |        }
- beyond       |    }
- covers       |    if (top * $name_near(z, $name_support[best]) < enough
- covers       |        && $name_coverage(z, w, enough) < enough) {
- covers       |        status |= $NAME_UNCOVERED;
- covers       |    }
-              |    /* Last, so that y may be x. */
-              |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-              |        y[o] = $name_offset[o] + sum[o];
- saturates    |        /* Not (y < low): NaN, of a fault, fails every comparison. */
- saturates    |        if (!(y[o] >= $name_output_low[o])) {
- clips        |        if (y[o] < $name_output_low[o]) {
- held         |            y[o] = $name_output_low[o];
- held         |        }
- held         |        if (y[o] > $name_output_high[o]) {
- held         |            y[o] = $name_output_high[o];
- held         |        }
-              |    }
-              |    return status;
-              |}
+_CENTRE = """
+/* Subtracts from n derivatives their mean by the n shares. */
+static void $name_centre($real *s, const $real *share, $int n)
+{
+    $int i, top = 0;
+    $real most, mean = 0.0R;
+    for (i = 1; i < n; ++i) {
+        if (share[i] > share[top]) {
+            top = i;
+        }
+    }
+    most = s[top];
+    for (i = 0; i < n; ++i) {
+        s[i] -= most;
+        mean += share[i] * s[i];
+    }
+    for (i = 0; i < n; ++i) {
+        s[i] -= mean;
+    }
+}
 """
-# From the root on: of what comes to node i, $rules[$n_rules + i], a part goes to either of its two
-# ends; or the derivatives of the logarithms. What a sigmoid has 80 widths off its cut, 2e-35, no
-# sum of strengths can tell from nothing: odds are held there, and no branch depends on the side on
-# which a row lies.
-TREE = """
-      |$rules[$n_rules] = $first;
-      |for (i = 0; i < $n_nodes; ++i) {
-      |    const $int k = $name_node_input[i];
-slope |    const $real ahead = e[k] * $name_nodes[i][1];
-      |    $real odds, above;
-      |    $real u = (z[k] - $name_nodes[i][0]) * $name_nodes[i][1];
-      |    u = u < -80.0R ? -80.0R : u;
-      |    odds = $EXP(-u);
-      |    above = 1.0R / (1.0R + odds);
-share |    w[$name_node_ends[i][0]] = w[$n_rules + i] * above;
-share |    w[$name_node_ends[i][1]] = w[$n_rules + i] * (odds * above);
-slope |    s[$name_node_ends[i][0]] = s[$n_rules + i] + odds * above * ahead;
-slope |    s[$name_node_ends[i][1]] = s[$n_rules + i] - above * ahead;
+_NEAR = """
+/* Of a rule in coverage: its share, falling with the distance from its data. */
+static $real $name_near(const $real *z, const $real *p)
+{
+    const $real *centre = p + 2, *factor = p + 2 + $NAME_N_INPUTS;
+    $real square = 0.0R, beyond;
+    int i, k;
+    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+        $real t = 0.0R;
+        for (k = 0; k <= i; ++k) {
+            t += *factor++ * (z[k] - centre[k]);
+        }
+        square += t * t;
+    }
+    if (square <= p[1] * p[1]) {
+        return p[0];
+    }
+    beyond = $SQRT(square) - p[1];
+    return p[0] * $EXP(-0.5R * beyond * beyond);
+}
+"""
+_COVERAGE = """
+/* The coverage in the box, or a part of it that is enough. */
+static $real $name_coverage(const $real *z, const $real *w, $real enough)
+{
+    $real covered = 0.0R;
+    $int r;
+
+    for (r = 0; r < $n_rules; ++r) {
+        if (covered < enough && $name_support[r][0] > 0.0R) {
+            covered += w[r] * $name_near(z, $name_support[r]);
+        }
+    }
+    return covered;
+}
+"""
+HELPERS = {"normalise": _NORMALISE, "centre": _CENTRE, "near": _NEAR, "coverage": _COVERAGE}
+
+TANGENT = """
+plain       |/* Adds the derivative of every sum along e. */
+moves       |/* Adds the derivative along the way of inputs of group g, where others but
+moves       |   the first are held elsewhere. */
+plain       |static void $name_tangent($given, const $real *e, $real *change)
+moves       |static void $name_tangent(const $real *at, const $real *way, $int g, $real *change)
+            |{
+table       |    $real t[$n_logarithms];
+            |    $real s[$n_strengths];
+moves table |    $real l[$n_logarithms];
+moves       |    $real w[$n_strengths], z[$NAME_N_INPUTS], e[$NAME_N_INPUTS];
+            |    $int r, o;
+terms       |    $int i;
+slopes      |    $int j;
+table       |    $int k;
+            |
+moves       |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
+moves       |        const $int group = $name_tangent_group[i];
+moves       |        e[i] = group == g ? way[i] : 0.0R;
+moves       |        z[i] = group == 0 || group == g ? at[i] : $name_tangent_at[i];
+moves       |    }
+moves       |$strengths
+            |$slopes
+            |    for (r = 0; r < $n_rules; ++r) {
+            |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+            |            $real f = $name_consequents[r][o][0], ahead = 0.0R;
+slopes      |            for (j = 0; j < $n_slopes; ++j) {
+slopes      |                f += $name_consequents[r][o][1 + j] * z[$slope_input];
+slopes      |                ahead += $name_consequents[r][o][1 + j] * e[$slope_input];
+slopes      |            }
+            |            change[o] += w[r] * (s[r] * f + ahead);
+            |        }
+            |    }
+            |}
+"""
+PREDICT = """
+      |$linkageint $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
+      |{
+      |    /* z: the input, held in the box, about the reference. */
+      |    $real z[$NAME_N_INPUTS], sum[$NAME_N_OUTPUTS], w[$n_strengths];
+table |    $real l[$n_logarithms];
+beyond|    $real e[$NAME_N_INPUTS];
+linear|    $real change[$NAME_N_OUTPUTS];
+covers|    $real top = 0.0R, enough = $limit;
+covers|    $int best = 0;
+      |    int status = $NAME_IN_RANGE;
+      |    $int i, r, o;
+slopes|    $int j;
+table |    $int k;
+      |
+      |$finite_input
+      |        z[i] = x[i];
+      |        if (z[i] < $name_low[i]) {
+      |            z[i] = $name_low[i];
+      |            status = $NAME_OUT_OF_RANGE;
+      |        }
+      |        if (z[i] > $name_high[i]) {
+      |            z[i] = $name_high[i];
+      |            status = $NAME_OUT_OF_RANGE;
+      |        }
+beyond|        e[i] = x[i] - z[i];
+      |        z[i] -= $name_reference[i];
+      |    }
+silent|    if (status != $NAME_IN_RANGE) {
+silent|        return $NAME_REJECT(y, status);
+silent|    }
+      |$strengths
+      |
+      |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+      |        sum[o] = 0.0R;
+      |    }
+      |    for (r = 0; r < $n_rules; ++r) {
+covers|        if (w[r] > top) {
+covers|            top = w[r];
+covers|            best = r;
+covers|        }
+      |        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+      |            $real f = $name_consequents[r][o][0];
+slopes|            for (j = 0; j < $n_slopes; ++j) {
+slopes|                f += $name_consequents[r][o][1 + j] * z[$slope_input];
+slopes|            }
+      |            sum[o] += w[r] * f;
+      |        }
+      |    }
+beyond|    if (status != $NAME_IN_RANGE) {
+fades |        $real distance = 0.0R;
+linear|        $real scale = 1.0R;
+beyond|        for (i = 0; i < $NAME_N_INPUTS; ++i) {
+fades |            const $real d = e[i] * $name_inverse_spread[i];
+fades |            distance += d * d;
+linear|            if (e[i] > $name_reach[i]) {
+linear|                e[i] = $name_reach[i];
+linear|            }
+linear|            if (e[i] < -$name_reach[i]) {
+linear|                e[i] = -$name_reach[i];
+linear|            }
+linear|            scale += (e[i] < 0.0R ? -e[i] : e[i]) * $name_inverse_spread[i];
+beyond|        }
+fades |        /* The coverage falls with the distance: more of it is asked for. */
+fades |        enough = $limit * $EXP(0.5R * distance);
+linear|        /* First along a part of the way, since products could overflow. */
+linear|        for (i = 0; i < $NAME_N_INPUTS; ++i) {
+linear|            e[i] /= scale;
+linear|        }
+linear|        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+linear|            change[o] = 0.0R;
+linear|        }
+plain |        $name_tangent($taken, e, change);
+moves |        for (i = 0; i < $n_groups; ++i) {
+moves |            $name_tangent(z, e, i, change);
+moves |        }
+linear|        for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+linear|            sum[o] += scale * change[o];
+linear|        }
+beyond|    }
+covers|    if (top * $name_near(z, $name_support[best]) < enough
+covers|        && $name_coverage(z, w, enough) < enough) {
+covers|        status |= $NAME_UNCOVERED;
+covers|    }
+      |    /* Last, so that y may be x. */
+      |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
+      |        y[o] = $name_offset[o] + sum[o];
+held  |        /* Not (y < low): NaN, of a fault, fails every comparison. */
+held  |        if (!(y[o] >= $name_output_low[o])) {
+held  |            y[o] = $name_output_low[o];
+held  |        }
+held  |        if (y[o] > $name_output_high[o]) {
+held  |            y[o] = $name_output_high[o];
+held  |        }
+      |    }
+      |    return status;
       |}
-"""
-ADD_SUPPORT = """
- |if (covered < enough && $name_support[r][0] > 0.0R) {
- |    covered += w[r] * $name_near(z, $name_support[r]);
- |}
-"""
-ADD_RULE = """
-covers |if (w[r] > top) {
-covers |    top = w[r];
-covers |    best = r;
-covers |}
-       |for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-       |    $real f = $name_consequents[r][o][0];
-slopes |    for (j = 0; j < $n_slopes; ++j) {
-slopes |        f += $name_consequents[r][o][1 + j] * z[$input];
-slopes |    }
-       |    sum[o] += w[r] * f;
-       |}
-"""
-ADD_CHANGE = """
-       |for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
-       |    $real f = $name_consequents[r][o][0], ahead = 0.0R;
-slopes |    for (j = 0; j < $n_slopes; ++j) {
-slopes |        f += $name_consequents[r][o][1 + j] * z[$input];
-slopes |        ahead += $name_consequents[r][o][1 + j] * e[$input];
-slopes |    }
-       |    change[o] += w[r] * (s[r] * f + ahead);
-       |}
 """
 
 

@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from ...export.c.builder import header_of, input_lines
 from ...export.c.dialect import STATUS, Dialect, kept_lines, remark
+from ...export.c.header import header_of, input_lines
 from ...export.c.self_test import ROWS, self_test
 from ...export.c.templates import FINITE_INPUT, rejection
 from .error_model import Piecewise, spread

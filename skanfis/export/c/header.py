@@ -1,15 +1,11 @@
-"""The .h file, and rules as a part of a larger .c file: for code that is written around them.
-
-skanfis.gyro writes such code, in the same ``dialect``, with the same ``self_test``.
-"""
+"""The .h file: what goes in and comes out, what it costs, and the declarations."""
 
 import textwrap
 
 import numpy as np
 
 from ...policies import policy_in_words
-from ._source import Source
-from .dialect import STATUS, Dialect, comment, remark, status_lines
+from .dialect import comment, remark, status_lines
 
 _SILENT = {
     "raise": "there is no output: y stays as it is",
@@ -147,25 +143,3 @@ def header_of(title, lines, dialect, n_inputs, n_outputs, include=""):
         n_outputs=n_outputs,
         include=f"\n{include}\n" if include else "",
     )
-
-
-class RulesPart(Source):
-    """The rules of a model as static functions of a larger C file, which share its status word.
-
-    The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is the prefix of the
-    file and ``suffix``. ``model``, ``low`` and ``high`` are the model and its box in the type of
-    the file.
-    """
-
-    def __init__(self, model, dialect: Dialect, suffix: str, min_coverage) -> None:
-        own = Dialect(dialect.name + suffix, dialect.real, dialect.std)
-        super().__init__(model, own, min_coverage, is_part=True)
-        self.low, self.high, self._outer = self.numbers.low, self.numbers.high, dialect.name.upper()
-
-    def text(self) -> str:
-        """The C code, for after the lines that include other files."""
-        prefix = self.dialect.name.upper()
-        sizes = {"N_INPUTS": self.model.n_inputs, "N_OUTPUTS": self.model.n_outputs}
-        macros = [f"#define {prefix}_{key} {value}\n" for key, value in sizes.items()]
-        macros += [f"#define {prefix}_{key} {self._outer}_{key}\n" for key in STATUS]
-        return f"\n/* Of the rules. */\n{''.join(macros)}\n{self.body()}"
