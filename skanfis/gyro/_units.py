@@ -13,8 +13,7 @@ from .errors import UsageError
 _COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
 # Logs that stay above the one, or reach the other, may be in degF; beyond the last nothing else is.
 _WARM, _HOT, _HOTTEST = 30.0, 86.0, 130.0
-# Numbers that large count from 1970, in these units.
-_EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
+_SINCE_1970 = 9e8, 4.1e9  # s, of clocks that tell a date from 1998 to 2099
 _STEPS = 1e-4, 600.0  # s, from one row to the next
 _HEATING = 5e-4, 60.0  # degC/min over a run, as the slowest logs in s have it,
 _CHAMBER, _FAST = (0.02, 60.0), 10.0  # as a chamber or a warm-up does, and as hardly any does
@@ -109,8 +108,9 @@ def _of_time(values, units):
     known = np.isfinite(values["time"])
     time = values["time"][known]
     heat = values.get("temperature", np.zeros(known.size))[known]
-    if time.min() > _EPOCHS[-1][0]:
-        return [{"time": next(unit for least, unit in _EPOCHS if time.min() > least)}]
+    for unit in ("s", "ms", "us", "ns"):
+        if _SINCE_1970[0] < convert(time.min(), "time", unit) < _SINCE_1970[1]:
+            return [{"time": unit}]
     if time.size > 1 and np.median(np.diff(time)) < 0.0:  # the last row comes first
         time, heat = time[::-1], heat[::-1]
     steps = np.diff(time)

@@ -92,7 +92,7 @@ def read_log(
     1   1.0         20.1  -380.0  20.0
     """
     request = Request(columns or {}, units or {}, tuple(require))
-    return read([paths] if isinstance(paths, str | Path) else list(paths), request).log
+    return read([paths] if isinstance(paths, str | os.PathLike) else list(paths), request).log
 
 
 @dataclass

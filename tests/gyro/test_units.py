@@ -40,6 +40,9 @@ NAMES = ("time", "temp", "gyro", "rate")
         ((1, 1, 1, 1), (0, 0, 0, 0), ("s", "degC", "deg/s", "deg/s")),
         ((1000, 1, 1, 1), (0, 0, 0, 0), ("ms", "degC", "deg/s", "deg/s")),
         ((1e6, 1, 1, 1), (1.7e15, 0, 0, 0), ("us", "degC", "deg/s", "deg/s")),
+        # Dates from 2000 on, and a clock that has run for thirty hours.
+        ((1, 1, 1, 1), (9.467e8, 0, 0, 0), ("s", "degC", "deg/s", "deg/s")),
+        ((1000, 1, 1, 1), (1.1e8, 0, 0, 0), ("ms", "degC", "deg/s", "deg/s")),
         ((1, 1, 1, 1), (0, 273.15, 0, 0), ("s", "K", "deg/s", "deg/s")),
         # 40 to 59 degC in degF is 104 to 139.
         ((1, 1.8, 1, 1), (0, 50, 0, 0), ("s", "degF", "deg/s", "deg/s")),
