@@ -266,6 +266,30 @@ def test_a_category_is_listed_by_its_levels(rng):
     assert lines[4:] == ["  sort: a, c, other", "  on: y, other"]
 
 
+@pytest.mark.parametrize("n_inputs", [4, 30])
+def test_inputs_that_no_rule_names_are_one_line(rng, n_inputs):
+    X = rng.normal(size=(80, n_inputs))
+    fibre = pd.DataFrame({"fibre": rng.choice(["a", "b"], 80)})
+    table = pd.concat([fibre, pd.DataFrame(X).add_prefix("x")], axis=1)
+    encoder = make_column_transformer((OneHotEncoder(), ["fibre"]), remainder="passthrough")
+    counts = [1, 1, 2, *[1] * (n_inputs - 1)]
+    model = ANFISRegressor(n_mfs=counts, consequent_features=[2, 3], agreement=0.1)
+    pipe = make_pipeline(encoder, model).fit(table, np.tanh(2.0 * X[:, 0]) + X[:, 1])
+    told = "fibre, x2, x3" if n_inputs == 4 else "29 more inputs"
+    text, names = export_text(pipe, precision=17), [f"x{j}" for j in range(n_inputs)]
+    listed = text.partition("trained:\n")[2].partition("\nOut")[0].splitlines()
+    assert [line.partition(": ")[0] for line in listed if line[2] != " "] == [
+        "  x0",
+        "  x1",
+        f"  {told}",
+    ]
+    assert listed[-1] == f"  {told}: in no rule"
+    assert_allclose(predicted(text, X, names)[:, 0], pipe.predict(table), atol=1e-9)
+    # Where nothing is predicted outside, every range counts.
+    pipe.set_params(anfisregressor__out_of_bounds="nan")
+    assert "in no rule" not in export_text(pipe)
+
+
 @ALL
 def test_every_rule_is_told_once_the_strongest_on_most_rows_first(model):
     labels, led = [one[0] for one in read_text(export_text(model), NAMES).rules], parts_led(model)
