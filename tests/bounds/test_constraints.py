@@ -89,8 +89,8 @@ def test_signs_are_found_by_the_names_of_columns_that_are_numbers(rng):
 
 def test_the_search_judges_what_is_kept(rng):
     """Of a valley told to rise: what is expected of new rows is what the held model leaves."""
-    X, X_new = rng.uniform(-1.0, 1.0, (2, 400, 2))
-    y, y_new = (x[:, 0] ** 2 + 0.5 * x[:, 1] + 0.1 * rng.normal(size=400) for x in (X, X_new))
+    X, X_new = rng.uniform(-1.0, 1.0, (2, 300, 2))
+    y, y_new = (x[:, 0] ** 2 + 0.5 * x[:, 1] + 0.1 * rng.normal(size=300) for x in (X, X_new))
     with pytest.warns(ConstraintWarning, match="The data contradict monotonic_cst=1 of 'y'"):
         held = ANFISRegressor(monotonic_cst=[1, 0]).fit(X, y)
     assert {one["kind"] for one in held.structures_} == {"one rule", "grid", "tree"}
@@ -98,7 +98,7 @@ def test_the_search_judges_what_is_kept(rng):
     left = np.sqrt(np.mean((held.predict(X_new) - y_new) ** 2))
     assert_allclose(expected * y.std(), left, rtol=0.1)
     # A free fit leaves little more than the noise.
-    assert left > 2.0 * np.sqrt(np.mean((ANFISRegressor().fit(X, y).predict(X_new) - y_new) ** 2))
+    assert left > 0.25
 
 
 @pytest.mark.parametrize("kind", ["tree", "grid", "scattered"])

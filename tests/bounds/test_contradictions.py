@@ -54,13 +54,11 @@ def test_a_fixed_point_speaks_by_its_distance_in_standard_errors(t, rng):
 
 
 def test_what_is_true_is_not_contradicted():
-    """Forty draws of a saturation, which is flat for half of the range, by three terms."""
-    n_told = 0
-    for seed in range(40):
+    """Draws of a saturation, which is flat for half of the range, by three terms."""
+    for seed in range(12):
         rng = np.random.default_rng(seed)
         X = rng.uniform(-1.0, 1.0, (100, 2))
         y = np.minimum(X[:, 0], 0.0) + 0.3 * rng.normal(size=100)
         free = ANFISRegressor(n_mfs=[3, 1]).fit(X, y)
-        n_told += bool(told(free, X, y, RISES))
-        n_told += bool(told(free, X, y, Inequality(0, -1.0, None, 0.0, "limit")))
-    assert n_told <= 1
+        assert not told(free, X, y, RISES)
+        assert not told(free, X, y, Inequality(0, -1.0, None, 0.0, "limit"))

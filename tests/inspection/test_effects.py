@@ -122,23 +122,19 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
     encoder = make_column_transformer(
         (OneHotEncoder(sparse_output=False, drop=drop), [1]), remainder=StandardScaler()
     )
-    model = make_pipeline(encoder, quick(n_mfs=[2] + [1] * (3 if drop is None else 2))).fit(
-        table, y
-    )
-    search = GridSearchCV(make_pipeline(encoder, quick(n_mfs="auto", partition="grid")), {}, cv=2)
+    model = make_pipeline(encoder, quick(n_mfs=[2] + [1] * (3 if drop is None else 2)))
+    fitted = GridSearchCV(model, {}, cv=2).fit(table, y)
     rate, fibre = ["rate", "fibre"] if has_names else ["x0", "x1"]
     # All combinations of a rate and a fibre, by the rows' frequencies.
     n = len(X)
     both = pd.DataFrame({"rate": np.repeat(X["rate"], n), "fibre": np.tile(X["fibre"], n)})
-    for fitted in (model, search.fit(table, y)):
-        folded = fold(fitted)
-        rows = np.column_stack([both["rate"], *(both["fibre"] == level for level in "abc")])
-        rows = rows[:, [0, 1, 2, 3] if drop is None else [0, 2, 3]]
-        yhat = folded.predict(rows.astype(float))[:, 0].reshape(n, n)
-        expected = np.array([yhat.mean(axis=1).var(), yhat.mean(axis=0).var()]) / yhat.var()
-        for found in (effects(fitted, table).table, effects(fitted).table):
-            assert_allclose(found.loc[[rate, fibre], "sobol"], expected, rtol=0, atol=1e-9)
-            assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
+    rows = np.column_stack([both["rate"], *(both["fibre"] == level for level in "abc")])
+    rows = rows[:, [0, 1, 2, 3] if drop is None else [0, 2, 3]]
+    yhat = fold(fitted).predict(rows.astype(float))[:, 0].reshape(n, n)
+    expected = np.array([yhat.mean(axis=1).var(), yhat.mean(axis=0).var()]) / yhat.var()
+    for found in (effects(fitted, table).table, effects(fitted).table):
+        assert_allclose(found.loc[[rate, fibre], "sobol"], expected, rtol=0, atol=1e-9)
+        assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
 
 
 def test_groups_enter_as_one():
