@@ -118,15 +118,6 @@ def test_a_category_is_drawn_by_its_levels():
         assert [one.get_text() for one in axes.get_xticklabels()] == ["a", "b", "c"]
 
 
-def test_axes_may_be_given():
-    model = KINDS["grid"]
-    X = rows_of(model, 1.0, 9)
-    axes = plt.subplots(5)[1]
-    assert list(EffectsDisplay.from_estimator(model, X, ax=axes).axes_) == list(axes)
-    with pytest.raises(ValueError, match="5 are needed"):
-        EffectsDisplay.from_estimator(model, X, ax=axes[:2])
-
-
 def test_labels_of_many_levels_stand_apart(rng):
     levels = ["minivan", "subcompact", "pickup", "2seater", "suv", "midsize"]
     X = pd.DataFrame({"class": rng.choice(levels, 200), "power": rng.normal(size=200)})
