@@ -125,11 +125,12 @@ def bounds(
     0.71 1.00
     """
     model, box = _checked(model, box, tol, max_boxes)
+    low, high = held_box(box, model)
 
     def evaluated(k, sign):
         return Enclosure(model, k, sign).values
 
-    return _enclosed(model, box, held_box(box, model), evaluated, np.ptp, tol, max_boxes)
+    return _enclosed(model, box, low, high, evaluated, np.ptp, tol, max_boxes)
 
 
 def gradient_bounds(
@@ -172,11 +173,12 @@ def gradient_bounds(
     """
     model, box = _checked(model, box, tol, max_boxes)
     (j,) = feature_indices([feature], model.input_names, "feature")
+    low, high = held_box(box, model, _BEYOND)
 
     def evaluated(k, sign):
         return partial(Enclosure(model, k, sign).slope, j=j)
 
-    found = _enclosed(model, box, held_box(box, model, _BEYOND), evaluated, size, tol, max_boxes)
+    found = _enclosed(model, box, low, high, evaluated, size, tol, max_boxes)
     names = tuple(f"d {y} / d {model.input_names[j]}" for y in model.output_names)
     return replace(found, output_names=names)
 
@@ -234,9 +236,9 @@ def cuts_of(model):
     return np.stack([model.minimum, model.maximum], axis=1)
 
 
-def _enclosed(model, box, ends, evaluated, scale, tol, max_boxes):
-    """Bounds of what ``evaluated`` by output and sign; ``tol`` is in units of ``scale(values)``."""
-    X, found = spread_points(*ends).T, []
+def _enclosed(model, box, low, high, evaluated, scale, tol, max_boxes):
+    """Bounds of what ``evaluated`` by output and sign; ``tol`` is in units of ``scale(ends)``."""
+    X, found = spread_points(low, high).T, []
     for k in range(model.n_outputs):
         sides = [evaluated(k, sign) for sign in (-1.0, 1.0)]
         seen = [evaluate(X, X) for evaluate in sides]
@@ -247,7 +249,7 @@ def _enclosed(model, box, ends, evaluated, scale, tol, max_boxes):
             # Bound and value are apart by rounding, beneath which no bound can go.
             least = max(tolerance, 8.0 * float(bound[top] - attained[top]))
             first = points[:, top], float(attained[top])
-            found.append(largest(evaluate, *ends, least, max_boxes, cuts_of(model), first))
+            found.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model), first))
     below, above = found[::2], found[1::2]
     return Bounds(
         lower=np.array([-one.bound for one in below]),
