@@ -1,7 +1,7 @@
 """What every input, and every pair of inputs, does to the output, and how much of it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations, compress
 from operator import itemgetter
 from typing import Any
@@ -30,7 +30,7 @@ class Effects:
     table: pd.DataFrame
     held: float
     notes: list[str]
-    _printed: pd.DataFrame
+    _printed: pd.DataFrame = field(repr=False)
 
     def __str__(self):
         table = self._printed.round(_DIGITS) + 0.0
@@ -73,7 +73,7 @@ def effects(
         and with X "rows", Cov(component, output) / Var(output) over its rows [1]_, which may be
         negative. Each column sums to one. ``held``: part of the combinations of independent inputs
         where the output would be held within its limits, from 10,000 draws. ``notes``: sentences.
-        Printed, the many rows of a table that do nothing are one row.
+        Printed, many rows that do nothing, or no more than draws are off by, are one.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def effects(
     shares = table["sobol"].round(9).tolist()
     order = sorted(range(len(subsets)), key=lambda i: (len(subsets[i]), -shares[i]))
     table = table.iloc[order]
-    printed = _as_printed(table, [subsets[i] for i in order])
+    printed = _as_printed(table, [subsets[i] for i in order], anova.error)
     if len(ones) > 2:
         left = (float(anova.variance > 0.0) - table.sum()).to_frame("three or more").T
         # Not by its label, which an input may have.
@@ -119,12 +119,13 @@ def effects(
     return Effects(table, held, notes, printed)
 
 
-def _as_printed(table, subsets):
-    """The table with one row for inputs and pairs that do nothing to the digits that are printed.
+def _as_printed(table, subsets, error):
+    """The table with one row for inputs and pairs that do nothing, to the digits that are printed.
 
-    An input stays that does something together with another. A few rows stay as they are.
+    ``error`` is what shares are off by. An input stays that does something together with another.
+    A few rows stay as they are.
     """
-    is_seen = (table.round(_DIGITS) != 0.0).any(axis=1).to_numpy()
+    is_seen = (table.round(_DIGITS).abs() > error).any(axis=1).to_numpy()
     seen = {g for v in compress(subsets, is_seen) for g in v}
     is_seen = is_seen | [len(v) == 1 and v[0] in seen for v in subsets]
     if sum(~is_seen) <= MOST_NAMED:

@@ -1,5 +1,6 @@
 """The picture of effects against means over the product of the inputs' values."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -149,8 +150,13 @@ def test_a_pair_within_the_error_of_draws_is_not_drawn(rng):
     coefficients = model.coefficients.copy()
     coefficients[:, 2:] = model.target.spread / model.spread[1:, None]
     model = replace(model, coefficients=coefficients)
-    table = effects(model, X).table["sobol"]
-    assert table[table.index.str.contains(" and ")].max() > 0.005
+    found = effects(model, X)
+    shares = found.table["sobol"]
+    assert shares[shares.index.str.contains(" and ")].max() > 0.005
+    # Nor is it printed by itself.
+    assert "x0 and x1" in shares
+    assert "x0 and x1" not in str(found)
+    assert re.search(r"\n\d pairs more ", str(found))
     display = drawn(EffectsDisplay.from_estimator(model, X))
     assert display.pairs == []
     assert not any("-0 %" in axes.get_title(loc="left") for axes in display.axes_)
