@@ -23,15 +23,8 @@ def line():
 
 
 def candidate(kind, rules, cost, error, chosen=False):
-    return {
-        "structure": f"{rules} of {kind}",
-        "kind": kind,
-        "rules": rules,
-        "n_mfs": None,
-        "reading_cost": cost,
-        "expected_error": error,
-        "chosen": chosen,
-    }
+    known = {"kind": kind, "rules": rules, "reading_cost": cost}
+    return known | {"expected_error": error, "chosen": chosen}
 
 
 # Best first, as they come.
