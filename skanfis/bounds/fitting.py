@@ -73,6 +73,8 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
             local, drawn = other, way
     kept = fit.kept(ordered, local)
     after = kept.evaluation.mean_squared_error
+    # Of data without noise the free fit may have none, to the last bit.
+    raised = after / before if before else np.inf
     report = {
         "certified": True,
         "drawn": drawn,
@@ -83,16 +85,16 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         held = replace(fit.model, coefficients=kept.coefficients)
         free = replace(model, target=None)
         fixed = constraints.points, constraints.values
-        for message in contradicted(free, held, fit.inequalities, fixed, rows, after / before):
+        for message in contradicted(free, held, fit.inequalities, fixed, rows, raised):
             warn_user(message, ConstraintWarning)
-    if drawn and after > _FAR * before:
+    if drawn and raised > _FAR and after:
         names = ", ".join(one.name for one in fit.inequalities)
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
         warn_user(
             f"To be certain of {names}, the rules were drawn {drawn:.0%} of the way to "
             f"{'one line' if ordered.is_line else 'rules in order'}, which raises the error of "
-            f"training by {np.sqrt(after / before) - 1.0:.0%}. Use {remedy}, or leave a "
+            f"training by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or leave a "
             "constraint out.",
             ConstraintWarning,
         )

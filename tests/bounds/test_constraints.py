@@ -295,6 +295,17 @@ def test_what_cannot_be_is_refused(known, message, rng):
     assert not hasattr(estimator, "model_")
 
 
+@pytest.mark.parametrize("n_mfs", [1, 2])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_free_fit_without_any_error_is_held_too(n_mfs, seed):
+    X = np.random.default_rng(seed).normal(size=(20, 1))
+    rising, falling = (ANFISRegressor(n_mfs, monotonic_cst=[sign]) for sign in (1, -1))
+    assert_allclose(rising.fit(X, X[:, 0]).predict(X), X[:, 0], atol=1e-4)
+    with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0'"):
+        falling.fit(X, X[:, 0])
+    assert_array_equal([monotonicity(model, 0)[0] for model in (rising, falling)], [1, -1])
+
+
 def test_a_constant_keeps_a_limit_that_the_data_contradict(rng):
     X, _, y = planted(rng)
     held = ANFISRegressor(n_mfs=1, order=0, constraints=[OutputLimits(lower=5.0)])
