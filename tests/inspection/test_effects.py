@@ -187,9 +187,9 @@ def test_what_does_nothing_is_printed_as_one_row(rng):
     assert header.split() == ["sobol", "rows"]
     printed = {name.strip(): values for name, *values in (row.rsplit(maxsplit=2) for row in rows)}
     nothing = {name for name, values in printed.items() if values == ["0.000", "0.000"]}
-    # The first two do nothing alone.
-    assert nothing == {"x0", "x1", "27 inputs and 28 pairs more", "three or more"}
-    assert printed.keys() == nothing | {"x2", "x0 and x1"}
+    # An input stays that does something together with another alone.
+    assert nothing == {"x1", "27 inputs and 27 pairs more", "three or more"}
+    assert printed.keys() == nothing | {"x0", "x2", "x0 and x1", "x0 and x2"}
     assert_allclose(sum(float(own) for own, _ in printed.values()), 1.0, atol=0.002)
 
 
