@@ -211,7 +211,7 @@ class _ConstrainedFit:
             raise self._refused(failure.by_equalities) from None
 
     def _is_certified(self, ordered):
-        model, constraints = self._model(ordered, ordered.local), self.constraints
+        model, constraints = self._model(ordered.local, ordered.is_line), self.constraints
         limits = zip(constraints.lower, constraints.upper, strict=True)
         return all(
             is_in_order(model, k, signs, of_output)
@@ -246,7 +246,8 @@ class _ConstrainedFit:
             # Beyond, a tangent is known, which is more than a value: it is not counted.
             points = points[self.is_inside]
         points = np.clip(points, model.minimum, model.maximum)
-        coefficients = self._model(ordered, local).coefficients
+        is_line = ordered.is_line and local is ordered.local
+        coefficients = self._model(local, is_line).coefficients
         return Kept(self.free, self._ended(local), coefficients, points)
 
     def drawn(self, ordered):
@@ -254,12 +255,12 @@ class _ConstrainedFit:
         local, drawn = ordered.local, 1.0
         if not all(is_known(group.family) for group in self.free.antecedent.groups):
             return local, drawn
-        near = self._nearest_at_points(ordered)
+        near = self._nearest_at_points()
         halves = 0.5 ** np.arange(1, 1 + _HALVINGS)
         # First all of the way, then next to none of it, and only then halves of what is left.
         for step in (1.0, halves[-1], *halves[:-1]):
             now = near + (drawn - step) * (ordered.local - near)
-            if self._is_proven(self._model(ordered, now)):
+            if self._is_proven(self._model(now)):
                 local, drawn = now, float(drawn - step)
             elif step == halves[-1]:
                 break
@@ -267,7 +268,7 @@ class _ConstrainedFit:
                 break
         return local, drawn
 
-    def _nearest_at_points(self, ordered):
+    def _nearest_at_points(self):
         """The local consequents nearest to the free fit that keep all where they did not.
 
         Points are the worst of a sample, then those at which branch and bound finds a violation.
@@ -279,7 +280,7 @@ class _ConstrainedFit:
 
         def violated(u, k):
             local[:, k] = u
-            now = self._model(ordered, local)
+            now = self._model(local)
             own = [one for one in self.inequalities if one.output == k]
             worst = [_worst(one.excess(now, sample), sample) for one in own]
             if not any(map(len, worst)) and self.n_boxes <= _ALL_BOXES * self.part:
@@ -341,9 +342,9 @@ class _ConstrainedFit:
             normal=replace(normal, coefficients=local),
         )
 
-    def _model(self, ordered, local):
+    def _model(self, local, is_line=False):
         model = self._with(local, self.problem.rows.targets)
-        if ordered.is_line and local is ordered.local:
+        if is_line:
             # To the last bit.
             line = np.broadcast_to(model.coefficients[:1], model.coefficients.shape)
             return replace(model, coefficients=line)
