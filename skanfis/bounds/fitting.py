@@ -88,7 +88,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         for message in contradicted(free, held, fit.inequalities, fixed, rows, raised):
             warn_user(message, ConstraintWarning)
     if drawn and raised > _FAR and after:
-        names = ", ".join(one.name for one in fit.inequalities)
+        names = ", ".join(one.name for one in fit.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
         warn_user(
@@ -255,7 +255,7 @@ class _ConstrainedFit:
         local, drawn = ordered.local, 1.0
         if not all(is_known(group.family) for group in self.free.antecedent.groups):
             return local, drawn
-        near = self._nearest_at_points()
+        near = self._nearest_at_points(ordered)
         halves = 0.5 ** np.arange(1, 1 + _HALVINGS)
         # First all of the way, then next to none of it, and only then halves of what is left.
         for step in (1.0, halves[-1], *halves[:-1]):
@@ -268,14 +268,15 @@ class _ConstrainedFit:
                 break
         return local, drawn
 
-    def _nearest_at_points(self):
+    def _nearest_at_points(self, ordered):
         """The local consequents nearest to the free fit that keep all where they did not.
 
         Points are the worst of a sample, then those at which branch and bound finds a violation.
         """
         normal, (equal, equal_to) = self.free.normal, self.fixed
         sample = spread_points(self.model.minimum, self.model.maximum)
-        local = normal.coefficients.copy()
+        # An output stays in order where not even the fixed points can be met otherwise.
+        local = ordered.local.copy()
         nothing = np.empty((0, self.problem.n_columns)), np.empty(0)
 
         def violated(u, k):

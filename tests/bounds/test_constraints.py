@@ -200,6 +200,16 @@ def test_points_are_met_and_rows_weigh(rng):
     assert_allclose(weighted.predict(X), repeated.predict(X), atol=1e-6)
 
 
+def test_points_are_met_by_a_line_where_the_data_ask_for_no_slopes():
+    rng = np.random.default_rng(1)
+    X, y = rng.normal(size=(42, 2)), rng.normal(size=42)
+    assert not ANFISRegressor(n_mfs=1).fit(X, y).consequents_[0, 1:].any()
+    known = [FixedPoint([0.0, 0.0], -0.2), FixedPoint([1.0, 0.0], 0.1)]
+    held = ANFISRegressor(n_mfs=1, constraints=known).fit(X, y)
+    assert_allclose(held.predict([[0.0, 0.0], [1.0, 0.0]]), [-0.2, 0.1], atol=1e-9)
+    assert held.constraints_["drawn"] == 1.0
+
+
 @pytest.mark.parametrize("policy", ["linear", "clip", LinearExtrapolation(np.inf)])
 def test_points_beyond_the_range_are_met_by_the_policy(rng, policy):
     """Zero rate of a campaign that began at some: what is predicted there, not at the edge."""
