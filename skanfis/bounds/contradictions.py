@@ -30,7 +30,6 @@ def contradicted(free, held, inequalities, fixed, rows, raised):
     points, values = fixed
     gap = np.zeros(values.shape)
     if len(points):
-        # NaN, where an output is not fixed, is no gap.
         gap = np.abs(free.predict(points) - values) - _CERTAIN * _deviation(free, points).T
     for k, output in enumerate(free.output_names):
         guilty = [

@@ -42,9 +42,8 @@ _POINTS_A_ROUND, _MARGIN = 20, 0.01
 
 @dataclass(frozen=True, eq=False)
 class Ordered:
-    """Local consequents of rules in order, at premises for which there is an order."""
+    """Local consequents of rules in order."""
 
-    free: Evaluation  # the best at these premises
     local: np.ndarray  # (n_columns, n_outputs)
     is_line: bool
 
@@ -65,16 +64,17 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     ``model`` is in the user's units; ``rows`` are X, y and their numbers, to say which contradict
     what is known, or None.
     """
-    fit = _ConstrainedFit(model, problem, constraints)
-    ordered = fit.in_order(evaluation)
-    local, before = ordered.local, evaluation.mean_squared_error
-    drawn = float(ordered.is_line)
-    if fit.error(ordered, local) > _DEAR * before:
+    fit = _ConstrainedFit(model, evaluation, problem, constraints)
+    ordered, before = fit.in_order(), evaluation.mean_squared_error
+    local, drawn = ordered.local, float(ordered.is_line)
+    if fit.error(local) > _DEAR * before:
         other, way = fit.drawn(ordered)
-        if fit.error(ordered, other) < fit.error(ordered, local):
+        if fit.error(other) < fit.error(local):
             local, drawn = other, way
     kept = fit.kept(ordered, local)
     after = kept.evaluation.mean_squared_error
+    # Of data without noise the free fit may have none, to the last bit.
+    raised = after / before if before else np.inf
     report = {
         "certified": True,
         "drawn": drawn,
@@ -85,16 +85,16 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         held = replace(fit.model, coefficients=kept.coefficients)
         free = replace(model, target=None)
         fixed = constraints.points, constraints.values
-        for message in contradicted(free, held, fit.inequalities, fixed, rows, after / before):
+        for message in contradicted(free, held, fit.inequalities, fixed, rows, raised):
             warn_user(message, ConstraintWarning)
-    if drawn and after > _FAR * before:
-        names = ", ".join(one.name for one in fit.inequalities)
+    if drawn and raised > _FAR and after:
+        names = ", ".join(one.name for one in fit.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
         warn_user(
             f"To be certain of {names}, the rules were drawn {drawn:.0%} of the way to "
             f"{'one line' if ordered.is_line else 'rules in order'}, which raises the error of "
-            f"training by {np.sqrt(after / before) - 1.0:.0%}. Use {remedy}, or leave a "
+            f"training by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or leave a "
             "constraint out.",
             ConstraintWarning,
         )
@@ -118,7 +118,8 @@ def ways_in_order(problem, evaluation, constraints: Constraints, equal, equal_to
     failure = InfeasibleError(False)
     for is_line in (False, True):
         try:
-            yield _nearest(problem, evaluation, constraints, equal, equal_to, is_line)
+            local = _nearest(problem, evaluation, constraints, equal, equal_to, is_line)
+            yield Ordered(local, is_line)
         except InfeasibleError as error:
             failure = error
     raise failure
@@ -138,7 +139,7 @@ def held_in_search(constraints: Constraints | None):
         no_points = np.empty((0, problem.n_columns)), np.empty((0, problem.n_outputs))
         evaluation = at_equal_widths(problem, evaluation, signs)
         ordered = next(ways_in_order(problem, evaluation, signs, *no_points))
-        return ordered.free.antecedent, problem.local.to_global(ordered.local)
+        return evaluation.antecedent, problem.local.to_global(ordered.local)
 
     return held
 
@@ -169,15 +170,21 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
         local[:, k] = to_local @ nearest_in_order(
             order, factor, start[:, k], to_rules, box, equal, equal_to[:, k]
         )
-    return Ordered(evaluation, local, is_line)
+    return local
 
 
 class _ConstrainedFit:
-    def __init__(self, model, problem, constraints):
+    def __init__(self, model, evaluation, problem, constraints):
         self.problem, self.constraints = problem, constraints
+        # The best at premises for which there is an order.
+        self.free = at_equal_widths(problem, evaluation, constraints)
         # That outputs are held on top is monotone: what rules keep, predictions do.
         self.model = replace(model.with_out_of_bounds("clip"), target=None)
         self.policy = model.out_of_bounds, model.max_extrapolation
+        # A model whose outputs are what each local consequent adds to the standardised target.
+        n_columns = problem.n_columns
+        as_it_is = Scale(*np.array([[0.0], [1.0], [0.0], [1.0]]).repeat(n_columns, axis=1))
+        self.columns = self._with(np.eye(n_columns), as_it_is)
         self.inequalities = constraints.inequalities(model)
         self.n_boxes, self.part = 0, min(1.0, _TERMS / max(model.antecedent.n_terms, 1))
         self.is_inside = model.in_bounds(constraints.points)
@@ -188,20 +195,23 @@ class _ConstrainedFit:
                 f"out_of_bounds={model.out_of_bounds!r} predicts nothing: "
                 f"{model.describe_out_of_bounds(beyond)} Use out_of_bounds='linear' or 'clip'."
             )
+        # Of the fixed points, sums over the local consequents, and what they are to be.
+        targets = problem.rows.targets
+        values = (constraints.values - targets.offset) / targets.scale
+        at_points = self.columns.with_out_of_bounds(*self.policy).predict(constraints.points)
+        self.fixed = at_points, values
 
-    def in_order(self, evaluation) -> Ordered:
+    def in_order(self) -> Ordered:
         """Rules in order, or a line; an error that says which constraints cannot be kept."""
-        evaluation = at_equal_widths(self.problem, evaluation, self.constraints)
-        fixed = self._fixed(self._columns(evaluation.antecedent))
         try:
-            ways = ways_in_order(self.problem, evaluation, self.constraints, *fixed)
+            ways = ways_in_order(self.problem, self.free, self.constraints, *self.fixed)
             # Of rules rounding may be larger than the margin, of a line there is next to none.
             return next(way for way in ways if self._is_certified(way))
         except InfeasibleError as failure:
             raise self._refused(failure.by_equalities) from None
 
     def _is_certified(self, ordered):
-        model, constraints = self._model(ordered, ordered.local), self.constraints
+        model, constraints = self._model(ordered.local, ordered.is_line), self.constraints
         limits = zip(constraints.lower, constraints.upper, strict=True)
         return all(
             is_in_order(model, k, signs, of_output)
@@ -225,9 +235,9 @@ class _ConstrainedFit:
             "one of them, or use order=1 or more rules."
         )
 
-    def error(self, ordered, local):
+    def error(self, local):
         """Mean squared error of training."""
-        return self._ended(ordered.free, local).mean_squared_error
+        return self._ended(local).mean_squared_error
 
     def kept(self, ordered, local) -> Kept:
         """These consequents at the end of the fit."""
@@ -236,20 +246,21 @@ class _ConstrainedFit:
             # Beyond, a tangent is known, which is more than a value: it is not counted.
             points = points[self.is_inside]
         points = np.clip(points, model.minimum, model.maximum)
-        coefficients = self._model(ordered, local).coefficients
-        return Kept(ordered.free, self._ended(ordered.free, local), coefficients, points)
+        is_line = ordered.is_line and local is ordered.local
+        coefficients = self._model(local, is_line).coefficients
+        return Kept(self.free, self._ended(local), coefficients, points)
 
     def drawn(self, ordered):
         """The nearest that is proven on the way from there, and how far that is drawn."""
         local, drawn = ordered.local, 1.0
-        if not all(is_known(group.family) for group in ordered.free.antecedent.groups):
+        if not all(is_known(group.family) for group in self.free.antecedent.groups):
             return local, drawn
         near = self._nearest_at_points(ordered)
         halves = 0.5 ** np.arange(1, 1 + _HALVINGS)
         # First all of the way, then next to none of it, and only then halves of what is left.
         for step in (1.0, halves[-1], *halves[:-1]):
             now = near + (drawn - step) * (ordered.local - near)
-            if self._is_proven(self._model(ordered, now)):
+            if self._is_proven(self._model(now)):
                 local, drawn = now, float(drawn - step)
             elif step == halves[-1]:
                 break
@@ -262,22 +273,21 @@ class _ConstrainedFit:
 
         Points are the worst of a sample, then those at which branch and bound finds a violation.
         """
-        model, normal = self.model, ordered.free.normal
-        columns = self._columns(ordered.free.antecedent)
-        equal, equal_to = self._fixed(columns)
-        sample = spread_points(model.minimum, model.maximum)
-        local = normal.coefficients.copy()
+        normal, (equal, equal_to) = self.free.normal, self.fixed
+        sample = spread_points(self.model.minimum, self.model.maximum)
+        # An output stays in order where not even the fixed points can be met otherwise.
+        local = ordered.local.copy()
         nothing = np.empty((0, self.problem.n_columns)), np.empty(0)
 
         def violated(u, k):
             local[:, k] = u
-            now = self._model(ordered, local)
+            now = self._model(local)
             own = [one for one in self.inequalities if one.output == k]
             worst = [_worst(one.excess(now, sample), sample) for one in own]
             if not any(map(len, worst)) and self.n_boxes <= _ALL_BOXES * self.part:
                 worst = [self._failure(one, now) for one in own]
             pairs = zip(own, worst, strict=True)
-            found = [nothing, *(self._rows(one, columns, points) for one, points in pairs)]
+            found = [nothing, *(self._rows(one, points) for one, points in pairs)]
             return tuple(map(np.concatenate, zip(*found, strict=True)))
 
         for k, values in enumerate(equal_to.T):
@@ -287,9 +297,9 @@ class _ConstrainedFit:
                 local[:, k] = nearest_by_exchange(*given, partial(violated, k=k))
         return local
 
-    def _rows(self, one, columns, points):
+    def _rows(self, one, points):
         """Sums over the local consequents that an inequality is about at points; their least."""
-        rows, found = self.problem.rows, one.of(columns, points)
+        rows, found = self.problem.rows, one.of(self.columns, points)
         if one.input is None:
             targets = rows.targets
             least = one.sign * (one.limit - targets.offset[one.output]) / targets.scale[one.output]
@@ -319,37 +329,30 @@ class _ConstrainedFit:
         found, until = self._proof(one, model)
         return found.point[None][: int(found.attained > until)]
 
-    def _ended(self, evaluation, local):
-        """The evaluation with other local consequents."""
-        normal = evaluation.normal
+    def _ended(self, local):
+        """The best, with other local consequents."""
+        normal = self.free.normal
         change, weighed = local - normal.coefficients, normal.gram + normal.penalty
-        cost = evaluation.cost + 0.5 * float(np.sum(change * (weighed @ change)))
+        cost = self.free.cost + 0.5 * float(np.sum(change * (weighed @ change)))
         error = 2.0 * cost - float(np.sum(local * (normal.penalty @ local)))
         return replace(
-            evaluation,
+            self.free,
             cost=cost,
             coefficients=self.problem.local.to_global(local),
             mean_squared_error=max(error, 0.0),
             normal=replace(normal, coefficients=local),
         )
 
-    def _model(self, ordered, local):
-        antecedent, targets = ordered.free.antecedent, self.problem.rows.targets
-        model = self._with(antecedent, local, targets)
-        if ordered.is_line and local is ordered.local:
+    def _model(self, local, is_line=False):
+        model = self._with(local, self.problem.rows.targets)
+        if is_line:
             # To the last bit.
             line = np.broadcast_to(model.coefficients[:1], model.coefficients.shape)
             return replace(model, coefficients=line)
         return model
 
-    def _columns(self, antecedent):
-        """A model whose outputs are what each local consequent adds to the standardised target."""
-        n_columns = self.problem.n_columns
-        as_it_is = Scale(*np.array([[0.0], [1.0], [0.0], [1.0]]).repeat(n_columns, axis=1))
-        return self._with(antecedent, np.eye(n_columns), as_it_is)
-
-    def _with(self, antecedent, local, targets):
-        """The model of premises of standardised inputs and local consequents of some targets."""
+    def _with(self, local, targets):
+        """The model of local consequents of some targets."""
         problem, inputs = self.problem, self.problem.rows.inputs
         common, slopes = problem.penalty.common, problem.consequent_inputs
         coefficients = problem.local.to_global(local)
@@ -357,16 +360,10 @@ class _ConstrainedFit:
         coefficients = in_user_units(coefficients, inputs, targets, slopes, problem.order)
         return replace(
             self.model,
-            antecedent=antecedent.change_units(inputs.offset, inputs.scale),
+            antecedent=self.free.antecedent.change_units(inputs.offset, inputs.scale),
             coefficients=coefficients,
             output_names=tuple(map(str, range(targets.scale.size))),
         )
-
-    def _fixed(self, columns):
-        """Of the fixed points, sums over the local consequents, and what they are to be."""
-        targets, points = self.problem.rows.targets, self.constraints.points
-        values = (self.constraints.values - targets.offset) / targets.scale
-        return columns.with_out_of_bounds(*self.policy).predict(points), values
 
 
 def _worst(excess, points):

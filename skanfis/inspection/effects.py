@@ -1,8 +1,8 @@
 """What every input, and every pair of inputs, does to the output, and how much of it."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import combinations
+from dataclasses import dataclass, field, replace
+from itertools import combinations, compress
 from operator import itemgetter
 from typing import Any
 
@@ -14,10 +14,13 @@ from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, covariances, draw
 from .displays import _position
+from .text import MOST_NAMED, counted
 
 # Shares that differ by more are told; so is what is held, of more of the product's mass.
 _DIFFERENT, _HELD = 0.1, 0.01
 _N_HELD = 10_000
+# Of shares as they are printed.
+_DIGITS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +30,11 @@ class Effects:
     table: pd.DataFrame
     held: float
     notes: list[str]
+    _printed: pd.DataFrame = field(repr=False)
 
     def __str__(self):
-        table = (self.table.round(3) + 0.0).to_string(float_format="{:.3f}".format)
+        table = self._printed.round(_DIGITS) + 0.0
+        table = table.to_string(float_format=f"{{:.{_DIGITS}f}}".format)
         return "\n".join([table, *self.notes])
 
 
@@ -68,6 +73,7 @@ def effects(
         and with X "rows", Cov(component, output) / Var(output) over its rows [1]_, which may be
         negative. Each column sums to one. ``held``: part of the combinations of independent inputs
         where the output would be held within its limits, from 10,000 draws. ``notes``: sentences.
+        Printed, many rows that do nothing, or no more than draws are off by, are one.
 
     Raises
     ------
@@ -99,16 +105,35 @@ def effects(
     if study.rows is not None:
         columns["rows"] = _shares(subsets, *covariances(anova, subsets, study.rows))
     table = pd.DataFrame(columns, index=[" and ".join(labels[g] for g in v) for v in subsets])
-    parts = table[: len(ones)], table[len(ones) :]
     # Rounded, so that inputs alike but for rounding errors stay in their order.
-    order = {"by": "sobol", "ascending": False, "kind": "stable", "key": lambda own: own.round(9)}
-    table = pd.concat([part.sort_values(**order) for part in parts])
+    shares = table["sobol"].round(9).tolist()
+    order = sorted(range(len(subsets)), key=lambda i: (len(subsets[i]), -shares[i]))
+    table = table.iloc[order]
+    printed = _as_printed(table, [subsets[i] for i in order], anova.error)
     if len(ones) > 2:
-        left = float(anova.variance > 0.0) - table.sum()
+        left = (float(anova.variance > 0.0) - table.sum()).to_frame("three or more").T
         # Not by its label, which an input may have.
-        table = pd.concat([table, left.to_frame("three or more").T])
+        table, printed = pd.concat([table, left]), pd.concat([printed, left])
     held = study.held
-    return Effects(table, held, _notes(table, held, isinstance(anova, DrawnAnova)))
+    notes = _notes(table, held, isinstance(anova, DrawnAnova))
+    return Effects(table, held, notes, printed)
+
+
+def _as_printed(table, subsets, error):
+    """The table with one row for inputs and pairs that do nothing, to the digits that are printed.
+
+    ``error`` is what shares are off by. An input stays that does something together with another.
+    A few rows stay as they are.
+    """
+    is_seen = (table.round(_DIGITS).abs() > error).any(axis=1).to_numpy()
+    seen = {g for v in compress(subsets, is_seen) for g in v}
+    is_seen = is_seen | [len(v) == 1 and v[0] in seen for v in subsets]
+    if sum(~is_seen) <= MOST_NAMED:
+        return table
+    n_pairs = sum(len(v) > 1 for v in compress(subsets, ~is_seen))
+    counts = {"input": sum(~is_seen) - n_pairs, "pair": n_pairs}
+    name = " and ".join(counted(n, what) for what, n in counts.items() if n)
+    return pd.concat([table[is_seen], table[~is_seen].sum().to_frame(f"{name} more").T])
 
 
 def _shares(subsets, closed, variance):

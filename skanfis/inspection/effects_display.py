@@ -80,6 +80,8 @@ class EffectsDisplay:
         check_count("max_shown", max_shown, 1)
         study = Study.of(estimator, X, groups, output)
         ones = [(g,) for g in np.flatnonzero(study.is_shown).tolist()]
+        if not ones:
+            raise ValueError("groups has every column, and groups have no curve: nothing to draw.")
         pairs = [(g, h) for g, h in study.pairs() if study.is_shown[g] and study.is_shown[h]]
         share = dict(zip([*ones, *pairs], study.sobol([*ones, *pairs]), strict=True))
         totals = study.anova.totals()

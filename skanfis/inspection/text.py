@@ -11,7 +11,7 @@ import pandas as pd
 
 from .._validation import check_count
 from ..export.folding import fold_with_reader
-from ..policies import MOST_DIGITS, policy_in_words
+from ..policies import MOST_DIGITS, SILENT, policy_in_words
 from .rules import (
     condition,
     has_training_data,
@@ -25,6 +25,8 @@ from .sentences import PRECISION, Sentences, rounded
 
 # Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 3
+# What has no part in the model is named up to so many, and else counted.
+MOST_NAMED = 5
 # What shares that sum to one may lack of it.
 _ROUNDING = 1e-9
 # How to compute a prediction; the parts in braces where there is such a thing.
@@ -290,11 +292,17 @@ def _legend(said, precision):
     families = [group.family for group in model.antecedent.groups]
     at = {one.name for family in families for one in family.parameters if one.kind == "location"}
     named = list(compress(model.memberships(), ~said.says_where))
+    # Columns of one category are called by it.
+    called = [said.levels.get(name, (name,))[0] for name in model.input_names]
+    with_part = set(compress(called, _has_part(said)))
+    unnamed = list(dict.fromkeys(one for one in called if one not in with_part))
     categories: dict[str, list[int]] = {}
     for j, name in enumerate(model.input_names):
+        if called[j] not in with_part:
+            continue
         terms = [term for term in named if term["input"] == name]
         if said.two_valued[j] and name in said.levels and not terms:
-            categories.setdefault(said.levels[name][0], []).append(j)
+            categories.setdefault(called[j], []).append(j)
             continue
         range_of = _range(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
         lines.append(f"  {name}: {range_of}")
@@ -304,6 +312,10 @@ def _legend(said, precision):
         levels = [said.levels[model.input_names[j]][1] for j in own]
         levels += ["other"] if model.reference[own].sum() < 1.0 - _ROUNDING else []
         lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
+    if unnamed:
+        is_few = len(unnamed) <= MOST_NAMED
+        told = ", ".join(unnamed) if is_few else f"{len(unnamed)} more inputs"
+        lines.append(_wrapped(f"  {told}: in no rule", later=6 * " "))
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
@@ -316,6 +328,16 @@ def _legend(said, precision):
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
     how = _HOW.format(terms="".join(terms), line=_LINE if said.common.any() else "")
     return "\n".join([*lines, "", _wrapped(how)])
+
+
+def _has_part(said):
+    """Inputs that are told of: with terms, or with a slope that is written, (n_inputs,)."""
+    model = said.model
+    if model.out_of_bounds in SILENT:
+        # Outside the range of any input nothing is predicted.
+        return np.ones(model.n_inputs, dtype=bool)
+    has_terms = np.isin(np.arange(model.n_inputs), model.antecedent.term_inputs)
+    return has_terms | said.is_own.any(axis=(0, 2)) | said.common.any(axis=1)
 
 
 def _term_text(term, locations):

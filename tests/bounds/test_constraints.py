@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.optimize import lsq_linear, minimize
+from scipy.optimize import lsq_linear
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
@@ -35,6 +35,10 @@ def planted(rng, n_rows=120, noise=0.3):
     return X, truth, truth + noise * rng.normal(size=n_rows)
 
 
+def points_on_a_line(*places):
+    return [FixedPoint([0.0, x], x) for x in places]
+
+
 def falls(model, j, rng, n_rows=4000):
     """The most that predictions fall over steps up along an input, in the range."""
     low, high = model.model_.minimum, model.model_.maximum
@@ -50,7 +54,6 @@ def falls(model, j, rng, n_rows=4000):
         {"order": 0, "n_mfs": 4},
         {"mf": "bell", "out_of_bounds": "clip"},
         {"loss": "huber", "solver": GradientDescent(error_goal=0.5)},
-        {"n_mfs": "auto", "max_iter": 500},
     ],
     ids=str,
 )
@@ -59,16 +62,13 @@ def test_predictions_rise_everywhere(params, rng):
     quick = QUICK | params
     free = ANFISRegressor(**quick).fit(X, y)
     assert free.constraints_ is None
-    if params.get("n_mfs") != "auto":
-        assert falls(free, 0, rng) > 1e-3
+    assert falls(free, 0, rng) > 1e-3
     held = ANFISRegressor(**quick, monotonic_cst=[1, 0]).fit(X, y)
     assert held.constraints_["certified"]
     assert held.constraints_["loss_after"] >= held.constraints_["loss_before"] * (1.0 - 1e-12)
     assert falls(held, 0, rng) <= 1e-12
     assert monotonicity(held, 0) == 1
-    # A structure that is found may grow under what is held.
-    if params.get("n_mfs") != "auto":
-        assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
+    assert_allclose(free.memberships_[0]["center"], held.memberships_[0]["center"])
 
 
 def test_slopes_that_rules_have_in_common_stay_one_to_the_last_bit(rng):
@@ -89,8 +89,8 @@ def test_signs_are_found_by_the_names_of_columns_that_are_numbers(rng):
 
 def test_the_search_judges_what_is_kept(rng):
     """Of a valley told to rise: what is expected of new rows is what the held model leaves."""
-    X, X_new = rng.uniform(-1.0, 1.0, (2, 400, 2))
-    y, y_new = (x[:, 0] ** 2 + 0.5 * x[:, 1] + 0.1 * rng.normal(size=400) for x in (X, X_new))
+    X, X_new = rng.uniform(-1.0, 1.0, (2, 300, 2))
+    y, y_new = (x[:, 0] ** 2 + 0.5 * x[:, 1] + 0.1 * rng.normal(size=300) for x in (X, X_new))
     with pytest.warns(ConstraintWarning, match="The data contradict monotonic_cst=1 of 'y'"):
         held = ANFISRegressor(monotonic_cst=[1, 0]).fit(X, y)
     assert {one["kind"] for one in held.structures_} == {"one rule", "grid", "tree"}
@@ -98,40 +98,28 @@ def test_the_search_judges_what_is_kept(rng):
     left = np.sqrt(np.mean((held.predict(X_new) - y_new) ** 2))
     assert_allclose(expected * y.std(), left, rtol=0.1)
     # A free fit leaves little more than the noise.
-    assert left > 2.0 * np.sqrt(np.mean((ANFISRegressor().fit(X, y).predict(X_new) - y_new) ** 2))
+    assert left > 0.25
 
 
 @pytest.mark.parametrize("kind", ["tree", "grid", "scattered"])
 def test_predictions_rise_beyond_the_range_too(kind):
-    """Steps up, and steps that an optimiser takes, from anywhere; the free fit falls there."""
+    """It is proven, and so are steps up from anywhere; the free fit falls there."""
     rng = np.random.default_rng(3)
     X = rng.uniform(-1.0, 1.0, (200, 2)) * [1.0, 30.0]
     # It rises with the first input where the second is not low: asked is that it does everywhere.
     y = np.tanh(3.0 * X[:, 0]) * (1.0 + 4.0 / 3.0 * np.tanh(X[:, 1] / 10.0))
     y += 0.3 * rng.normal(size=200)
-    params = {"partition": kind, "max_rules": 6, "out_of_bounds": LinearExtrapolation(2.0)}
+    params = {"partition": kind, "max_rules": 4, "out_of_bounds": LinearExtrapolation(2.0)}
     free = ANFISRegressor(**params).fit(X, y)
     held = ANFISRegressor(**params, monotonic_cst=[1, 0]).fit(X, y)
     assert held.constraints_["certified"]
     low, high = 3.0 * X.min(axis=0), 3.0 * X.max(axis=0)
     box = np.stack([low, high], axis=1)
     assert_array_equal(monotonicity(held, 0, box), [1])
-    before = rng.uniform(low, high, (100_000, 2))
-    after = before + rng.exponential(0.3, (100_000, 1)) * [1.0, 0.0]
-
-    def fall(model, start, stop):
-        return model.predict(start) - model.predict(stop)
-
-    assert fall(held, before, after).max() <= 1e-12
-    assert fall(free, before, after).max() > 1e-3
-    for start, stop in zip(before[:5], after[:5], strict=True):
-        found = minimize(
-            lambda u: -fall(held, u[None, :2], u[None, :2] + [abs(u[2]), 0.0])[0],
-            [*start, stop[0] - start[0]],
-            method="Nelder-Mead",
-            options={"maxfev": 100},
-        )
-        assert -found.fun <= 1e-12
+    before = rng.uniform(low, high, (30_000, 2))
+    after = before + rng.exponential(0.3, (30_000, 1)) * [1.0, 0.0]
+    assert (held.predict(before) - held.predict(after)).max() <= 1e-12
+    assert (free.predict(before) - free.predict(after)).max() > 1e-3
 
 
 def test_data_that_contradict_are_told(rng):
@@ -212,6 +200,16 @@ def test_points_are_met_and_rows_weigh(rng):
     assert_allclose(weighted.predict(X), repeated.predict(X), atol=1e-6)
 
 
+def test_points_are_met_by_a_line_where_the_data_ask_for_no_slopes():
+    rng = np.random.default_rng(1)
+    X, y = rng.normal(size=(42, 2)), rng.normal(size=42)
+    assert not ANFISRegressor(n_mfs=1).fit(X, y).consequents_[0, 1:].any()
+    known = [FixedPoint([0.0, 0.0], -0.2), FixedPoint([1.0, 0.0], 0.1)]
+    held = ANFISRegressor(n_mfs=1, constraints=known).fit(X, y)
+    assert_allclose(held.predict([[0.0, 0.0], [1.0, 0.0]]), [-0.2, 0.1], atol=1e-9)
+    assert held.constraints_["drawn"] == 1.0
+
+
 @pytest.mark.parametrize("policy", ["linear", "clip", LinearExtrapolation(np.inf)])
 def test_points_beyond_the_range_are_met_by_the_policy(rng, policy):
     """Zero rate of a campaign that began at some: what is predicted there, not at the edge."""
@@ -284,34 +282,46 @@ def test_there_is_always_a_line(rng):
             {"constraints": [FixedPoint([0.0, 0.0], 1.0), FixedPoint([0.0, 0.0], 2.0)]},
             r"fixes 'y' at 2 points, which 9 rules cannot all meet: two are the same",
         ),
+        (
+            {"constraints": points_on_a_line(*np.linspace(-0.5, 0.5, 40))},
+            "fixes 'y' at 40 points, which 9 rules cannot all meet",
+        ),
+        (
+            {"monotonic_cst": [0, -1], "constraints": points_on_a_line(0.0, 0.2)},
+            "contradict one another: output 0 is",
+        ),
+        (
+            # A line through two points leaves the limit.
+            {"n_mfs": 1, "constraints": [*points_on_a_line(-0.5, 0.5), OutputLimits(upper=0.7)]},
+            "1 rule keep the limit 0.7 of 'y', with the 2 fixed points",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused(known, message, rng):
     X, _, y = planted(rng)
-    estimator = ANFISRegressor(**QUICK, **known)
+    estimator = ANFISRegressor(**QUICK | known)
     with pytest.raises(ValueError, match=message):
         estimator.fit(X, y)
     assert not hasattr(estimator, "model_")
 
 
-def test_what_the_rules_cannot_keep_is_named(rng):
+@pytest.mark.parametrize("n_mfs", [1, 2])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_free_fit_without_any_error_is_held_too(n_mfs, seed):
+    X = np.random.default_rng(seed).normal(size=(20, 1))
+    rising, falling = (ANFISRegressor(n_mfs, monotonic_cst=[sign]) for sign in (1, -1))
+    assert_allclose(rising.fit(X, X[:, 0]).predict(X), X[:, 0], atol=1e-4)
+    with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0'"):
+        falling.fit(X, X[:, 0])
+    assert_array_equal([monotonicity(model, 0)[0] for model in (rising, falling)], [1, -1])
+
+
+def test_a_constant_keeps_a_limit_that_the_data_contradict(rng):
     X, _, y = planted(rng)
-    known = {"monotonic_cst": [0, -1], "constraints": [FixedPoint([0.0, x], x) for x in (0.0, 0.2)]}
-    with pytest.raises(ValueError, match="contradict one another: output 0 is"):
-        ANFISRegressor(**QUICK, **known).fit(X, y)
-    known = {"constraints": [FixedPoint([0.0, x], x) for x in np.linspace(-0.5, 0.5, 40)]}
-    with pytest.raises(ValueError, match="fixes 'y' at 40 points, which 9 rules cannot all meet"):
-        ANFISRegressor(**QUICK, **known).fit(X, y)
-    # A line through two points leaves the limit.
-    known = {"constraints": [FixedPoint([-0.5, 0.0], -1.0), FixedPoint([0.0, 0.0], 0.5)]}
-    known["constraints"].append(OutputLimits(upper=1.0))
-    with pytest.raises(ValueError, match="1 rule keep the limit 1 of 'y', with the 2 fixed points"):
-        ANFISRegressor(n_mfs=1, **known).fit(X, y)
-    # Of order zero with one rule: a constant.
-    known = {"constraints": [OutputLimits(lower=5.0)]}
+    held = ANFISRegressor(n_mfs=1, order=0, constraints=[OutputLimits(lower=5.0)])
     with pytest.warns(ConstraintWarning, match="The data contradict the limit 5 of 'y'"):
-        constant = ANFISRegressor(n_mfs=1, order=0, **known).fit(X, y)
-    assert_allclose(constant.predict(X), 5.0, atol=2e-3 * y.std())
+        held.fit(X, y)
+    assert_allclose(held.predict(X), 5.0, atol=2e-3 * y.std())
 
 
 def test_a_kind_goes_on_while_its_free_rules_gain():
@@ -330,3 +340,6 @@ def test_a_kind_goes_on_while_its_free_rules_gain():
     free, told = (ANFISRegressor(monotonic_cst=s).fit(X, y) for s in (None, [1, 0]))
     errors = [np.mean((model.predict(fresh) - y_fresh) ** 2) for model in (free, told)]
     assert errors[1] < errors[0]
+    assert told.constraints_["certified"]
+    assert falls(told, 0, rng) <= 1e-12
+    assert monotonicity(told, 0) == 1

@@ -58,17 +58,20 @@ def problem_of(antecedent, rng, order=1, n_inputs=2, alpha=1e-3):
     return SeparableProblem(rows, antecedent, order, Penalty(alpha=alpha, slope=alpha))
 
 
-def kept(problem, evaluation, order):
-    """A frozen model whose rules are in order."""
+def in_order(problem, evaluation, order):
+    """The nearest local consequents that keep an order."""
     nothing = np.empty((0, problem.n_columns)), np.empty(0)
     box = [end[problem.consequent_inputs] for end in problem.rows.inputs.box]
     normal, to_rules = evaluation.normal, problem.local.to_global(np.eye(problem.n_columns))
     start = normal.coefficients[:, 0]
-    local = nearest_in_order(order, normal.factor, start, to_rules, box, *nothing)
+    return nearest_in_order(order, normal.factor, start, to_rules, box, *nothing)
+
+
+def kept(problem, evaluation, order):
+    """A frozen model whose rules are in order."""
     inputs, targets = problem.rows.inputs, problem.rows.targets
-    coefficients = in_user_units(
-        problem.local.to_global(local[:, None]), inputs, targets, np.arange(2), problem.order
-    )
+    held = problem.local.to_global(in_order(problem, evaluation, order)[:, None])
+    coefficients = in_user_units(held, inputs, targets, np.arange(2), problem.order)
     antecedent = evaluation.antecedent.change_units(inputs.offset, inputs.scale)
     return TSKModel(
         antecedent=antecedent,
@@ -87,10 +90,10 @@ def kept(problem, evaluation, order):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_in_order_rises(kind):
-    """300 random models of a kind: rows, and the proof that knows nothing of an order."""
+    """90 random models of a kind: rows, and the proof that knows nothing of an order."""
     rng = np.random.default_rng(5)
     falls = n_proven = n_asked = 0
-    for place in range(300):
+    for place in range(90):
         # One input rises or falls, or two; scattered rules may be in other orders by the other.
         signs, order = np.array([1, -1, 0])[rng.integers(0, 3, 2)], place % 2
         if not signs.all() or kind == "scattered":
@@ -116,7 +119,7 @@ def test_what_is_in_order_rises(kind):
             n_proven, n_asked = n_proven + (found.bound <= until), n_asked + 1
     # A slope that touches zero inside the range takes more boxes than these.
     assert n_proven > 0.7 * n_asked
-    assert falls > 30 or kind == "one rule"
+    assert falls > 9 or kind == "one rule"
 
 
 def test_the_least_change_that_is_in_order(rng):
@@ -127,8 +130,7 @@ def test_the_least_change_that_is_in_order(rng):
     held = RuleOrder.of(antecedent, np.array([1, 0]), FREE, problem.consequent_inputs)
     box, normal = problem.rows.inputs.box, evaluation.normal
     to_rules, start = problem.local.to_global(np.eye(problem.n_columns)), normal.coefficients[:, 0]
-    nothing = np.empty((0, problem.n_columns)), np.empty(0)
-    found = nearest_in_order(held, normal.factor, start, to_rules, box, *nothing)
+    found = in_order(problem, evaluation, held)
     weighed, rows = normal.gram + normal.penalty, []
     n_terms = antecedent.counts[0]
     for x, z in product(np.linspace(*np.transpose(box)[0], 51), np.transpose(box)[1]):

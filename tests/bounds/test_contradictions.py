@@ -11,22 +11,30 @@ RISES = Inequality(0, 1.0, 0, 0.0, "rises")
 BELOW = Inequality(0, -1.0, None, 1.0, "limit")
 
 
-def told(model, X, y, inequality):
+def told(model, X, y, *inequalities, fixed=None):
     rows = X, y[:, None], np.arange(len(y))
-    fixed = np.empty((0, X.shape[1])), np.empty((0, 1))
-    return list(contradicted(model.model_, model.model_, [inequality], fixed, rows, 2.0))
+    fixed = fixed or (np.empty((0, X.shape[1])), np.empty((0, 1)))
+    return list(contradicted(model.model_, model.model_, inequalities, fixed, rows, 2.0))
 
 
 @pytest.mark.parametrize("t", [-6.0, -3.0, 6.0])
 def test_a_line_speaks_by_its_t_statistic(t, rng):
-    """Of a single rule the mean change over its deviation is slope over standard error."""
+    """Of a single rule the mean change over its deviation is slope over standard error.
+
+    So is the distance of a fixed point at the mean of the rows over that of the mean.
+    """
     x, noise = rng.uniform(-1.0, 1.0, 200), rng.normal(size=200)
     design = np.column_stack([np.ones(200), x])
     noise -= design @ np.linalg.lstsq(design, noise, rcond=None)[0]
-    deviation = np.sqrt(noise @ noise / 198.0 / np.sum((x - x.mean()) ** 2))
-    X, y = x[:, None], t * deviation * x + noise
+    variance = noise @ noise / 198.0
+    slope = t * np.sqrt(variance / np.sum((x - x.mean()) ** 2))
+    X, y = x[:, None], slope * x + noise
     line = ANFISRegressor(n_mfs=1, alpha=1e-9, agreement=0.0).fit(X, y)
     assert bool(told(line, X, y, RISES)) == (t < -4.0)
+    fixed = np.array([[x.mean()]]), np.array([[y.mean() + t * np.sqrt(variance / 200.0)]])
+    found = told(line, X, y, fixed=fixed)
+    assert len(found) == (abs(t) > 4.0)
+    assert all("The data contradict FixedPoint at [" in sentence for sentence in found)
 
 
 def test_a_hump_speaks_against_rising_and_against_a_limit(rng):
@@ -38,29 +46,12 @@ def test_a_hump_speaks_against_rising_and_against_a_limit(rng):
     assert not told(free, X, y, Inequality(0, -1.0, None, 1.6, "limit"))
 
 
-@pytest.mark.parametrize("t", [-6.0, -3.0, 6.0])
-def test_a_fixed_point_speaks_by_its_distance_in_standard_errors(t, rng):
-    """Of a line at the mean of its rows: the noise's deviation over the root of the rows."""
-    x, noise = rng.uniform(-1.0, 1.0, 200), rng.normal(size=200)
-    X, y = x[:, None], x + noise
-    line = ANFISRegressor(n_mfs=1, alpha=1e-9, agreement=0.0).fit(X, y).model_
-    residual = y - np.polyval(np.polyfit(x, y, 1), x)
-    error = np.sqrt(residual @ residual / 198.0 / 200.0)
-    fixed = np.array([[x.mean()]]), np.array([[y.mean() + t * error]])
-    rows = X, y[:, None], np.arange(200)
-    found = list(contradicted(line, line, [], fixed, rows, 2.0))
-    assert len(found) == (abs(t) > 4.0)
-    assert all("The data contradict FixedPoint at [" in sentence for sentence in found)
-
-
 def test_what_is_true_is_not_contradicted():
-    """Forty draws of a saturation, which is flat for half of the range, by three terms."""
-    n_told = 0
-    for seed in range(40):
+    """Draws of a saturation, which is flat for half of the range, by three terms."""
+    for seed in range(12):
         rng = np.random.default_rng(seed)
         X = rng.uniform(-1.0, 1.0, (100, 2))
         y = np.minimum(X[:, 0], 0.0) + 0.3 * rng.normal(size=100)
         free = ANFISRegressor(n_mfs=[3, 1]).fit(X, y)
-        n_told += bool(told(free, X, y, RISES))
-        n_told += bool(told(free, X, y, Inequality(0, -1.0, None, 0.0, "limit")))
-    assert n_told <= 1
+        assert not told(free, X, y, RISES)
+        assert not told(free, X, y, Inequality(0, -1.0, None, 0.0, "limit"))

@@ -11,10 +11,10 @@ from sklearn.preprocessing import MinMaxScaler
 
 from skanfis import ANFISRegressor
 from skanfis.cluster import SubtractiveClustering
-from skanfis.inspection import MembershipDisplay, ResponseSurfaceDisplay
+from skanfis.inspection import EffectsDisplay, MembershipDisplay, ResponseSurfaceDisplay
 from skanfis.inspection.labels import as_label, printable, title_of
 
-from ..export.rule_bases import EVERY_PAIR, MODELS
+from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
 
 plt = pytest.importorskip("matplotlib.pyplot")
@@ -80,13 +80,6 @@ class TestMemberships:
         peaks = [display.inputs[0].grid[line.get_ydata().argmax()] for line in curves]
         assert_allclose(peaks, near, atol=0.05)
 
-    def test_on_given_axes(self, fitted):
-        pipe, _ = fitted
-        _, axes = plt.subplots(1, 2)
-        assert_array_equal(MembershipDisplay.from_estimator(pipe, ax=axes).axes_, axes)
-        with pytest.raises(ValueError, match="ax has 3 axes; 2 are needed"):
-            MembershipDisplay.from_estimator(pipe, ax=plt.subplots(1, 3)[1])
-
 
 class TestSurface:
     @EACH
@@ -144,6 +137,15 @@ class TestSurface:
         x = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
         with pytest.raises(ValueError, match="one input, and a surface takes two: plot what"):
             ResponseSurfaceDisplay.from_estimator(ANFISRegressor(n_mfs=2).fit(x, x[:, 0]))
+
+
+@pytest.mark.parametrize(("display", "count"), [(MembershipDisplay, 3), (EffectsDisplay, 5)])
+def test_panels_are_drawn_on_given_axes(display, count):
+    X = rows_of(A_GRID, 1.0, 9)
+    axes = plt.subplots(count)[1]
+    assert_array_equal(display.from_estimator(A_GRID, X, ax=axes).axes_, axes)
+    with pytest.raises(ValueError, match=f"ax has 2 axes; {count} are needed"):
+        display.from_estimator(A_GRID, X, ax=axes[:2])
 
 
 def test_a_surface_is_drawn_where_asked():

@@ -122,23 +122,19 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
     encoder = make_column_transformer(
         (OneHotEncoder(sparse_output=False, drop=drop), [1]), remainder=StandardScaler()
     )
-    model = make_pipeline(encoder, quick(n_mfs=[2] + [1] * (3 if drop is None else 2))).fit(
-        table, y
-    )
-    search = GridSearchCV(make_pipeline(encoder, quick(n_mfs="auto", partition="grid")), {}, cv=2)
+    model = make_pipeline(encoder, quick(n_mfs=[2] + [1] * (3 if drop is None else 2)))
+    fitted = GridSearchCV(model, {}, cv=2).fit(table, y)
     rate, fibre = ["rate", "fibre"] if has_names else ["x0", "x1"]
     # All combinations of a rate and a fibre, by the rows' frequencies.
     n = len(X)
     both = pd.DataFrame({"rate": np.repeat(X["rate"], n), "fibre": np.tile(X["fibre"], n)})
-    for fitted in (model, search.fit(table, y)):
-        folded = fold(fitted)
-        rows = np.column_stack([both["rate"], *(both["fibre"] == level for level in "abc")])
-        rows = rows[:, [0, 1, 2, 3] if drop is None else [0, 2, 3]]
-        yhat = folded.predict(rows.astype(float))[:, 0].reshape(n, n)
-        expected = np.array([yhat.mean(axis=1).var(), yhat.mean(axis=0).var()]) / yhat.var()
-        for found in (effects(fitted, table).table, effects(fitted).table):
-            assert_allclose(found.loc[[rate, fibre], "sobol"], expected, rtol=0, atol=1e-9)
-            assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
+    rows = np.column_stack([both["rate"], *(both["fibre"] == level for level in "abc")])
+    rows = rows[:, [0, 1, 2, 3] if drop is None else [0, 2, 3]]
+    yhat = fold(fitted).predict(rows.astype(float))[:, 0].reshape(n, n)
+    expected = np.array([yhat.mean(axis=1).var(), yhat.mean(axis=0).var()]) / yhat.var()
+    for found in (effects(fitted, table).table, effects(fitted).table):
+        assert_allclose(found.loc[[rate, fibre], "sobol"], expected, rtol=0, atol=1e-9)
+        assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
 
 
 def test_groups_enter_as_one():
@@ -177,6 +173,24 @@ def test_inputs_without_terms_do_nothing_together():
     X = rows_of(MODELS["grid, order 1, 1 outputs"], 1.0, 9)
     found = effects(MODELS["grid on two inputs, order 0, 1 outputs"], X).table
     assert list(found.index[3:]) == ["time and rate", "three or more"]
+
+
+def test_what_does_nothing_is_printed_as_one_row(rng):
+    X = rng.normal(size=(80, 30))
+    X = np.vstack([X, -X])
+    model = quick(n_mfs=[2, *[1] * 29], consequent_features=[0, 1, 2])
+    found = effects(model.fit(X, X[:, 0] * X[:, 1] + X[:, 2]), X)
+    every = found.table["sobol"]
+    assert every.size == 30 + 29 + 1
+    assert_allclose(every[["x7", "x0 and x7"]], 0.0, atol=1e-20)
+    header, *rows = str(replace(found, notes=[])).splitlines()
+    assert header.split() == ["sobol", "rows"]
+    printed = {name.strip(): values for name, *values in (row.rsplit(maxsplit=2) for row in rows)}
+    nothing = {name for name, values in printed.items() if values == ["0.000", "0.000"]}
+    # An input stays that does something together with another alone.
+    assert nothing == {"x1", "27 inputs and 27 pairs more", "three or more"}
+    assert printed.keys() == nothing | {"x0", "x2", "x0 and x1", "x0 and x2"}
+    assert_allclose(sum(float(own) for own, _ in printed.values()), 1.0, atol=0.002)
 
 
 def test_draws_are_said():

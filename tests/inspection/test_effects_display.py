@@ -1,5 +1,6 @@
 """The picture of effects against means over the product of the inputs' values."""
 
+import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -83,6 +84,8 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
     assert [one["input"] for one in fewer.curves] == [display.curves[0]["input"]]
     with pytest.raises(ValueError, match="max_shown"):
         EffectsDisplay.from_estimator(model, X, max_shown=0)
+    with pytest.raises(ValueError, match="groups has every column, and groups have no curve"):
+        EffectsDisplay.from_estimator(model, X, groups={"all": range(3)})
 
 
 def test_the_band_is_the_deviation_of_the_mean_over_other_inputs():
@@ -118,15 +121,6 @@ def test_a_category_is_drawn_by_its_levels():
         assert [one.get_text() for one in axes.get_xticklabels()] == ["a", "b", "c"]
 
 
-def test_axes_may_be_given():
-    model = KINDS["grid"]
-    X = rows_of(model, 1.0, 9)
-    axes = plt.subplots(5)[1]
-    assert list(EffectsDisplay.from_estimator(model, X, ax=axes).axes_) == list(axes)
-    with pytest.raises(ValueError, match="5 are needed"):
-        EffectsDisplay.from_estimator(model, X, ax=axes[:2])
-
-
 def test_labels_of_many_levels_stand_apart(rng):
     levels = ["minivan", "subcompact", "pickup", "2seater", "suv", "midsize"]
     X = pd.DataFrame({"class": rng.choice(levels, 200), "power": rng.normal(size=200)})
@@ -158,8 +152,13 @@ def test_a_pair_within_the_error_of_draws_is_not_drawn(rng):
     coefficients = model.coefficients.copy()
     coefficients[:, 2:] = model.target.spread / model.spread[1:, None]
     model = replace(model, coefficients=coefficients)
-    table = effects(model, X).table["sobol"]
-    assert table[table.index.str.contains(" and ")].max() > 0.005
+    found = effects(model, X)
+    shares = found.table["sobol"]
+    assert shares[shares.index.str.contains(" and ")].max() > 0.005
+    # Nor is it printed by itself.
+    assert "x0 and x1" in shares
+    assert "x0 and x1" not in str(found)
+    assert re.search(r"\n\d pairs more ", str(found))
     display = drawn(EffectsDisplay.from_estimator(model, X))
     assert display.pairs == []
     assert not any("-0 %" in axes.get_title(loc="left") for axes in display.axes_)

@@ -266,6 +266,30 @@ def test_a_category_is_listed_by_its_levels(rng):
     assert lines[4:] == ["  sort: a, c, other", "  on: y, other"]
 
 
+@pytest.mark.parametrize("n_inputs", [4, 30])
+def test_inputs_that_no_rule_names_are_one_line(rng, n_inputs):
+    X = rng.normal(size=(80, n_inputs))
+    fibre = pd.DataFrame({"fibre": rng.choice(["a", "b"], 80)})
+    table = pd.concat([fibre, pd.DataFrame(X).add_prefix("x")], axis=1)
+    encoder = make_column_transformer((OneHotEncoder(), ["fibre"]), remainder="passthrough")
+    counts = [1, 1, 2, *[1] * (n_inputs - 1)]
+    model = ANFISRegressor(n_mfs=counts, consequent_features=[2, 3], agreement=0.1)
+    pipe = make_pipeline(encoder, model).fit(table, np.tanh(2.0 * X[:, 0]) + X[:, 1])
+    told = "fibre, x2, x3" if n_inputs == 4 else "29 more inputs"
+    text, names = export_text(pipe, precision=17), [f"x{j}" for j in range(n_inputs)]
+    listed = text.partition("trained:\n")[2].partition("\nOut")[0].splitlines()
+    assert [line.partition(": ")[0] for line in listed if line[2] != " "] == [
+        "  x0",
+        "  x1",
+        f"  {told}",
+    ]
+    assert listed[-1] == f"  {told}: in no rule"
+    assert_allclose(predicted(text, X, names)[:, 0], pipe.predict(table), atol=1e-9)
+    # Where nothing is predicted outside, every range counts.
+    pipe.set_params(anfisregressor__out_of_bounds="nan")
+    assert "in no rule" not in export_text(pipe)
+
+
 @ALL
 def test_every_rule_is_told_once_the_strongest_on_most_rows_first(model):
     labels, led = [one[0] for one in read_text(export_text(model), NAMES).rules], parts_led(model)
@@ -319,11 +343,7 @@ def test_a_grid_in_words():
     assert "common line" not in text
 
 
-def test_places_are_told_to_digits_of_their_widths():
-    # At two significant digits 1000423 would be 1000000, at a width of 600.
-    term = next(t for t in A_GRID.memberships() if t["input"] == "time")
-    written = read_text(export_text(A_GRID), NAMES).terms["time", term["name"]][1]
-    assert written["center"] == pytest.approx(term["center"], abs=0.05 * term["width"])
+def test_numbers_are_rounded_to_the_nearest_decimal():
     assert number(1000423.4, 4) == "1000000"
     found = rounded([1000423.41, -1e-13, 1.0 / 3.0], 600.0, 4)
     assert_array_equal(found, [1000423.4, 0.0, 0.3])
@@ -406,11 +426,13 @@ def test_terms_are_written_without_rests_of_rounding_and_places_to_the_last_digi
     numbers = re.findall(r"(?:center|width) (\S+?)(?:,|\n)", export_text(model))
     assert len(numbers) == 6
     assert max(len(text.partition("e")[0]) for text in numbers) <= len("1700000000.12")
-    read = read_text(export_text(model, precision=17), ["x0"])
+    few, every = (read_text(export_text(model, precision=n), ["x0"]).terms for n in (2, 17))
     for term in model.memberships_:
-        _, told = read.terms[term["input"], term["name"]]
-        assert told["center"] == term["center"]
-        assert told["width"] == pytest.approx(term["width"], rel=1e-13)
+        key, width = (term["input"], term["name"]), term["width"]
+        # Places to digits of the width: of a time stamp as many as it takes.
+        assert few[key][1]["center"] == pytest.approx(term["center"], abs=0.05 * width)
+        assert every[key][1]["center"] == term["center"]
+        assert every[key][1]["width"] == pytest.approx(width, rel=1e-13)
 
 
 def test_a_rule_that_is_the_strongest_on_no_row_errs_on_none():
