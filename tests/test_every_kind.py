@@ -4,6 +4,7 @@ What only reads a model goes through frozen models of every kind where it is tes
 """
 
 import pickle
+from functools import cache
 
 import joblib
 import numpy as np
@@ -37,7 +38,6 @@ def data():
 
 X, Y = data()
 WEIGHT = np.random.default_rng(1).integers(0, 3, 300)
-_FITTED: dict = {}
 
 
 def searched(kind, **settings):
@@ -45,12 +45,12 @@ def searched(kind, **settings):
     return ANFISRegressor(**given)
 
 
+@cache
 def fitted(kind):
     """One fit of each kind for all that only read it."""
-    if kind not in _FITTED:
-        _FITTED[kind] = searched(kind).fit(X, Y)
-        assert _FITTED[kind].n_rules_ > 2
-    return _FITTED[kind]
+    estimator = searched(kind).fit(X, Y)
+    assert estimator.n_rules_ > 2
+    return estimator
 
 
 def onward(kind, **settings):

@@ -56,24 +56,8 @@ def same_bits(one, other, data=X):
 
 
 def textbook_strengths(estimator, memberships, data):
-    """Products of memberships over their sum, from nothing but the estimator's attributes."""
-    names = list(getattr(estimator, "feature_names_in_", [f"x{j}" for j in range(data.shape[1])]))
-    mu = [
-        oracles.textbook_membership(term["function"], data[:, names.index(term["input"])], term)
-        for term in memberships
-    ]
-    mu = np.array(mu).reshape(-1, len(data))
-    products = np.array([np.prod(mu[list(rule)], axis=0) for rule in estimator.rules_])
-    return products / products.sum(axis=0)
-
-
-def textbook_predict(estimator, data):
-    """y = sum_r w_r (p_r0 + p_r1 x_1 + ... + p_rd x_d)."""
-    strengths = textbook_strengths(estimator, estimator.memberships_, data)
-    basis = np.column_stack([np.ones(len(data)), data])
-    outputs = estimator.consequents_.reshape(estimator.n_rules_, basis.shape[1], -1)
-    result = np.einsum("rn,ni,rio->no", strengths, basis, outputs)
-    return result[:, 0] if estimator.consequents_.ndim == 2 else result
+    names = getattr(estimator, "feature_names_in_", [f"x{j}" for j in range(data.shape[1])])
+    return oracles.textbook_strengths(memberships, estimator.rules_, names, data)
 
 
 # ----------------------------------------------------------------------------------- what it learns
@@ -166,14 +150,12 @@ def test_attributes_reproduce_the_predictions(place, settings):
     # What the rules say, before it is held within the limits of the target.
     model.model_ = replace(model.model_, target=None)
     # p0 + p1 x1 + ... cancels where x is far from the origin, by 10^6 spans for the first column.
-    error = np.abs(textbook_predict(model, data) - model.predict(data)) / np.ptp(targets, axis=0)
+    strengths = textbook_strengths(model, model.memberships_, data)
+    consequents = model.consequents_.reshape(model.n_rules_, 4, n_outputs)
+    expected = oracles.textbook_predict(strengths, consequents, data).reshape(targets.shape)
+    error = np.abs(expected - model.predict(data)) / np.ptp(targets, axis=0)
     assert error.max() < 1e-8
-    assert_allclose(
-        model.strengths(data).T,
-        textbook_strengths(model, model.memberships_, data),
-        rtol=0,
-        atol=1e-8,
-    )
+    assert_allclose(model.strengths(data).T, strengths, rtol=0, atol=1e-8)
 
 
 FREE = {"agreement": 0.0, "alpha": 1e-12, "solver": VariableProjection(tol=0.01, stiffness=0.0)}
