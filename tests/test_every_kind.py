@@ -21,6 +21,7 @@ from skanfis.export import export_json, fold, read_json
 from skanfis.export.json_reader import parse_json
 from skanfis.learning import VariableProjection
 
+N_ROWS = 160
 KINDS = {"grid": GridAntecedent, "tree": TreeAntecedent, "scattered": ScatteredAntecedent}
 pytestmark = [pytest.mark.parametrize("kind", KINDS)]
 # Weights that are given are not sought: a fit takes a tenth of the time.
@@ -30,14 +31,14 @@ GIVEN = {"agreement": 0.01, "alpha": 1e-4, "solver": VariableProjection(stiffnes
 def data():
     """A step, a slope, and a column of two values."""
     g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (300, 3)) * [1.0, 10.0, 1.0] + [0.0, 5.0, 0.0]
-    X[:, 2] = g.integers(0, 2, 300)
+    X = g.uniform(-1.0, 1.0, (N_ROWS, 3)) * [1.0, 10.0, 1.0] + [0.0, 5.0, 0.0]
+    X[:, 2] = g.integers(0, 2, N_ROWS)
     y = np.where(X[:, 0] > 0.2, 0.3 * X[:, 1], 1.0 - 0.1 * X[:, 1]) + X[:, 2] * (X[:, 1] > 5.0)
-    return X, y + 0.05 * g.normal(size=300)
+    return X, y + 0.05 * g.normal(size=N_ROWS)
 
 
 X, Y = data()
-WEIGHT = np.random.default_rng(1).integers(0, 3, 300)
+WEIGHT = np.random.default_rng(1).integers(0, 3, N_ROWS)
 
 
 def searched(kind, **settings):
@@ -103,7 +104,7 @@ class TestFits:
     def test_orders_and_several_outputs(self, kind, order):
         estimator = searched(kind, order=order, max_rules=6).fit(X, two())
         assert_is(estimator, kind)
-        assert estimator.predict(X).shape == (300, 2)
+        assert estimator.predict(X).shape == (N_ROWS, 2)
         assert estimator.model_.order == order
 
     def test_weight_of_two_is_the_row_twice(self, kind):
@@ -135,7 +136,7 @@ class TestFits:
 
     def test_early_stopping_groups_and_losses(self, kind):
         assert_is(searched(kind, early_stopping=True, loss="huber").fit(X, Y), kind)
-        assert_is(searched(kind).fit(X, Y, groups=np.arange(300) // 30), kind)
+        assert_is(searched(kind).fit(X, Y, groups=np.arange(N_ROWS) // 20), kind)
 
     def test_parts_add_up(self, kind):
         whole = onward(kind, solver="lse").partial_fit(X, Y)

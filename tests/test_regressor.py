@@ -96,7 +96,7 @@ def test_planted_model_is_found():
     ],
 )
 def test_surface_is_learnt_between_the_points(settings, most):
-    train, check = surface(200), surface(500, seed=1)
+    train, check = surface(150), surface(500, seed=1)
     model = ANFISRegressor(**settings).fit(*train)
     # Of the target's deviation; a linear model leaves 0.4.
     assert np.sqrt(1 - model.score(*check)) < most
@@ -243,8 +243,8 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
         return read(self, part)
 
     monkeypatch.setattr(StandardisedData, "read", read_and_remember)
-    # Eight blocks in three chunks.
-    data, target = X[:128], Y[:128]
+    # Four blocks in two chunks.
+    data, target = X[:64], Y[:64]
     weight = np.random.default_rng(0).uniform(0.5, 2.0, len(data))
     models = {}
     for n_jobs in (None, 2):

@@ -43,9 +43,9 @@ def test_linear_truth_gets_next_to_a_linear_model(rng):
 
 
 def test_noise_alone_gets_a_single_rule(rng):
-    """Nine times of ten (``benchmarks structure``, 94 of 100); here seven of ten at least."""
-    draws = [(inputs(rng, 150, 8), rng.standard_normal(150)) for _ in range(10)]
-    assert sum(ANFISRegressor().fit(*draw).n_rules_ == 1 for draw in draws) >= 7
+    """Nine times of ten (``benchmarks structure``, 94 of 100); here four of five at least."""
+    draws = [(inputs(rng, 150, 8), rng.standard_normal(150)) for _ in range(5)]
+    assert sum(ANFISRegressor().fit(*draw).n_rules_ == 1 for draw in draws) >= 4
 
 
 def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
@@ -72,8 +72,8 @@ def test_expected_error_is_that_on_new_rows(rng):
 
 @pytest.mark.parametrize("partition", ["auto", *KINDS])
 def test_more_noise_never_gives_more_rules(rng, partition):
-    X = inputs(rng, 200, 2)
-    truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(200)
+    X = inputs(rng, 100, 2)
+    truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(100)
     model = ANFISRegressor(partition=partition)
     assert model.fit(X, truth + 0.02 * noise).n_rules_ > model.fit(X, truth + 30 * noise).n_rules_
 
@@ -194,13 +194,14 @@ def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_star
 
 
 @pytest.mark.parametrize(
-    ("starts", "most"), [((0.0, 10.0, 50.0), 0.3), (np.linspace(0.0, 50.0, 30), 0.01)]
+    ("starts", "n_rows", "most"),
+    [((0.0, 10.0, 50.0), 30, 0.3), (np.linspace(0.0, 50.0, 30), 60, 0.01)],
 )
-def test_between_runs_rules_by_time_and_temperature_are_not_wild(rng, starts, most):
+def test_between_runs_rules_by_time_and_temperature_are_not_wild(rng, starts, n_rows, most):
     """Instruments that warm up by 6 degrees, each from its own; three say next to nothing."""
-    time = np.tile(np.linspace(0.0, 1.0, 60), len(starts))
+    time = np.tile(np.linspace(0.0, 1.0, n_rows), len(starts))
     warmth = 6.0 * (1.0 - np.exp(-3.0 * time))
-    temperature = np.repeat(starts, 60) + warmth + 0.05 * rng.standard_normal(time.size)
+    temperature = np.repeat(starts, n_rows) + warmth + 0.05 * rng.standard_normal(time.size)
 
     def truth(X):
         return 0.01 * (X[:, 1] - 20.0) ** 2 + np.exp(-4.0 * X[:, 0])
@@ -215,7 +216,7 @@ def test_between_runs_rules_by_time_and_temperature_are_not_wild(rng, starts, mo
 def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     # Half-way between two rows the product is not that of the factors: no new row lies there.
     rng = np.random.default_rng(1)
-    X, fresh = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (2, 800, 3))
+    X, fresh = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (2, 400, 3))
     noise = 1e-3
 
     def truth(X):
@@ -227,7 +228,7 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
     low, high = X.min(axis=0), X.max(axis=0)
     fresh = fresh[((low <= fresh) & (fresh <= high)).all(axis=1)]
-    model = ANFISRegressor(simplicity=0).fit(X, truth(X) + noise * rng.standard_normal(800))
+    model = ANFISRegressor(simplicity=0).fit(X, truth(X) + noise * rng.standard_normal(400))
     errors = model.predict(fresh) - truth(fresh)
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
 

@@ -63,7 +63,7 @@ def test_what_bends_at_first_and_then_goes_on_is_followed(rng):
         return np.tanh(2.0 * X[:, 0]) + X[:, 1]
 
     # Long tails: some rows are many deviations from the rest.
-    X = rng.lognormal(sigma=1.0, size=(300, 2))
+    X = rng.lognormal(sigma=1.0, size=(150, 2))
     model = ANFISRegressor(simplicity=0).fit(X, truth(X))
     assert model.n_rules_ > 1
     assert model.model_.max_extrapolation >= 5.0
