@@ -185,16 +185,19 @@ def test_row_without_weight_is_absent(case):
     assert_array_equal(model.predict(case.X), without.predict(case.X))
 
 
-def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
-    # As beyond 20,000 rows, with a clustering on 40 of 120.
-    monkeypatch.setattr(representative_rows, "__defaults__", (40,))
+def assert_weights_are_repeats_in_any_units(model):
     X, y = gyro()
     weight = np.random.default_rng(2).integers(1, 5, len(y))
-    model = ANFISRegressor(partition=KMEANS)
     weighted = model.fit(X, y, weight).predict(X)
     *units, unit = alternating(3, 6)
     found = model.fit(*repeated(X * units, y * unit, weight)).predict(X * units) / unit
     assert_allclose(found, weighted, rtol=0, atol=TOLERANCE * np.ptp(y))
+
+
+def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
+    # As beyond 20,000 rows, with a clustering on 40 of 120.
+    monkeypatch.setattr(representative_rows, "__defaults__", (40,))
+    assert_weights_are_repeats_in_any_units(ANFISRegressor(partition=KMEANS))
 
 
 @pytest.mark.parametrize("name", ["gyro", "sinc"])
@@ -226,12 +229,7 @@ def test_structure_that_is_chosen_by_itself(name):
     ids=str,
 )
 def test_every_family_and_solver(settings):
-    X, y = gyro()
-    weight = np.random.default_rng(2).integers(1, 5, len(y))
     # Of weights that are found the cases above speak.
     solver = of_given_stiffness(settings.get("solver", "varpro"))
     model = ANFISRegressor(max_iter=8, **GIVEN | settings | {"solver": solver})
-    plain = model.fit(X, y, weight).predict(X)
-    *units, unit = alternating(3, 6)
-    found = model.fit(*repeated(X * units, y * unit, weight)).predict(X * units) / unit
-    assert_allclose(found, plain, rtol=0, atol=TOLERANCE * np.ptp(y))
+    assert_weights_are_repeats_in_any_units(model)
