@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
 from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
@@ -205,10 +206,11 @@ def test_structure_that_is_chosen_by_itself(name):
     # Units, offsets, repeated rows and their order, all at once: the same choice, the same fit.
     X, y = DATA[name]()
     weight = np.random.default_rng(2).integers(1, 4, len(y))
-    plain = ANFISRegressor().fit(X, y, weight)
+    model = ANFISRegressor(max_rules=4)
+    plain = clone(model).fit(X, y, weight)
     *units, unit = alternating(X.shape[1], 6)
     far = (X + 1e4 * np.ptp(X, axis=0)) * units
-    other = ANFISRegressor().fit(*repeated(far, unit * y, weight))
+    other = clone(model).fit(*repeated(far, unit * y, weight))
     assert_allclose(other.predict(far) / unit, plain.predict(X), atol=TOLERANCE * np.ptp(y))
     assert other.n_rules_ == plain.n_rules_
     # What the penalty hardly costs is found less exactly than what is predicted.

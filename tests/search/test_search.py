@@ -74,7 +74,7 @@ def test_expected_error_is_that_on_new_rows(rng):
 def test_more_noise_never_gives_more_rules(rng, partition):
     X = inputs(rng, 100, 2)
     truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(100)
-    model = ANFISRegressor(partition=partition)
+    model = ANFISRegressor(partition=partition, max_rules=6)
     assert model.fit(X, truth + 0.02 * noise).n_rules_ > model.fit(X, truth + 30 * noise).n_rules_
 
 
@@ -161,7 +161,8 @@ def runs(n_runs=6, n_rows=90, seed=0):
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
     X, y, run = runs()
-    alone, grouped = (ANFISRegressor().fit(X, y, groups=groups) for groups in (None, run))
+    model = ANFISRegressor(max_rules=8)
+    alone, grouped = (clone(model).fit(X, y, groups=groups) for groups in (None, run))
     on_temperature = [
         [term["input"] for term in model.memberships_].count("x0") for model in (alone, grouped)
     ]
@@ -175,7 +176,7 @@ def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
 
 def test_groups_may_have_names_and_a_single_one_says_nothing():
     X, y, run = runs(4, 20)
-    grid = ANFISRegressor(partition="grid")
+    grid = ANFISRegressor(partition="grid", max_rules=4)
     names = list(np.array(["a", "b", "c", "d"])[run])
     by_number, by_name, one, none = (
         clone(grid).fit(X, y, groups=groups) for groups in (run, names, 0 * run, None)
@@ -216,7 +217,7 @@ def test_between_runs_rules_by_time_and_temperature_are_not_wild(rng, starts, n_
 def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     # Half-way between two rows the product is not that of the factors: no new row lies there.
     rng = np.random.default_rng(1)
-    X, fresh = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (2, 400, 3))
+    X, fresh = rng.uniform([0.0, -20.0, -100.0], [3600.0, 60.0, 100.0], (2, 800, 3))
     noise = 1e-3
 
     def truth(X):
@@ -228,7 +229,8 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
     low, high = X.min(axis=0), X.max(axis=0)
     fresh = fresh[((low <= fresh) & (fresh <= high)).all(axis=1)]
-    model = ANFISRegressor(simplicity=0).fit(X, truth(X) + noise * rng.standard_normal(400))
+    model = ANFISRegressor(simplicity=0, max_rules=8)
+    model.fit(X, truth(X) + noise * rng.standard_normal(800))
     errors = model.predict(fresh) - truth(fresh)
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
 
@@ -289,7 +291,7 @@ def test_candidates_are_listed_from_the_best(rng):
 
 def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
     X, y = bumps(rng)
-    model = ANFISRegressor(max_rules=6)
+    model = ANFISRegressor(max_rules=4)
     fitted = {s: clone(model).set_params(simplicity=s).fit(X, y) for s in (0.0, 0.05, 0.5)}
     told = {s: chosen(model) for s, model in fitted.items()}
     costs = [one["reading_cost"] for one in told.values()]
