@@ -319,7 +319,6 @@ def test_rows_that_are_all_the_same_give_the_mean(settings, order):
     assert_allclose(model.predict(X[:1]), Y.mean(), rtol=1e-12)
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize("settings", [{}, {"n_mfs": 2}, {"partition": KMEANS}])
 def test_constant_target_is_predicted_everywhere(settings):
     model = ANFISRegressor(**settings).fit(X, np.full(N_ROWS, 7.1))

@@ -7,7 +7,6 @@ steps, or it would end elsewhere. TOLERANCE asks for 5e-6, which no step left ou
 cluster and no statistic with n - 1 for n would pass; where a test asks for less, it says why.
 """
 
-import warnings
 from functools import lru_cache
 
 import numpy as np
@@ -15,12 +14,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.base import clone
 from sklearn.cluster import KMeans
-from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_mackey_glass
-from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.learning import SOLVERS, VariableProjection
 from skanfis.membership import MEMBERSHIPS
 from skanfis.search import representative_rows
@@ -80,10 +77,7 @@ class Case:
         self.X, self.y = DATA[data]()
         self.settings = settings
         self.span = np.ptp(self.y)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            warnings.simplefilter("ignore", UnderdeterminedWarning)
-            self.plain = self.fit(self.X, self.y)
+        self.plain = self.fit(self.X, self.y)
         self.predictions = self.plain.predict(self.X)
 
     def fit(self, X, y, sample_weight=None, **settings):

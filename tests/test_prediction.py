@@ -75,7 +75,6 @@ def accounts(rng, noise, n_rows=200):
     return X, X @ [1.0, 2.0, 0.5, 1.5] + noise * rng.normal(size=n_rows)
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_line_is_followed_far_where_it_leaves_little(rng):
     """Accounts that add up do so beyond the largest that was seen as well."""
     X, y = accounts(rng, noise=0.0)
@@ -88,7 +87,6 @@ def test_line_is_followed_far_where_it_leaves_little(rng):
     assert model.predict(farther[None]) <= y.max() + FARTHEST * y.std()
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize("noise", [0.1, 0.3])
 def test_line_is_followed_for_as_many_deviations_as_the_target_has_of_the_noise(rng, noise):
     X, y = accounts(rng, noise)
@@ -131,7 +129,6 @@ def test_pipeline_warns_of_rows_out_of_bounds(front):
     assert np.isfinite(found).all()
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_policy_may_be_changed_after_training(trained):
     model = pickle.loads(pickle.dumps(trained))
     for policy in ("linear", "nan", "clip"):

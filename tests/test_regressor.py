@@ -84,7 +84,6 @@ def test_planted_model_is_found():
 
 
 @pytest.mark.theory
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
     ("settings", "most"),
     [
@@ -311,15 +310,6 @@ def test_data_frame_gives_names_to_the_terms(library):
 
 
 @LIBRARIES
-def test_columns_in_another_order_are_refused(library):
-    model = quick().fit(frame_of(library, X, NAMES), Y)
-    turned = frame_of(library, X[:, ::-1], NAMES[::-1])
-    for method in (model.predict, model.coverage, model.strengths, model.in_bounds):
-        with pytest.raises(ValueError, match="same order"):
-            method(turned)
-
-
-@LIBRARIES
 def test_names_pass_through_a_scaler(library):
     frame = frame_of(library, X, NAMES)
     pipeline = make_pipeline(StandardScaler(), quick()).set_output(transform=library)
@@ -362,7 +352,6 @@ def test_representations_show_what_was_changed_and_the_rules():
         assert list(fitted._repr_mimebundle_()) == ["text/plain"]
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_weights_are_routed_through_pipeline_and_search():
     weight = np.random.default_rng(0).uniform(size=len(X)) ** 4
     noisy = Y + 0.01 * np.random.default_rng(1).normal(size=len(X))

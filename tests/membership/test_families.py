@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis.antecedent import GridAntecedent
 from skanfis.membership import FAMILIES as EVERY_FAMILY
 from skanfis.membership import (
     MEMBERSHIPS,
@@ -13,6 +14,7 @@ from skanfis.membership import (
     SigmoidProduct,
     membership_families,
 )
+from skanfis.membership.flanked import PiShaped, Trapezoidal, Triangular
 
 from ..oracles import by_formula, central_difference, complex_step, corners, textbook_membership
 
@@ -257,3 +259,20 @@ def test_families_are_given_by_name_or_class_for_all_inputs_or_for_each():
     assert membership_families("bell", names) == [Bell, Bell]
     assert membership_families(Bell, names) == [Bell, Bell]
     assert membership_families(("bell", Gaussian), names) == [Bell, Gaussian]
+
+
+@pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped])
+def test_where_no_term_reaches_the_nearest_speaks(family):
+    # Terms at 0, 10 and 30 that reach no further than 1.
+    theta = family.start(np.array([0.0, 10.0, 30.0]), np.ones(3), 0.6)
+    x = np.array([-1e9, -50.0, 4.0, 6.0, 18.0, 22.0, 80.0, 1e9])
+    assert not family.value(x[None], theta).any()
+    antecedent = GridAntecedent.build([family], [0], [theta])
+    with np.errstate(all="raise", under="ignore"):
+        strengths = antecedent.strengths(x[None])
+    assert_allclose(strengths.sum(axis=0), 1.0, rtol=1e-14)
+    assert_array_equal(strengths.argmax(axis=0), [0, 0, 0, 1, 1, 2, 2, 2])
+    # Half-way the two neighbours share, and strengths pass from one to the other smoothly.
+    between = antecedent.strengths(np.linspace(4.0, 6.0, 401)[None])
+    assert_allclose(between[:2, 200], 0.5, rtol=1e-10)
+    assert (np.abs(np.diff(between, axis=1)) < 0.05).all()

@@ -59,7 +59,6 @@ def known(request, data):
 
 
 class TestImported:
-    @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
     def test_without_iterations_nothing_is_learnt(self, data, known):
         X, y = surface(50, seed=1)
         for given in (known, known.model_):
@@ -148,7 +147,6 @@ class TestImported:
 
 
 @pytest.mark.theory
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
     "partition", ["scattered", SubtractiveClustering(0.8), FuzzyCMeans(3, random_state=0)]
 )
@@ -347,7 +345,6 @@ def test_draws_of_a_clusterer_without_a_seed_have_that_of_the_fit(data, clustere
     assert np.array_equal(one, other) is is_seeded
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_parameters_of_a_clusterer_can_be_searched(data):
     model = quick(partition=KMeans(random_state=0))
     search = GridSearchCV(model, {"partition__n_clusters": [1, 4]}, cv=3).fit(*data)

@@ -28,7 +28,6 @@ def chosen(model):
     return told
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_linear_truth_gets_next_to_a_linear_model(rng):
     # A criterion by error lets a rule more pass where it does no harm; the plane stays a plane.
     X = inputs(rng)
@@ -56,7 +55,6 @@ def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
     assert ANFISRegressor(order=0).fit(X, y).n_rules_ > linear
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_expected_error_is_that_on_new_rows(rng):
     def surface(n):
         X = inputs(rng, n)
@@ -158,7 +156,6 @@ def runs(n_runs=6, n_rows=90, seed=0):
     return np.column_stack([temperature, rate]), y, run
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
     X, y, run = runs()
     model = ANFISRegressor(max_rules=8)

@@ -57,7 +57,6 @@ def test_distance_is_that_of_the_definition(case):
     assert model.model_.rows_extrapolation == by_definition(model, X, Y)
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_what_bends_at_first_and_then_goes_on_is_followed(rng):
     def truth(X):
         return np.tanh(2.0 * X[:, 0]) + X[:, 1]

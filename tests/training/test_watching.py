@@ -116,7 +116,6 @@ class TestCallbacks:
             model.fit(np.full((5, 1), np.nan), np.arange(5.0))
         assert seen.torn_down
 
-    @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
     def test_those_of_scikit_learn_work_through_searches(self, capsys):
         from sklearn.callback import ProgressBar, ScoringMonitor
 
