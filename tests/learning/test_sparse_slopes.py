@@ -53,11 +53,9 @@ def test_what_it_takes_from_the_evidence_is_that_of_the_marginal_likelihood(rng,
     noise = posterior.noise_variance
     prior = evaluation.normal.penalty + 1e-3 * np.outer(line.height, line.height)
     # Phi in local coordinates.
-    rows = StandardisedData.of(X, y)
-    Z = np.concatenate([rows.read(part)[0] for chunk in rows.chunks(40) for part in chunk], axis=1)
+    Z, target, _ = StandardisedData.of(X, y).read(slice(None))
     design = (TREE.strengths(Z)[:, None] * np.vstack([np.ones(n), Z])).reshape(12, n)
     design = problem.local.transform_rows(design).T
-    target = np.concatenate([rows.read(p)[1] for c in rows.chunks(40) for p in c], axis=1)
 
     def minus_twice_log(of_prior):
         covariance = noise * np.eye(n) + design @ of_prior @ design.T
