@@ -232,7 +232,7 @@ def test_outputs_share_the_premises_and_have_their_own_consequents():
 )
 def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)
-    monkeypatch.setattr(blocks, "FEWEST_ROWS", 16)
+    monkeypatch.setattr(blocks, "FEWEST_ROWS", 8)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
     with_few_candidates(monkeypatch)
     threads, read = set(), StandardisedData.read
@@ -242,7 +242,7 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
         return read(self, part)
 
     monkeypatch.setattr(StandardisedData, "read", read_and_remember)
-    # Four blocks in two chunks.
+    # Eight blocks in three chunks.
     data, target = X[:64], Y[:64]
     weight = np.random.default_rng(0).uniform(0.5, 2.0, len(data))
     models = {}
