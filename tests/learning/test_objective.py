@@ -122,7 +122,6 @@ def test_evaluation_is_that_of_the_dense_ridge_regression(case):
     assert_allclose(found.masses, firing @ dense.weight, rtol=1e-11, atol=1e-15)
 
 
-@pytest.mark.theory
 def test_gradient_is_exact_far_from_the_optimum_and_gauss_newton_the_schur_complement(case):
     _, linearisation = case.at_point()
     expected = case.dense.gradient(case.point)
@@ -133,7 +132,6 @@ def test_gradient_is_exact_far_from_the_optimum_and_gauss_newton_the_schur_compl
     assert_all_close(linearisation.gauss_newton, linearisation.gauss_newton.T, 1e-14)
 
 
-@pytest.mark.theory
 def test_joint_gradient_is_that_at_any_consequents(case):
     """By premises; by consequents: test_departures."""
     dense, shape = case.dense, (case.problem.n_columns, case.problem.n_outputs)

@@ -22,9 +22,8 @@ from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.penalty import Penalty
-from skanfis.membership import Gaussian
-from skanfis.search import StructureRequest
 from skanfis.search.start import Start
+from skanfis.training.settings import structure_request
 
 from ..quick import quick, with_few_candidates
 
@@ -74,13 +73,9 @@ class TestImported:
     def test_with_least_squares_the_consequents_alone_are_learnt(self, data, known):
         X, y = data
         model = ANFISRegressor(partition=known, solver="lse").fit(X, 3.0 * y - 1.0)
-        for one, other in zip(model.memberships_, known.memberships_, strict=True):
-            assert one["name"] == other["name"]
-            assert_allclose(
-                [v for v in one.values() if isinstance(v, float)],
-                [v for v in other.values() if isinstance(v, float)],
-                rtol=1e-9,
-            )
+        assert model.model_.term_names == known.model_.term_names
+        found, expected = (one.model_.antecedent.parameters for one in (model, known))
+        assert_allclose(found, expected, rtol=1e-9)
         again = ANFISRegressor(partition=known, solver="lse").fit(X, y)
         assert_allclose(model.predict(X), 3.0 * again.predict(X) - 1.0, atol=1e-8)
 
@@ -351,25 +346,6 @@ def test_parameters_of_a_clusterer_can_be_searched(data):
     assert search.best_estimator_.n_rules_ == search.best_params_["partition__n_clusters"] == 4
 
 
-def request_for(counts, weights):
-    inputs, families = np.arange(len(counts)), [Gaussian] * len(counts)
-    names = [f"x{j}" for j in inputs]
-    return StructureRequest(
-        n_mfs=counts,
-        partition="grid",
-        families=families,
-        order=1,
-        premise_inputs=inputs,
-        consequent_inputs=inputs,
-        weights=weights,
-        premises_move=True,
-        seed=0,
-        names=names,
-        simplicity=0.05,
-        max_rules=None,
-    )
-
-
 @pytest.mark.parametrize("agreement_is_raised", [False, True])
 def test_weights_found_on_a_sample_are_for_all_rows(data, agreement_is_raised, rng):
     X, y = data[0].to_numpy(), data[1].to_numpy()[:, None]
@@ -378,9 +354,10 @@ def test_weights_found_on_a_sample_are_for_all_rows(data, agreement_is_raised, r
     sample = replace(rows, X=X[:60], y=y[:60], sample_weight=weight[:60])
     found = Penalty(agreement=0.01, alpha=0.02, slope=0.03, stiffness=0.04)
     start = Start(None, found, np.arange(2), agreement_is_raised=agreement_is_raised)
-    asked = request_for([2, 1, 1], {"alpha": 0.02}).for_all(start, sample, rows).penalty
+    estimator = ANFISRegressor([2, 1, 1], solver=VariableProjection(stiffness=0.04))
+    asked = structure_request(estimator, list(data[0])).for_all(start, sample, rows).penalty
     # Relative to a mean over rows they fall with their number; one that is given stays as it is.
     ratio = weight[:60].sum() / weight.sum()
-    assert asked.alpha == 0.02
+    assert asked.stiffness == 0.04
     assert_allclose(asked.agreement, 0.01 * (1.0 if agreement_is_raised else ratio), rtol=5e-3)
-    assert_allclose([asked.slope, asked.stiffness], np.multiply([0.03, 0.04], ratio), rtol=5e-3)
+    assert_allclose([asked.alpha, asked.slope], np.multiply([0.02, 0.03], ratio), rtol=5e-3)

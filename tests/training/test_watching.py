@@ -134,20 +134,15 @@ class TestCallbacks:
         assert np.isfinite(search.best_score_)
 
 
-def interrupt_after(monkeypatch, n_iter):
-    """Ctrl-C at the end of an iteration, as a terminal would send it."""
+def test_an_estimator_that_is_interrupted_is_as_before(monkeypatch):
+    """By Ctrl-C at the end of an iteration, as a terminal would send it."""
 
     def interrupt(self, iteration, evaluation):
-        if iteration == n_iter:
-            raise KeyboardInterrupt
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr(watching.Printer, "__call__", interrupt)
-
-
-def test_an_estimator_that_is_interrupted_is_as_before(monkeypatch):
     model = quick(verbose=True).fit(X, Y)
     before = model.predict(X)
-    interrupt_after(monkeypatch, 1)
+    monkeypatch.setattr(watching.Printer, "__call__", interrupt)
     with pytest.raises(KeyboardInterrupt):
         model.set_params(n_mfs=3).fit(X, Y)
     assert_array_equal(model.predict(X), before)
@@ -172,10 +167,9 @@ def test_callbacks_are_given_the_data_as_they_were_given(settings):
     assert all(seen.tasks)
 
 
-SETTINGS = {"early_stopping": True}
 # Weights that let rules learn the noise.
 FREE = {"agreement": 0.0, "alpha": 1e-6, "solver": VariableProjection(stiffness=0.0)}
-LOOSE = FREE | SETTINGS
+LOOSE = FREE | {"early_stopping": True}
 
 
 def overfitting(n_rows=150, seed=0):
