@@ -111,6 +111,21 @@ def textbook_membership(function, x, numbers):
     raise NotImplementedError(function)
 
 
+def textbook_strengths(terms, rules, input_names, X):
+    """Products of memberships over their sum, (n_rules, n_rows), from what a person is told."""
+    names = list(input_names)
+    mu = [textbook_membership(t["function"], X[:, names.index(t["input"])], t) for t in terms]
+    mu = np.array(mu).reshape(-1, len(X))
+    products = np.array([np.prod(mu[[t for t in rule if t >= 0]], axis=0) for rule in rules])
+    return products / products.sum(axis=0)
+
+
+def textbook_predict(strengths, consequents, X):
+    """sum_r w_r (p_r0 + p_r1 x_1 + ... + p_rd x_d), with p of (n_rules, 1 + d, n_outputs)."""
+    basis = np.column_stack([np.ones(len(X)), X])
+    return np.einsum("rn,ni,rio->no", strengths, basis, consequents)
+
+
 def by_formula(formula, x, numbers):
     """What a printed formula says: "f where t = g", "f where s(u) = g", or "f"."""
     formula, _, where = formula.replace("^", "**").partition(" where ")

@@ -6,33 +6,18 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.consequent import LocalBasis, NormalFactor
 
-N_RULES, N_INPUTS, N_ROWS = 4, 3, 200
 
-
-@pytest.fixture(name="Z")
-def standardised_inputs(rng):
-    return rng.normal(size=(N_INPUTS, N_ROWS)) + np.array([[0.0], [2.0], [-1.0]])
-
-
-@pytest.fixture
-def strengths(rng):
-    return rng.dirichlet(np.full(N_RULES, 0.5), N_ROWS).T
-
-
-@pytest.fixture
-def weight(rng):
-    weight = rng.uniform(0.1, 2.0, N_ROWS)
-    return weight / weight.sum()
-
-
-def gram_of(strengths, Z, weight, order):
-    phi = np.array([w * b for w in strengths for b in ([1, *Z] if order else [1.0])])
+def gram_of(strengths, Z, weight):
+    phi = np.array([w * b for w in strengths for b in [1, *Z]])
     return (phi * weight) @ phi.T
 
 
-def test_rule_that_fires_on_one_spot_has_a_spread(Z, weight, strengths):
+def test_rule_that_fires_on_one_spot_has_a_spread(rng):
+    Z = rng.normal(size=(3, 200)) + np.array([[0.0], [2.0], [-1.0]])
+    strengths, weight = rng.dirichlet(np.full(4, 0.5), 200).T, rng.uniform(0.1, 2.0, 200)
     strengths[:, 0], strengths[0, 1:] = [1.0, 0.0, 0.0, 0.0], 0.0
-    local = LocalBasis.from_gram(gram_of(strengths / strengths.sum(axis=0), Z, weight, 1), N_RULES)
+    gram = gram_of(strengths / strengths.sum(axis=0), Z, weight / weight.sum())
+    local = LocalBasis.from_gram(gram, 4)
     assert_allclose(local.center[0], Z[:, 0], rtol=1e-12)
     assert_array_equal(local.spread[0], 0.05)
 
@@ -41,7 +26,7 @@ def test_local_basis_spares_the_gram_matrix_its_condition(rng):
     # Two narrow rules far apart: w_r and w_r z are parallel, (z - a) / h and one are not.
     Z = np.concatenate([rng.normal(-100.0, 1.0, 500), rng.normal(100.0, 1.0, 500)])[None]
     strengths = np.array([Z[0] < 0, Z[0] >= 0], dtype=float)
-    gram = gram_of(strengths, Z, np.full(1000, 1e-3), 1)
+    gram = gram_of(strengths, Z, np.full(1000, 1e-3))
     assert np.linalg.cond(gram) > 1e7
     assert np.linalg.cond(LocalBasis.from_gram(gram, 2).transform_gram(gram)) < 1.5
 

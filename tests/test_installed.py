@@ -17,13 +17,13 @@ from skanfis import ANFISRegressor, export, inspection
 from skanfis.datasets import make_ofog
 from skanfis.intervals import ConformalRegressor
 
+X = np.random.default_rng(0).uniform(-1.0, 1.0, (100, 2))
+Y = np.sin(3.0 * X[:, 0]) + X[:, 1]
+
 
 @pytest.fixture(scope="module")
 def model():
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (100, 2))
-    y = np.sin(3.0 * X[:, 0]) + X[:, 1]
-    return ANFISRegressor(n_mfs=[3, 1], agreement=0.01).fit(X, y)
+    return ANFISRegressor(n_mfs=[3, 1], agreement=0.01).fit(X, Y)
 
 
 def test_every_module_can_be_imported():
@@ -57,18 +57,12 @@ def test_every_text_that_a_model_is_written_to(model, tmp_path):
     export.export_json(model, tmp_path / "m.json")
     export.export_fis(model, tmp_path / "m.fis")
     read = export.read_json(tmp_path / "m.json")
-    X = np.array([[0.1, 0.2]])
     np.testing.assert_array_equal(read.predict(X)[:, 0], model.predict(X))
     assert "m_predict" in export.export_c(model, tmp_path / "m").header
     rules = export.read_fis(tmp_path / "m.fis")
     np.testing.assert_allclose(rules.predict(X)[:, 0], model.predict(X), rtol=1e-6)
-    sure = ConformalRegressor(model, method="split").fit(*_rows())
+    sure = ConformalRegressor(model, method="split").fit(X, Y)
     assert (np.diff(np.stack(sure.predict_interval(X, 0.9)), axis=0) > 0.0).all()
-
-
-def _rows():
-    X = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 2))
-    return X, np.sin(3.0 * X[:, 0])
 
 
 def test_pictures(model):

@@ -7,19 +7,17 @@ steps, or it would end elsewhere. TOLERANCE asks for 5e-6, which no step left ou
 cluster and no statistic with n - 1 for n would pass; where a test asks for less, it says why.
 """
 
-import warnings
 from functools import lru_cache
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.base import clone
 from sklearn.cluster import KMeans
-from sklearn.exceptions import ConvergenceWarning
 from threadpoolctl import threadpool_limits
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_mackey_glass
-from skanfis.exceptions import UnderdeterminedWarning
 from skanfis.learning import SOLVERS, VariableProjection
 from skanfis.membership import MEMBERSHIPS
 from skanfis.search import representative_rows
@@ -79,10 +77,7 @@ class Case:
         self.X, self.y = DATA[data]()
         self.settings = settings
         self.span = np.ptp(self.y)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)
-            warnings.simplefilter("ignore", UnderdeterminedWarning)
-            self.plain = self.fit(self.X, self.y)
+        self.plain = self.fit(self.X, self.y)
         self.predictions = self.plain.predict(self.X)
 
     def fit(self, X, y, sample_weight=None, **settings):
@@ -185,16 +180,19 @@ def test_row_without_weight_is_absent(case):
     assert_array_equal(model.predict(case.X), without.predict(case.X))
 
 
-def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
-    # As beyond 20,000 rows, with a clustering on 40 of 120.
-    monkeypatch.setattr(representative_rows, "__defaults__", (40,))
+def assert_weights_are_repeats_in_any_units(model):
     X, y = gyro()
     weight = np.random.default_rng(2).integers(1, 5, len(y))
-    model = ANFISRegressor(partition=KMEANS)
     weighted = model.fit(X, y, weight).predict(X)
     *units, unit = alternating(3, 6)
     found = model.fit(*repeated(X * units, y * unit, weight)).predict(X * units) / unit
     assert_allclose(found, weighted, rtol=0, atol=TOLERANCE * np.ptp(y))
+
+
+def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
+    # As beyond 20,000 rows, with a clustering on 40 of 120.
+    monkeypatch.setattr(representative_rows, "__defaults__", (40,))
+    assert_weights_are_repeats_in_any_units(ANFISRegressor(partition=KMEANS))
 
 
 @pytest.mark.parametrize("name", ["gyro", "sinc"])
@@ -202,10 +200,11 @@ def test_structure_that_is_chosen_by_itself(name):
     # Units, offsets, repeated rows and their order, all at once: the same choice, the same fit.
     X, y = DATA[name]()
     weight = np.random.default_rng(2).integers(1, 4, len(y))
-    plain = ANFISRegressor().fit(X, y, weight)
+    model = ANFISRegressor(max_rules=4)
+    plain = clone(model).fit(X, y, weight)
     *units, unit = alternating(X.shape[1], 6)
     far = (X + 1e4 * np.ptp(X, axis=0)) * units
-    other = ANFISRegressor().fit(*repeated(far, unit * y, weight))
+    other = clone(model).fit(*repeated(far, unit * y, weight))
     assert_allclose(other.predict(far) / unit, plain.predict(X), atol=TOLERANCE * np.ptp(y))
     assert other.n_rules_ == plain.n_rules_
     # What the penalty hardly costs is found less exactly than what is predicted.
@@ -226,12 +225,7 @@ def test_structure_that_is_chosen_by_itself(name):
     ids=str,
 )
 def test_every_family_and_solver(settings):
-    X, y = gyro()
-    weight = np.random.default_rng(2).integers(1, 5, len(y))
     # Of weights that are found the cases above speak.
     solver = of_given_stiffness(settings.get("solver", "varpro"))
     model = ANFISRegressor(max_iter=8, **GIVEN | settings | {"solver": solver})
-    plain = model.fit(X, y, weight).predict(X)
-    *units, unit = alternating(3, 6)
-    found = model.fit(*repeated(X * units, y * unit, weight)).predict(X * units) / unit
-    assert_allclose(found, plain, rtol=0, atol=TOLERANCE * np.ptp(y))
+    assert_weights_are_repeats_in_any_units(model)

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import partial
-from itertools import product
 
 import numpy as np
 import pytest
@@ -18,23 +17,10 @@ from .export import rule_bases
 
 
 def naive(frozen, X):
-    """p0 + p1 x1 + ... of every rule, averaged with products of memberships; one row at a time."""
-    terms = frozen.memberships()
-    on_input = {name: [t for t in terms if t["input"] == name] for name in frozen.input_names}
-    if isinstance(frozen.antecedent, GridAntecedent):
-        rules = list(product(*[found for found in on_input.values() if found]))
-    else:
-        rules = [[terms[t] for t in rule if t >= 0] for rule in frozen.antecedent.rule_terms]
-    outputs = []
-    for row in X:
-        at = dict(zip(frozen.input_names, row, strict=True))
-        firing = [
-            np.prod([oracles.textbook_membership(t["function"], at[t["input"]], t) for t in rule])
-            for rule in rules
-        ]
-        values = [p[0] + row @ p[1:] for p in frozen.consequents]
-        outputs.append(np.dot(firing, values) / np.sum(firing))
-    return np.array(outputs)
+    """p0 + p1 x1 + ... of every rule, averaged with products of memberships."""
+    rules = oracles.rules_by_hand(frozen.antecedent)
+    strengths = oracles.textbook_strengths(frozen.memberships(), rules, frozen.input_names, X)
+    return oracles.textbook_predict(strengths, frozen.consequents, X)
 
 
 # In units in which every input is of order one.

@@ -1,4 +1,4 @@
-"""The code on the pages runs, and prints what they say that it prints."""
+"""The code on the pages and in README runs, and prints what they say that it prints."""
 
 import doctest
 import re
@@ -11,7 +11,8 @@ from skanfis.export.fis.functions import function_of
 from skanfis.inspection.readability import GREATEST_ALONE, GREATEST_ERROR
 from skanfis.membership import FAMILIES, MEMBERSHIPS
 
-DOCS = Path(__file__).parents[1] / "docs"
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 PAGES = ("quickstart", "from_matlab")
 # How many lines of code there are at least: a page that lost them is no page that works.
 WITH_PROMPTS = {
@@ -26,6 +27,8 @@ WITH_PROMPTS = {
 }
 if not (DOCS / f"{PAGES[0]}.rst").is_file():
     pytest.skip("the documentation is not here", allow_module_level=True)
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+OF_README = re.findall(r"^```python\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
 
 pytestmark = pytest.mark.page
 
@@ -33,8 +36,6 @@ BLOCK = re.compile(r"^\.\. code-block:: (python|text)\n\n((?:   .*\n|\n)+)", re.
 LOOSELY = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
 
 
-# The warnings that the pages speak of.
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize("page", PAGES)
 def test_page_as_pasted(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -92,3 +93,34 @@ def test_every_family_is_on_the_page():
     for family in MEMBERSHIPS.values():
         assert f'``"{family.name}"``' in page
         assert all(parameter.name in page for parameter in family.parameters)
+
+
+def run(block, capsys):
+    """In a namespace with nothing in it."""
+    exec(compile(block, "README.md", "exec"), namespace := {"__name__": "__main__"})
+    return namespace, capsys.readouterr().out
+
+
+def test_ordinary_data_of_readme_as_pasted(capsys):
+    namespace, out = run(OF_README[0], capsys)
+    assert float(re.search(r"R² on new rows: (\S+)", out)[1]) > 0.3
+    announced = re.search(r"# (\d+) rules, on (\w+) and (\w+)", OF_README[0])
+    assert int(announced[1]) == namespace["model"].n_rules_
+    assert f"IF {announced[2]} is low AND {announced[3]} is high\n" in out
+
+
+def test_gyro_of_readme_as_pasted(capsys):
+    namespace, out = run(OF_README[1], capsys)
+    assert "rate" not in namespace["X"]
+    numbers = r"(\d+) °/h RMS before, (\d+) after\n"
+    measured, told = re.fullmatch(numbers, out), re.search(f"# {numbers}", OF_README[1])
+    assert [*map(float, measured.groups())] == pytest.approx([*map(float, told.groups())], rel=0.1)
+    # There is no other block.
+    assert len(OF_README) == 2
+
+
+def test_every_file_that_readme_links_to_is_there():
+    links = re.findall(r"\]\(([^)#]+)", README)
+    assert links
+    missing = [link for link in links if "://" not in link and not (ROOT / link).is_file()]
+    assert not missing

@@ -16,6 +16,7 @@ from sklearn.preprocessing import RobustScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent
 from skanfis.bounds import FixedPoint
+from skanfis.consequent import in_user_units
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
 from skanfis.learning import GradientDescent, Hybrid, LeastSquares, VariableProjection
@@ -38,7 +39,7 @@ def quick(tol=1e-3):
     return {"agreement": 0.01, "alpha": 1e-3, "solver": solver}
 
 
-def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt, n_known=0):
+def dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=0):
     """Noise and standard deviation of new rows of standardised inputs, of one output.
 
     The first ``n_known`` of them are known for certain: observed a great many times.
@@ -47,16 +48,16 @@ def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt,
     inverted whole; the noise is what the residual leaves after the trace of the smoother.
     """
     antecedent, order, inputs = problem.antecedent, problem.order, problem.consequent_inputs
-    dense = oracles.DenseProblem(rows, antecedent, order, penalty, inputs)
+    dense = oracles.DenseProblem(problem.rows, antecedent, order, PENALTY, inputs)
     theta, beta = evaluation.antecedent.parameters, evaluation.coefficients[:, 0]
-    n, p = rows.n_rows, beta.size
+    n, p = problem.rows.n_rows, beta.size
     by_beta = dense.residual_matrix(theta)
     by_theta = oracles.complex_step(lambda t: dense.residual_matrix(t) @ beta, theta)
     x = premise.displacement(theta)
     to_theta = oracles.central_difference(premise.parameters, x)
     jacobian = np.hstack([by_beta, by_theta @ to_theta])
     precision = jacobian.T @ jacobian
-    precision[p:, p:] += penalty.stiffness * np.eye(x.size)
+    precision[p:, p:] += PENALTY.stiffness * np.eye(x.size)
     new_design = oracles.dense_design(antecedent, theta, new, order, inputs)
     by_premises = oracles.complex_step(
         lambda t: oracles.dense_design(antecedent, t, new, order, inputs) @ beta, theta
@@ -70,7 +71,7 @@ def dense_deviation(problem, premise, rows, penalty, evaluation, new, is_learnt,
     data = by_beta[:n].T @ by_beta[:n]
     k = np.trace(np.linalg.solve(by_beta.T @ by_beta, data))
     if is_learnt:
-        k += x.size - penalty.stiffness * np.trace(covariance[p:, p:])
+        k += x.size - PENALTY.stiffness * np.trace(covariance[p:, p:])
     squares = dense.weight @ (dense.y[:, 0] - dense.design(theta) @ beta) ** 2
     noise = np.sqrt(squares * n / (n - k))
     if n_known:
@@ -101,21 +102,12 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch):
     evaluation = problem.evaluate(premise.parameters(moved))
     posterior = posterior_of(problem, premise if is_learnt else None, evaluation, rows.n_rows)
     new = rng.uniform(-1, 1, size=(2, 80))
-    noise, expected = dense_deviation(problem, premise, rows, PENALTY, evaluation, new, is_learnt)
-    n_rules, scale = antecedent.n_rules, rows.inputs.scale
-    solved = evaluation.coefficients.reshape(n_rules, -1, 1) * rows.targets.scale
-    coefficients = np.zeros((n_rules, 1 + 2 * order, 1))
-    coefficients[:, 0] = solved[:, 0] + rows.targets.offset
-    used = problem.consequent_inputs
-    coefficients[:, 1 + used] = solved[:, 1:] / scale[used, None]
-    model = oracle_model(rows, evaluation.antecedent, coefficients, posterior)
-    model = replace(model, minimum=np.full(2, -1e3), maximum=np.full(2, 1e3))
-    X = (rows.inputs.offset[:, None] + scale[:, None] * new).T
+    noise, expected = dense_deviation(problem, premise, evaluation, new, is_learnt)
+    model = model_of(problem, evaluation, posterior)
+    X = rows.inputs.offset + rows.inputs.scale * new.T
     found = model.standard_deviation(X)[:, 0]
     sure = replace(model, posterior=posterior.given(model, X[:3]))
-    _, of_known = dense_deviation(
-        problem, premise, rows, PENALTY, evaluation, new, is_learnt, n_known=3
-    )
+    _, of_known = dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=3)
     left = sure.standard_deviation(X)[:, 0]
     assert_allclose(left[:3], posterior.noise[0], rtol=2e-5)
     assert_allclose(left, of_known * rows.targets.scale[0], rtol=2e-5)
@@ -123,18 +115,18 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch):
     assert_allclose(found, expected * rows.targets.scale[0], rtol=1e-8)
 
 
-def oracle_model(rows, antecedent, coefficients, posterior):
+def model_of(problem, evaluation, posterior):
     """A model in raw units, its box wide."""
-    fitted = ANFISRegressor(n_mfs=1, max_iter=0).fit(rows.X, rows.y).model_
-    raw = antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
+    rows, used, order = problem.rows, problem.consequent_inputs, problem.order
+    raw = evaluation.antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
     return replace(
-        fitted,
+        ANFISRegressor(n_mfs=1, max_iter=0).fit(rows.X, rows.y).model_,
         antecedent=raw,
         initial_antecedent=raw,
-        coefficients=coefficients,
+        coefficients=in_user_units(evaluation.coefficients, rows.inputs, rows.targets, used, order),
         term_names=("",) * raw.n_terms,
-        minimum=np.full(2, -np.inf),
-        maximum=np.full(2, np.inf),
+        minimum=np.full(2, -1e3),
+        maximum=np.full(2, 1e3),
         posterior=posterior,
     )
 

@@ -1,4 +1,4 @@
-"""Every public name has a full docstring with an example, and a place in the documentation."""
+"""Every public name has a full docstring with an example, types, and a place in the docs."""
 
 import inspect
 import re
@@ -70,7 +70,7 @@ def listed_on_api_page():
 
 
 @pytest.mark.parametrize("name", public_names())
-def test_docstring_is_complete(name):
+def test_docstring_is_complete_and_methods_tell_the_parameters_that_they_have(name):
     public = resolve(name)
     found = sections(public.__doc__)
     assert re.match(r"\S.*\.$", found["Summary"].split("\n\n")[0], flags=re.DOTALL)
@@ -79,11 +79,7 @@ def test_docstring_is_complete(name):
     if not inspect.isclass(public) and inspect.signature(public).return_annotation is not None:
         assert "Returns" in found
     assert ">>> " in found["Examples"]
-
-
-@pytest.mark.parametrize("name", public_names())
-def test_methods_tell_the_parameters_that_they_have(name):
-    for method, function in inspect.getmembers(resolve(name), inspect.isfunction):
+    for method, function in inspect.getmembers(public, inspect.isfunction):
         found = sections(function.__doc__)
         if function.__module__.startswith("skanfis") and "Parameters" in found:
             own = list(inspect.signature(function).parameters)[1:]
@@ -98,3 +94,46 @@ def test_what_the_api_page_lists_exists():
     named = [name.rpartition(".") for name in listed_on_api_page()]
     assert named
     assert [(module, name) for module, _, name in named if name not in exports(module)] == []
+
+
+# ``py.typed`` promises types: public signatures carry them.
+PUBLIC = [resolve(name) for name in public_names()]
+
+
+def own_functions(named):
+    """The constructor, public methods and properties that the package defines for a class."""
+    for owner in named.__mro__:
+        if not owner.__module__.startswith("skanfis."):
+            continue
+        for name, found in vars(owner).items():
+            function = found.fget if isinstance(found, property) else found
+            function = getattr(function, "__func__", function)
+            if inspect.isfunction(function) and (name == "__init__" or not name.startswith("_")):
+                yield function
+
+
+def functions_of(named):
+    return list(own_functions(named)) if inspect.isclass(named) else [named]
+
+
+def test_what_is_public_says_what_it_returns():
+    functions = [function for named in PUBLIC for function in functions_of(named)]
+    assert len(functions) > 100
+    assert [f.__qualname__ for f in functions if "return" not in f.__annotations__] == []
+
+
+def test_what_is_public_says_what_it_takes():
+    # The method solve() of a solver takes what training gives it, and is none of the user's.
+    untyped = [
+        f"{function.__qualname__}: {name}"
+        for named in PUBLIC
+        if not named.__module__.startswith("skanfis.learning")
+        for function in map(inspect.unwrap, functions_of(named))
+        for name, parameter in inspect.signature(function).parameters.items()
+        if parameter.annotation is parameter.empty and name not in ("self", "cls")
+    ]
+    assert untyped == []
+
+
+def test_the_estimator_has_no_more_parameters_than_a_person_reads():
+    assert len(inspect.signature(skanfis.ANFISRegressor).parameters) <= 20

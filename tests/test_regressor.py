@@ -56,24 +56,8 @@ def same_bits(one, other, data=X):
 
 
 def textbook_strengths(estimator, memberships, data):
-    """Products of memberships over their sum, from nothing but the estimator's attributes."""
-    names = list(getattr(estimator, "feature_names_in_", [f"x{j}" for j in range(data.shape[1])]))
-    mu = [
-        oracles.textbook_membership(term["function"], data[:, names.index(term["input"])], term)
-        for term in memberships
-    ]
-    mu = np.array(mu).reshape(-1, len(data))
-    products = np.array([np.prod(mu[list(rule)], axis=0) for rule in estimator.rules_])
-    return products / products.sum(axis=0)
-
-
-def textbook_predict(estimator, data):
-    """y = sum_r w_r (p_r0 + p_r1 x_1 + ... + p_rd x_d)."""
-    strengths = textbook_strengths(estimator, estimator.memberships_, data)
-    basis = np.column_stack([np.ones(len(data)), data])
-    outputs = estimator.consequents_.reshape(estimator.n_rules_, basis.shape[1], -1)
-    result = np.einsum("rn,ni,rio->no", strengths, basis, outputs)
-    return result[:, 0] if estimator.consequents_.ndim == 2 else result
+    names = getattr(estimator, "feature_names_in_", [f"x{j}" for j in range(data.shape[1])])
+    return oracles.textbook_strengths(memberships, estimator.rules_, names, data)
 
 
 # ----------------------------------------------------------------------------------- what it learns
@@ -100,11 +84,10 @@ def test_planted_model_is_found():
 
 
 @pytest.mark.theory
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 @pytest.mark.parametrize(
     ("settings", "most"),
     [
-        ({}, 0.02),
+        ({"max_rules": 8}, 0.02),
         ({"n_mfs": 2, "mf": "bell"}, 0.02),
         ({"n_mfs": 3, "order": 0}, 0.05),
         # Four clusters of rows without gaps between them share most of their terms.
@@ -112,7 +95,7 @@ def test_planted_model_is_found():
     ],
 )
 def test_surface_is_learnt_between_the_points(settings, most):
-    train, check = surface(200), surface(500, seed=1)
+    train, check = surface(150), surface(500, seed=1)
     model = ANFISRegressor(**settings).fit(*train)
     # Of the target's deviation; a linear model leaves 0.4.
     assert np.sqrt(1 - model.score(*check)) < most
@@ -166,14 +149,12 @@ def test_attributes_reproduce_the_predictions(place, settings):
     # What the rules say, before it is held within the limits of the target.
     model.model_ = replace(model.model_, target=None)
     # p0 + p1 x1 + ... cancels where x is far from the origin, by 10^6 spans for the first column.
-    error = np.abs(textbook_predict(model, data) - model.predict(data)) / np.ptp(targets, axis=0)
+    strengths = textbook_strengths(model, model.memberships_, data)
+    consequents = model.consequents_.reshape(model.n_rules_, 4, n_outputs)
+    expected = oracles.textbook_predict(strengths, consequents, data).reshape(targets.shape)
+    error = np.abs(expected - model.predict(data)) / np.ptp(targets, axis=0)
     assert error.max() < 1e-8
-    assert_allclose(
-        model.strengths(data).T,
-        textbook_strengths(model, model.memberships_, data),
-        rtol=0,
-        atol=1e-8,
-    )
+    assert_allclose(model.strengths(data).T, strengths, rtol=0, atol=1e-8)
 
 
 FREE = {"agreement": 0.0, "alpha": 1e-12, "solver": VariableProjection(tol=0.01, stiffness=0.0)}
@@ -242,16 +223,16 @@ def test_outputs_share_the_premises_and_have_their_own_consequents():
     "settings",
     # Every solver takes the same passes over the rows: one that asks for all of them, and Jang's.
     [
-        {},
+        {"max_rules": 3},
         {"n_mfs": 2, "loss": "huber"},
         {"partition": KMEANS, "mf": "bell", "solver": VariableProjection(stiffness=1e-3)},
         {"n_mfs": 2, "solver": Hybrid(stiffness=1e-3)},
     ],
-    ids=["default", "huber", "clusters", "hybrid"],
+    ids=["search", "huber", "clusters", "hybrid"],
 )
 def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)
-    monkeypatch.setattr(blocks, "FEWEST_ROWS", 16)
+    monkeypatch.setattr(blocks, "FEWEST_ROWS", 8)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
     with_few_candidates(monkeypatch)
     threads, read = set(), StandardisedData.read
@@ -262,7 +243,7 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
 
     monkeypatch.setattr(StandardisedData, "read", read_and_remember)
     # Eight blocks in three chunks.
-    data, target = X[:128], Y[:128]
+    data, target = X[:64], Y[:64]
     weight = np.random.default_rng(0).uniform(0.5, 2.0, len(data))
     models = {}
     for n_jobs in (None, 2):
@@ -318,7 +299,7 @@ def frame_of(library, data, names):
 
 
 @LIBRARIES
-def test_data_frame_gives_names_to_the_terms(library):
+def test_data_frame_gives_names_to_the_terms_behind_a_scaler_too(library):
     frame = frame_of(library, X, NAMES)
     model = quick().fit(frame, frame_of(library, Y[:, None], ["error"])["error"])
     assert_array_equal(model.feature_names_in_, NAMES)
@@ -326,26 +307,11 @@ def test_data_frame_gives_names_to_the_terms(library):
     # A frame's memory runs along its columns, and so do sums.
     expected = quick().fit(X, Y).predict(X)
     assert_allclose(model.predict(frame), expected, rtol=0, atol=1e-10)
-
-
-@LIBRARIES
-def test_columns_in_another_order_are_refused(library):
-    model = quick().fit(frame_of(library, X, NAMES), Y)
-    turned = frame_of(library, X[:, ::-1], NAMES[::-1])
-    for method in (model.predict, model.coverage, model.strengths, model.in_bounds):
-        with pytest.raises(ValueError, match="same order"):
-            method(turned)
-
-
-@LIBRARIES
-def test_names_pass_through_a_scaler(library):
-    frame = frame_of(library, X, NAMES)
     pipeline = make_pipeline(StandardScaler(), quick()).set_output(transform=library)
     pipeline.fit(frame, Y)
     assert pipeline[-1].memberships_[-1]["input"] == "rate"
     # Standardised before or not: the fit depends on no units.
-    plain = quick().fit(frame, Y).predict(frame)
-    assert_allclose(pipeline.predict(frame), plain, rtol=0, atol=1e-8 * np.ptp(Y))
+    assert_allclose(pipeline.predict(frame), expected, rtol=0, atol=1e-8 * np.ptp(Y))
 
 
 def test_frame_without_names_that_are_text_is_an_array():
@@ -380,7 +346,6 @@ def test_representations_show_what_was_changed_and_the_rules():
         assert list(fitted._repr_mimebundle_()) == ["text/plain"]
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_weights_are_routed_through_pipeline_and_search():
     weight = np.random.default_rng(0).uniform(size=len(X)) ** 4
     noisy = Y + 0.01 * np.random.default_rng(1).normal(size=len(X))

@@ -32,16 +32,16 @@ SETTINGS = {
 }
 
 
-def data(n_rows):
+def data(n_rows=60):
     g = np.random.default_rng(11)
     X = g.normal(size=(n_rows, 3)) * [1.0, 100.0, 1e-3]
     return X, np.sin(X[:, 0]) + 1e-2 * X[:, 1] * X[:, 0] + 0.1 * g.normal(size=n_rows)
 
 
-def digest(name, n_rows=100, **more):
+def digest(name):
     """What a fit is, in short."""
-    X, y = data(n_rows)
-    model = ANFISRegressor(**({"solver": VariableProjection(tol=1e-2)} | SETTINGS[name] | more))
+    X, y = data()
+    model = ANFISRegressor(**({"solver": VariableProjection(tol=1e-2)} | SETTINGS[name]))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         model.fit(X, y)

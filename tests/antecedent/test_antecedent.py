@@ -83,38 +83,29 @@ def test_without_terms_one_rule_always_fires(Z):
         assert_array_equal(same.strengths(Z), np.ones((1, 60)))
 
 
-@pytest.mark.parametrize("kind", ["grid", "scattered", "table", "tree"])
-def test_the_rest_fires_as_before_in_proportion(kind, rng):
-    g, Z = np.random.default_rng(1), rng.normal(size=(3, 50))
-    antecedent = {
-        "grid": lambda: oracles.random_grid(g, [Gaussian, Bell, Gaussian], [2, 3, 2]),
-        "scattered": lambda: oracles.random_scattered(g, Gaussian, 5, [0, 1, 2]),
-        "table": lambda: oracles.random_table(g),
-        "tree": lambda: oracles.random_tree(g),
-    }[kind]()
-    left, terms = antecedent.without_rules([0, 3])
-    kept = np.setdiff1d(np.arange(antecedent.n_rules), [0, 3])
+SMALL = grid(("g", 3), ("b", 2))
+
+
+@pytest.mark.parametrize(
+    ("antecedent", "removed", "counts", "terms"),
+    [
+        (ANTECEDENTS["families that alternate"], [0, 3], None, None),
+        (ANTECEDENTS["scattered bells"], [0, 3], None, None),
+        (ANTECEDENTS["rules listed one by one"], [0, 3], None, None),
+        (oracles.random_tree(np.random.default_rng(1)), [0, 3], None, None),
+        # The middle term of the first input: what is left is a grid.
+        (SMALL, [2, 3], (2, 2), [0, 2, 3, 4]),
+        # An input that is left with one term has none.
+        (SMALL, [1, 3, 5], (3,), [0, 1, 2]),
+    ],
+)
+def test_the_rest_fires_as_before_in_proportion(antecedent, removed, counts, terms, Z):
+    left, kept_terms = antecedent.without_rules(removed)
+    kept = np.setdiff1d(np.arange(antecedent.n_rules), removed)
     before = antecedent.strengths(Z)[kept]
-    assert type(left) is RuleTableAntecedent
     assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-9)
-    assert terms.size == left.n_terms
-
-
-def test_a_grid_without_a_whole_term_is_a_grid(rng):
-    antecedent = oracles.random_grid(np.random.default_rng(1), [Gaussian, Bell], [3, 2])
-    left, terms = antecedent.without_rules([2, 3])  # the middle term of the first input
-    assert isinstance(left, GridAntecedent)
-    assert left.counts == (2, 2)
-    assert_array_equal(terms, [0, 2, 3, 4])
-    Z = rng.normal(size=(2, 50))
-    before = antecedent.strengths(Z)[[0, 1, 4, 5]]
-    assert_allclose(left.strengths(Z), before / before.sum(axis=0), rtol=1e-10)
-
-
-def test_an_input_left_with_one_term_has_none(rng):
-    antecedent = oracles.random_grid(np.random.default_rng(1), [Gaussian, Bell], [3, 2])
-    left, terms = antecedent.without_rules([1, 3, 5])
-    assert left.counts == (3,)
-    assert_array_equal(terms, [0, 1, 2])
-    Z = rng.normal(size=(2, 50))
-    assert_allclose(left.strengths(Z).sum(axis=0), 1.0)
+    assert type(left) is (GridAntecedent if counts else RuleTableAntecedent)
+    assert left.grid_counts == counts
+    assert kept_terms.size == left.n_terms
+    if counts:
+        assert_array_equal(kept_terms, terms)

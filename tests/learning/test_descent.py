@@ -1,4 +1,7 @@
-"""Jang's rule against a transcription of his paper that shares nothing with the package."""
+"""Jang's rule against a transcription of his paper that shares nothing with the package.
+
+And descent along the joint gradient, of which test_objective speaks.
+"""
 
 from dataclasses import replace
 
@@ -7,7 +10,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.datasets import make_jang_three_input
-from skanfis.learning import Hybrid
+from skanfis.learning import GradientDescent, Hybrid
 from skanfis.learning.data import Scale, StandardisedData
 from skanfis.learning.descent import NaturalPremise
 from skanfis.learning.objective import SeparableProblem
@@ -17,11 +20,6 @@ from skanfis.membership import MEMBERSHIPS, Bell
 
 from .. import oracles
 from .test_varpro import planted
-
-
-def hybrid(problem, premise, *, max_iter, on_iteration=None, **settings):
-    """A run of the rule with settings of its own."""
-    return Hybrid(**settings).solve(problem, premise, max_iter=max_iter, on_iteration=on_iteration)
 
 
 class Jang1993:
@@ -115,12 +113,8 @@ def test_three_input_problem_is_trained_as_by_the_transcription(step_size, raw):
     X, y = make_jang_three_input()
     rows = in_raw_units(X, y) if raw else StandardisedData.of(X, y[:, None])
     seen = []
-    result = hybrid(
-        *two_bells(rows),
-        max_iter=60,
-        tol=0.0,
-        step_size=step_size,
-        on_iteration=lambda n, evaluation: seen.append(evaluation.antecedent),
+    result = Hybrid(tol=0.0, step_size=step_size).solve(
+        *two_bells(rows), max_iter=60, on_iteration=lambda n, at: seen.append(at.antecedent)
     )
     table = rows.table(slice(None))
     errors, premises = Jang1993(table[:, :-1], table[:, -1]).train(60, step_size)
@@ -198,16 +192,16 @@ class TestNaturalPremise:
 
 
 class TestEnd:
-    def problem(self):
+    def solve(self, max_iter, **settings):
         rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
         penalty = Penalty(alpha=1e-8, slope=1e-8)
-        return SeparableProblem(rows, premise.antecedent, 1, penalty), premise
+        problem = SeparableProblem(rows, premise.antecedent, 1, penalty)
+        return Hybrid(tol=0.0, **settings).solve(problem, premise, max_iter=max_iter)
 
     def test_error_goal_ends_it(self):
-        problem, premise = self.problem()
-        free = hybrid(problem, premise, max_iter=30, tol=0.0)
+        free = self.solve(30)
         goal = np.sqrt(free.loss_curve[12])
-        result = hybrid(problem, premise, max_iter=30, tol=0.0, error_goal=goal)
+        result = self.solve(30, error_goal=goal)
         assert result.status == "error_goal"
         assert result.converged
         first = int(np.argmax(np.sqrt(free.loss_curve) <= goal))
@@ -217,8 +211,37 @@ class TestEnd:
 
     def test_best_epoch_and_not_the_last(self):
         # So long a step goes up and down.
-        problem, premise = self.problem()
-        result = hybrid(problem, premise, max_iter=25, tol=0.0, step_size=0.5)
+        result = self.solve(25, step_size=0.5)
         best = int(result.loss_curve.argmin())
         assert best < 25
         assert_allclose(result.evaluation.mean_squared_error, result.loss_curve[best])
+
+
+def test_step_is_along_the_gradient_by_natural_premises_and_consequents():
+    rows, premise, *_ = planted("bells", 0, displaced=0.5, noise=0.1, n_outputs=2)
+    antecedent, penalty = premise.antecedent, Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
+    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
+    seen = []
+    solver = GradientDescent(tol=0.0)
+    solver.solve(problem, premise, max_iter=2, on_iteration=lambda n, e: seen.append(e))
+    # The first step, from the solution of least squares, leaves the consequents where they are.
+    (before, start), (_, found) = ((one, variables_of(one)) for one in seen)
+    n_consequents = before.coefficients.size
+
+    def cost(variables):
+        center, width, slope = variables[:-n_consequents].reshape(3, -1)
+        parameters = np.concatenate([center, np.log(width), np.log(slope)])
+        return dense.cost_at(parameters, variables[-n_consequents:].reshape(-1, 2))
+
+    slope = oracles.complex_step(cost, start)
+    assert np.linalg.norm(slope[-n_consequents:]) > 0.01 * np.linalg.norm(slope)
+    expected = start - 0.01 * slope / np.linalg.norm(slope)
+    assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+def variables_of(evaluation):
+    """Numbers of the premises, as a person reads them, and consequents, in a row."""
+    (group,) = evaluation.antecedent.groups
+    natural = group.family.natural(group.theta)
+    return np.concatenate([natural.ravel(), evaluation.coefficients.ravel()])

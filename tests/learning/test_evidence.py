@@ -186,13 +186,12 @@ def at_fixed_premises(seed):
     return at, with_pulls(penalty, problem.common_line, g)
 
 
-def slope_of(function, penalty, key, step=1e-3):
+def slope_of(function, penalty, key):
     """Derivative by the logarithm of a weight."""
-    ends = [
-        function(replace(penalty, **{key: getattr(penalty, key) * np.exp(side * step)}))
-        for side in (1.0, -1.0)
-    ]
-    return (ends[0] - ends[1]) / (2.0 * step)
+    log = np.log([getattr(penalty, key)])
+    return oracles.central_difference(
+        lambda x: function(replace(penalty, **{key: float(np.exp(x[0]))})), log, 1e-3
+    )[0]
 
 
 BLOCKS = {"slope": "slope_pulls", "alpha": "pulls"}
@@ -209,16 +208,6 @@ def with_logs(penalty, block, logs):
     names, mean = getattr(penalty, BLOCKS[block]), float(np.exp(np.mean(logs)))
     pulls = dict(zip(names, np.exp(logs - np.mean(logs)).tolist(), strict=True))
     return replace(penalty, **{block: mean, BLOCKS[block]: pulls})
-
-
-def slopes_of_pulls(function, penalty, block, step=1e-3):
-    """Derivatives by the logarithms of all weights of a block."""
-    logs = logs_of(penalty, block)
-    ends = [
-        [function(with_logs(penalty, block, logs + side * step * unit)) for side in (1.0, -1.0)]
-        for unit in np.eye(logs.size)
-    ]
-    return np.array([(high - low) / (2.0 * step) for high, low in ends])
 
 
 class TestReestimated:
@@ -238,7 +227,11 @@ class TestReestimated:
             assert abs(slope) < 1e-3
         for block, pulls in BLOCKS.items():
             if getattr(penalty, pulls):
-                slopes = slopes_of_pulls(lambda p: at(p).minus_twice_log, penalty, block)
+                slopes = oracles.central_difference(
+                    lambda logs, b=block: at(with_logs(penalty, b, logs)).minus_twice_log,
+                    logs_of(penalty, block),
+                    1e-3,
+                )
                 assert np.abs(slopes).max() < 2e-3
 
     def test_no_weight_falls_below_its_own_least_or_moves_by_more_than_a_step(self):

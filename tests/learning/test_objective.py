@@ -6,7 +6,7 @@ dense cost, with beta eliminated inside it: nothing is left out of the derivativ
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import blocks
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent
@@ -115,25 +115,38 @@ def test_evaluation_is_that_of_the_dense_ridge_regression(case):
     found, dense = case.problem.evaluate(case.point), case.dense
     assert_allclose(found.cost, dense.cost(case.point), rtol=1e-11)
     assert_all_close(found.coefficients, dense.coefficients(case.point), 1e-9)
-    squares = (dense.y - dense.design(case.point) @ found.coefficients) ** 2
-    assert_allclose(found.mean_squared_error, np.sum(dense.weight @ squares), rtol=1e-10)
+    squares = dense.weight @ (dense.y - dense.design(case.point) @ found.coefficients) ** 2
+    assert_allclose(found.mean_squared_error, np.sum(squares), rtol=1e-10)
+    assert_allclose(case.problem.mean_squares(found), squares, rtol=1e-9)
     firing = oracles.strengths(case.problem.antecedent, case.point, dense.Z)
     assert_allclose(found.masses, firing @ dense.weight, rtol=1e-11, atol=1e-15)
 
 
-@pytest.mark.theory
-def test_gradient_is_exact_far_from_the_optimum(case):
+def test_gradient_is_exact_far_from_the_optimum_and_gauss_newton_the_schur_complement(case):
     _, linearisation = case.at_point()
     expected = case.dense.gradient(case.point)
     assert np.abs(expected).max() > 1e-3
     assert_all_close(linearisation.gradient, expected, 1e-10)
-
-
-def test_gauss_newton_is_the_schur_complement(case):
-    _, linearisation = case.at_point()
     expected = case.dense.gauss_newton(case.point)
     assert_all_close(linearisation.gauss_newton, expected, 1e-10)
     assert_all_close(linearisation.gauss_newton, linearisation.gauss_newton.T, 1e-14)
+
+
+def test_joint_gradient_is_that_at_any_consequents(case):
+    """By premises; by consequents: test_departures."""
+    dense, shape = case.dense, (case.problem.n_columns, case.problem.n_outputs)
+    coefficients = np.random.default_rng(8).normal(size=shape)
+    evaluation, by_premises, _ = case.problem.joint(case.point, coefficients)
+    assert_allclose(evaluation.cost, dense.cost_at(case.point, coefficients), rtol=1e-12)
+    residual = dense.y - dense.design(case.point) @ coefficients
+    error = np.sum(dense.weight @ residual**2)
+    assert_allclose(evaluation.mean_squared_error, error, rtol=1e-11)
+    firing = oracles.strengths(case.problem.antecedent, case.point, dense.Z)
+    assert_allclose(evaluation.masses, firing @ dense.weight, rtol=1e-10, atol=1e-14)
+    assert evaluation.coefficients is coefficients
+    assert_array_equal(evaluation.antecedent.parameters, case.point)
+    expected = oracles.complex_step(lambda p: dense.cost_at(p, coefficients), case.point)
+    assert_all_close(by_premises, expected, 1e-11)
 
 
 @pytest.mark.parametrize("alpha", [1e-6, 1e-8, 1e-10])
@@ -208,16 +221,6 @@ def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
     least = np.mean(residual**2)
     assert_allclose(seeing.mean_squared_error, least, rtol=0.02)
     assert abs(blind.mean_squared_error - least) > 0.1 * least
-
-
-@pytest.mark.parametrize("name", ["grid of both", "scattered bells", "grid, order 0, outputs"])
-def test_mean_squares_are_those_of_the_dense_design(name):
-    case = Case.named(name, FULL)
-    evaluation = case.problem.evaluate(case.point)
-    phi = case.dense.design(case.point)
-    squares = (case.dense.y - phi @ evaluation.coefficients) ** 2
-    found = case.problem.mean_squares(evaluation)
-    assert_allclose(found, case.dense.weight @ squares, rtol=1e-9)
 
 
 @pytest.mark.parametrize("weighted", [False, True])

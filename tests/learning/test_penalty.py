@@ -18,46 +18,38 @@ BUILD = {
 }
 
 
-class Model:
-    """Rows and rules; the strengths of the rules on every row, by hand."""
-
-    def __init__(self, kind, order, n_outputs=1):
-        g = np.random.default_rng(3)
-        self.antecedent, self.order = BUILD[kind](g), order
-        self.rows = oracles.bumpy_rows(g, 200, 2, n_outputs, weighted=True)
-        self.Z = self.rows.inputs.apply(self.rows.X.T)
-        self.y = (self.rows.y - self.rows.targets.offset) / self.rows.targets.scale
-        self.share = self.rows.sample_weight / self.rows.sample_weight.sum()
-        self.basis = np.vstack([np.ones((1, 200)), self.Z]) if order else np.ones((1, 200))
-        self.w = oracles.strengths(self.antecedent, self.antecedent.parameters, self.Z)
-
-    def solved(self, penalty):
-        """Consequents on [1, z], (n_rules, n_basis, n_outputs)."""
-        problem = SeparableProblem(self.rows, self.antecedent, self.order, penalty)
-        found = problem.evaluate(self.antecedent.parameters).coefficients
-        return found.reshape(len(self.w), len(self.basis), -1)
+def dense_and_solved(kind, order, penalty, n_outputs=2):
+    """What the dense problem knows of rows and rules, and consequents on [1, z] of every rule."""
+    g = np.random.default_rng(3)
+    antecedent = BUILD[kind](g)
+    rows = oracles.bumpy_rows(g, 200, 2, n_outputs, weighted=True)
+    found = SeparableProblem(rows, antecedent, order, penalty).evaluate(antecedent.parameters)
+    dense = oracles.DenseProblem(rows, antecedent, order, penalty)
+    return dense, found.coefficients.reshape(dense.n_rules, len(dense.basis), -1)
 
 
 @pytest.mark.parametrize("kind", BUILD)
 @pytest.mark.parametrize("order", [0, 1])
 class TestWeightOfAgreement:
     def test_at_one_every_rule_is_a_regression_of_its_own(self, kind, order):
-        model = Model(kind, order, 2)
-        for rule, w in zip(model.solved(Penalty(agreement=1.0)), model.w, strict=True):
+        dense, solved = dense_and_solved(kind, order, Penalty(agreement=1.0))
+        antecedent = dense.antecedent
+        strengths = oracles.strengths(antecedent, antecedent.parameters, dense.Z)
+        for rule, w in zip(solved, strengths, strict=True):
             own = LinearRegression(fit_intercept=False)
-            own.fit(model.basis.T, model.y, sample_weight=w * model.share)
+            own.fit(dense.basis.T, dense.y, sample_weight=w * dense.weight)
             assert_allclose(rule, own.coef_.T, rtol=1e-6, atol=1e-8)
 
     def test_without_end_all_rules_are_one_line(self, kind, order):
-        model = Model(kind, order, 2)
+        dense, solved = dense_and_solved(kind, order, Penalty(agreement=1e7))
         line = LinearRegression(fit_intercept=False)
-        line.fit(model.basis.T, model.y, sample_weight=model.share)
-        for rule in model.solved(Penalty(agreement=1e7)):
+        line.fit(dense.basis.T, dense.y, sample_weight=dense.weight)
+        for rule in solved:
             assert_allclose(rule, line.coef_.T, atol=1e-5)
 
 
 def test_pull_to_the_common_line_is_without_end_the_ridge_of_one_line():
-    model = Model("grid", 1)
-    ridge = Ridge(alpha=0.3, tol=1e-12).fit(model.Z.T, model.y[:, 0], model.share)
-    for rule in model.solved(Penalty(alpha=1e7, slope=0.3)):
+    dense, solved = dense_and_solved("grid", 1, Penalty(alpha=1e7, slope=0.3), n_outputs=1)
+    ridge = Ridge(alpha=0.3, tol=1e-12).fit(dense.Z.T, dense.y[:, 0], dense.weight)
+    for rule in solved:
         assert_allclose(rule[:, 0], [ridge.intercept_, *ridge.coef_], atol=1e-5)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis.antecedent import GridAntecedent
 from skanfis.membership import FAMILIES as EVERY_FAMILY
 from skanfis.membership import (
     MEMBERSHIPS,
@@ -13,6 +14,7 @@ from skanfis.membership import (
     SigmoidProduct,
     membership_families,
 )
+from skanfis.membership.flanked import PiShaped, Trapezoidal, Triangular
 
 from ..oracles import by_formula, central_difference, complex_step, corners, textbook_membership
 
@@ -114,20 +116,13 @@ def test_value_is_the_formula_in_papers(family, rng):
 
 
 @FAMILIES
-def test_log_value_is_the_logarithm_of_the_value(family, rng):
-    theta = random_theta(family, rng)
-    x = points(family, theta, NEAR)
-    expected = np.log(floored(family, x, theta))
-    # Where mu is nearly one its logarithm is known to the last bit of one only.
-    assert_allclose(family.log_value(x, theta), expected, rtol=1e-12, atol=1e-15)
-
-
-@FAMILIES
-def test_gradient_is_that_of_the_textbook_formula(family, rng):
+def test_log_value_and_gradient_are_those_of_the_textbook_formula(family, rng):
     theta = random_theta(family, rng)
     x = points(family, theta, NEAR)
     log_mu, gradient = family.log_value_and_gradient(x, theta)
-    assert_allclose(log_mu, family.log_value(x, theta), rtol=1e-14, atol=1e-300)
+    # Where mu is nearly one its logarithm is known to the last bit of one only.
+    assert_allclose(log_mu, np.log(floored(family, x, theta)), rtol=1e-12, atol=1e-15)
+    assert_allclose(family.log_value(x, theta), log_mu, rtol=1e-14, atol=1e-300)
     assert_allclose(gradient, gradient_by_complex_step(family, x, theta), rtol=1e-10, atol=1e-14)
 
 
@@ -257,3 +252,20 @@ def test_families_are_given_by_name_or_class_for_all_inputs_or_for_each():
     assert membership_families("bell", names) == [Bell, Bell]
     assert membership_families(Bell, names) == [Bell, Bell]
     assert membership_families(("bell", Gaussian), names) == [Bell, Gaussian]
+
+
+@pytest.mark.parametrize("family", [Triangular, Trapezoidal, PiShaped])
+def test_where_no_term_reaches_the_nearest_speaks(family):
+    # Terms at 0, 10 and 30 that reach no further than 1.
+    theta = family.start(np.array([0.0, 10.0, 30.0]), np.ones(3), 0.6)
+    x = np.array([-1e9, -50.0, 4.0, 6.0, 18.0, 22.0, 80.0, 1e9])
+    assert not family.value(x[None], theta).any()
+    antecedent = GridAntecedent.build([family], [0], [theta])
+    with np.errstate(all="raise", under="ignore"):
+        strengths = antecedent.strengths(x[None])
+    assert_allclose(strengths.sum(axis=0), 1.0, rtol=1e-14)
+    assert_array_equal(strengths.argmax(axis=0), [0, 0, 0, 1, 1, 2, 2, 2])
+    # Half-way the two neighbours share, and strengths pass from one to the other smoothly.
+    between = antecedent.strengths(np.linspace(4.0, 6.0, 401)[None])
+    assert_allclose(between[:2, 200], 0.5, rtol=1e-10)
+    assert (np.abs(np.diff(between, axis=1)) < 0.05).all()

@@ -10,8 +10,6 @@ from skanfis.membership import FAMILIES, MEMBERSHIPS
 from .. import oracles
 from ..export.rule_bases import build
 
-__all__ = ["Table", "frozen_models", "settings_of_fit", "tables"]
-
 Table = namedtuple("Table", "X y sample_weight")
 
 _seeds = st.integers(0, 2**32 - 1)

@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from skanfis.antecedent import GridAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, grid_antecedent, tuning
+from skanfis.search import Spacing, tuning
 from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.sample import search_sample
 
@@ -22,38 +23,33 @@ def sample_of(X, y, weight=None):
     return search_sample(StandardisedData.of(X, y.reshape(len(X), -1), weight), 20_000)
 
 
-def line_through(rows):
-    """A model of one rule."""
-    n_inputs = rows.X.shape[1]
-    antecedent = grid_antecedent([Gaussian] * n_inputs, [1] * n_inputs, Spacing(rows))
+def solved(rows, antecedent):
+    """Rules with their consequents, before their premises move."""
     problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
     premise = Premise.of(antecedent, *rows.inputs.box)
     return tuning.tune(problem, premise, ["slope"], rows.sample_weight.sum(), turns=0)
 
 
-class TestCandidate:
-    def test_kinds_are_told_in_words(self):
-        one = Candidate((1, 1, 1))
-        grid = one.with_more_terms(2).with_more_terms(0).with_more_terms(2)
-        scattered = one.with_more_clusters([2, 0])
-        assert [c.kind for c in (one, grid, scattered)] == ["one rule", "grid", "scattered"]
-        assert [c.n_rules for c in (one, grid, scattered)] == [1, 6, 2]
-        assert [c.n_terms for c in (one, grid, scattered)] == [0, 5, 4]
-        assert [c.describe() for c in (one, grid, scattered)] == [
-            "one rule",
-            "grid of 6 rules",
-            "2 scattered rules",
-        ]
+def test_kinds_are_told_in_words():
+    one = Candidate((1, 1, 1))
+    grid = one.with_more_terms(2).with_more_terms(0).with_more_terms(2)
+    scattered = one.with_more_clusters([2, 0])
+    for found, kind, n_rules, n_terms, words in (
+        (one, "one rule", 1, 0, "one rule"),
+        (grid, "grid", 6, 5, "grid of 6 rules"),
+        (scattered, "scattered", 2, 4, "2 scattered rules"),
+    ):
+        assert (found.kind, found.n_rules, found.n_terms) == (kind, n_rules, n_terms)
+        assert found.describe() == words
 
-    def test_scattered_rules_are_half_as_many_again(self):
-        found = [Candidate((1,))]
-        for _ in range(6):
-            found.append(found[-1].with_more_clusters([0]))
-        assert [c.n_rules for c in found] == [1, 2, 3, 5, 8, 12, 18]
 
-    def test_inputs_of_scattered_rules_stay(self):
-        larger = Candidate((1,) * 4).with_more_clusters([3, 1]).with_more_clusters([0, 1])
-        assert larger == Candidate((1,) * 4, 3, (0, 1, 3))
+def test_scattered_rules_are_half_as_many_again_and_their_inputs_stay():
+    found = [Candidate((1,))]
+    for _ in range(6):
+        found.append(found[-1].with_more_clusters([0]))
+    assert [c.n_rules for c in found] == [1, 2, 3, 5, 8, 12, 18]
+    larger = Candidate((1,) * 4).with_more_clusters([3, 1]).with_more_clusters([0, 1])
+    assert larger == Candidate((1,) * 4, 3, (0, 1, 3))
 
 
 def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
@@ -93,7 +89,7 @@ def test_scores_of_terms_are_the_formula_term_by_term(rng, count, n_outputs, tol
     y = np.sin(3.0 * X[:, [0]]) + X[:, [2]] * X[:, [3]] + 0.3 * rng.normal(size=(150, n_outputs))
     # Weights that go with the inputs: the mean of a share is far from its plain mean.
     rows = sample_of(X, y, np.ceil(np.exp(X.sum(axis=1))))
-    tuned, spacing = line_through(rows), Spacing(rows)
+    tuned, spacing = solved(rows, GridAntecedent((), counts=())), Spacing(rows)
     s, basis = rows.sample_weight, np.column_stack([np.ones(len(rows.X)), rows.X])
     residual = rows.y - basis @ tuned.evaluation.coefficients
 

@@ -58,8 +58,10 @@ class TestPrefer:
         found = Judges.of([rows.part([0, 1]), rows.part([2])])
         assert_array_equal(found.group, [1, 0, 1])
         assert found.mean(np.array([1.0, 0.0, 5.0])) == 16.0 / 6.0
-        alone = Judges.of([StandardisedData(X, y, weight, None, None)])
-        assert_array_equal(alone.group, [0, 1, 2])
+        # One group for all says nothing.
+        for one in (None, np.full(3, 7)):
+            alone = Judges.of([StandardisedData(X, y, weight, None, None, one)])
+            assert_array_equal(alone.group, [0, 1, 2])
 
 
 def test_the_best_costs_more_to_read_only_where_that_is_no_chance():

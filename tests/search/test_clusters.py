@@ -32,14 +32,10 @@ def rules_of(family, rows, label):
     return clustered_antecedent([family] * n_inputs, rows, label, np.arange(n_inputs))
 
 
-def rule_parameters(antecedent, n_inputs):
-    """Theta as (n_parameters, n_rules, n_inputs), rules in the order of their first centre."""
-    theta = np.hstack([group.theta for group in antecedent.groups])
-    inputs = np.concatenate([group.inputs for group in antecedent.groups])
-    terms = antecedent.rule_terms
-    terms = np.take_along_axis(terms, np.argsort(inputs[terms], axis=1), axis=1)
-    theta = theta[:, terms]
-    assert theta.shape[2] == n_inputs
+def rule_parameters(antecedent):
+    """Theta as (n_parameters, n_rules, 2), rules in the order of their first centre."""
+    (group,) = antecedent.groups
+    theta = group.theta.reshape(len(group.theta), -1, 2)
     return theta[:, np.argsort(theta[0, :, 0])]
 
 
@@ -51,7 +47,7 @@ class TestRules:
         found = clustered_antecedent([Gaussian] * 3, rows, by_k_means, np.array([1, 2]))
         expected = rules_of(Gaussian, StandardisedData.of(X, y), by_k_means)
         assert {int(j) for group in found.groups for j in group.inputs} == {1, 2}
-        for one, other in zip(rule_parameters(found, 2), rule_parameters(expected, 2), strict=True):
+        for one, other in zip(rule_parameters(found), rule_parameters(expected), strict=True):
             assert_allclose(one, other)
 
     # "At least" and "at most" hold beyond the blob too.
@@ -74,7 +70,7 @@ class TestRules:
             seen.append(table)
             return np.where(table[:, 0] > 0.5, -1, table[:, 1] > 0)
 
-        centers, log_widths = rule_parameters(rules_of(Gaussian, rows, label), 2)
+        centers, log_widths = rule_parameters(rules_of(Gaussian, rows, label))
         z, target, _ = rows.read(slice(None))
         # Clusters are sought in standardised inputs and target together.
         assert_allclose(np.sort(seen[0], axis=0), np.sort(np.vstack([z, target]).T, axis=0))
@@ -89,7 +85,7 @@ class TestRules:
         X = np.vstack([np.full((30, 2), 5.0), rng.normal(size=(30, 2))])
         rows = StandardisedData.of(X, X[:, :1])
         antecedent = rules_of(Gaussian, rows, lambda t, w: (t[:, 0] < t[:, 0].max()).astype(int))
-        widths = np.exp(rule_parameters(antecedent, 2)[1, 1])
+        widths = np.exp(rule_parameters(antecedent)[1, 1])
         assert_allclose(widths, 0.1 * np.sqrt(2.0), rtol=1e-12)
 
     @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import Gaussian, Triangular
@@ -26,22 +26,13 @@ def evenly(n_inputs, n_rows=N_ROWS):
     return Spacing(rows), low, high
 
 
-def terms(antecedent):
-    """(input, theta of one term) for every term."""
-    for group in antecedent.groups:
-        for t, j in enumerate(group.inputs):
-            yield int(j), group.family, group.theta[:, [t]]
-
-
 def test_even_values_give_even_terms_between_the_outer_quantiles():
     spacing, low, high = evenly(2)
     antecedent = grid_antecedent([Gaussian] * 2, [3, 2], spacing)
-    found = [(j, theta[0, 0]) for j, _, theta in terms(antecedent)]
-    assert [j for j, _ in found] == [0, 0, 0, 1, 1]
-    centers = [low, 0.5 * (low + high), high, low, high]
-    assert_allclose([center for _, center in found], centers, rtol=1e-9, atol=1e-9)
     assert antecedent.counts == (3, 2)
-    assert antecedent.n_rules == 6
+    assert_array_equal(antecedent.term_inputs, [0, 0, 0, 1, 1])
+    centers = [low, 0.5 * (low + high), high, low, high]
+    assert_allclose(antecedent.term_places, centers, rtol=1e-9, atol=1e-9)
 
 
 # Of what families make of a place and a distance: tests/membership.

@@ -23,7 +23,11 @@ def inputs(rng, n_rows=400, n_inputs=3):
     return rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def chosen(model):
+    (told,) = (one for one in model.structures_ if one["chosen"])
+    return told
+
+
 def test_linear_truth_gets_next_to_a_linear_model(rng):
     # A criterion by error lets a rule more pass where it does no harm; the plane stays a plane.
     X = inputs(rng)
@@ -38,9 +42,9 @@ def test_linear_truth_gets_next_to_a_linear_model(rng):
 
 
 def test_noise_alone_gets_a_single_rule(rng):
-    """Nine times of ten (``benchmarks structure``, 94 of 100); here seven of ten at least."""
-    draws = [(inputs(rng, 150, 8), rng.standard_normal(150)) for _ in range(10)]
-    assert sum(ANFISRegressor().fit(*draw).n_rules_ == 1 for draw in draws) >= 7
+    """Nine times of ten (``benchmarks structure``, 94 of 100); here four of five at least."""
+    draws = [(inputs(rng, 150, 8), rng.standard_normal(150)) for _ in range(5)]
+    assert sum(ANFISRegressor().fit(*draw).n_rules_ == 1 for draw in draws) >= 4
 
 
 def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
@@ -51,7 +55,6 @@ def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
     assert ANFISRegressor(order=0).fit(X, y).n_rules_ > linear
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_expected_error_is_that_on_new_rows(rng):
     def surface(n):
         X = inputs(rng, n)
@@ -62,15 +65,14 @@ def test_expected_error_is_that_on_new_rows(rng):
     X_new, y_new = surface(20_000)
     found = np.sqrt(np.mean((model.predict(X_new) - y_new) ** 2)) / y.std()
     # 500 rows tell a standard deviation to 3 %; twice that.
-    (expected,) = (one["expected_error"] for one in model.structures_ if one["chosen"])
-    assert_allclose(expected, found, rtol=0.06)
+    assert_allclose(chosen(model)["expected_error"], found, rtol=0.06)
 
 
 @pytest.mark.parametrize("partition", ["auto", *KINDS])
 def test_more_noise_never_gives_more_rules(rng, partition):
-    X = inputs(rng, 200, 2)
-    truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(200)
-    model = ANFISRegressor(partition=partition)
+    X = inputs(rng, 100, 2)
+    truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(100)
+    model = ANFISRegressor(partition=partition, max_rules=6)
     assert model.fit(X, truth + 0.02 * noise).n_rules_ > model.fit(X, truth + 30 * noise).n_rules_
 
 
@@ -154,10 +156,10 @@ def runs(n_runs=6, n_rows=90, seed=0):
     return np.column_stack([temperature, rate]), y, run
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
     X, y, run = runs()
-    alone, grouped = (ANFISRegressor().fit(X, y, groups=groups) for groups in (None, run))
+    model = ANFISRegressor(max_rules=8)
+    alone, grouped = (clone(model).fit(X, y, groups=groups) for groups in (None, run))
     on_temperature = [
         [term["input"] for term in model.memberships_].count("x0") for model in (alone, grouped)
     ]
@@ -166,15 +168,19 @@ def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
     X_new, y_new, _ = runs(40, seed=1)
     for model, least, most in ((grouped, 0.5, 1.5), (alone, 0.0, 0.5)):
         error = np.sqrt(np.mean((model.predict(X_new) - y_new) ** 2)) / y.std()
-        (expected,) = (one["expected_error"] for one in model.structures_ if one["chosen"])
-        assert least * error <= expected < most * error
+        assert least * error <= chosen(model)["expected_error"] < most * error
 
 
-def test_a_single_group_says_nothing():
-    X, y, run = runs(2, 40)
-    grid = ANFISRegressor(partition="grid")
-    one, none = (clone(grid).fit(X, y, groups=g) for g in (np.zeros(run.size), None))
+def test_groups_may_have_names_and_a_single_one_says_nothing():
+    X, y, run = runs(4, 20)
+    grid = ANFISRegressor(partition="grid", max_rules=4)
+    names = list(np.array(["a", "b", "c", "d"])[run])
+    by_number, by_name, one, none = (
+        clone(grid).fit(X, y, groups=groups) for groups in (run, names, 0 * run, None)
+    )
+    assert_array_equal(by_name.predict(X), by_number.predict(X))
     assert_array_equal(one.predict(X), none.predict(X))
+    assert by_name.structures_[0]["expected_error"] != none.structures_[0]["expected_error"]
 
 
 def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_start(rng):
@@ -186,13 +192,14 @@ def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_star
 
 
 @pytest.mark.parametrize(
-    ("starts", "most"), [((0.0, 10.0, 50.0), 0.3), (np.linspace(0.0, 50.0, 30), 0.01)]
+    ("starts", "n_rows", "most"),
+    [((0.0, 10.0, 50.0), 30, 0.3), (np.linspace(0.0, 50.0, 30), 60, 0.01)],
 )
-def test_between_runs_rules_by_time_and_temperature_are_not_wild(rng, starts, most):
+def test_between_runs_rules_by_time_and_temperature_are_not_wild(rng, starts, n_rows, most):
     """Instruments that warm up by 6 degrees, each from its own; three say next to nothing."""
-    time = np.tile(np.linspace(0.0, 1.0, 60), len(starts))
+    time = np.tile(np.linspace(0.0, 1.0, n_rows), len(starts))
     warmth = 6.0 * (1.0 - np.exp(-3.0 * time))
-    temperature = np.repeat(starts, 60) + warmth + 0.05 * rng.standard_normal(time.size)
+    temperature = np.repeat(starts, n_rows) + warmth + 0.05 * rng.standard_normal(time.size)
 
     def truth(X):
         return 0.01 * (X[:, 1] - 20.0) ** 2 + np.exp(-4.0 * X[:, 0])
@@ -219,7 +226,8 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
     low, high = X.min(axis=0), X.max(axis=0)
     fresh = fresh[((low <= fresh) & (fresh <= high)).all(axis=1)]
-    model = ANFISRegressor(simplicity=0).fit(X, truth(X) + noise * rng.standard_normal(800))
+    model = ANFISRegressor(simplicity=0, max_rules=8)
+    model.fit(X, truth(X) + noise * rng.standard_normal(800))
     errors = model.predict(fresh) - truth(fresh)
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
 
@@ -251,14 +259,13 @@ def test_expected_error_of_the_linear_model_is_that_of_its_folds(rng, n_groups):
     assert_allclose(told["expected_error"], error, rtol=1e-3)
 
 
-@pytest.mark.parametrize("partition", ["auto", *KINDS])
-def test_candidates_are_listed_from_the_best(rng, partition):
-    model = ANFISRegressor(partition=partition).fit(*bumps(rng, 60))
+def test_candidates_are_listed_from_the_best(rng):
+    """Of one kind alone: test_every_kind."""
+    model = ANFISRegressor().fit(*bumps(rng, 60))
     found = model.structures_
     assert [one["expected_error"] for one in found] == sorted(o["expected_error"] for o in found)
-    kinds = set(KINDS) if partition == "auto" else {partition}
-    assert {one["kind"] for one in found} == {"one rule", *kinds}
-    assert [one["rules"] for one in found if one["chosen"]] == [model.n_rules_]
+    assert {one["kind"] for one in found} == {"one rule", *KINDS}
+    assert chosen(model)["rules"] == model.n_rules_
     assert len({one["structure"] for one in found}) == len(found)
     for one in found:
         n_conditions = 3 * one["rules"]
@@ -281,9 +288,9 @@ def test_candidates_are_listed_from_the_best(rng, partition):
 
 def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
     X, y = bumps(rng)
-    model = ANFISRegressor(max_rules=6)
+    model = ANFISRegressor(max_rules=4)
     fitted = {s: clone(model).set_params(simplicity=s).fit(X, y) for s in (0.0, 0.05, 0.5)}
-    told = {s: next(o for o in m.structures_ if o["chosen"]) for s, m in fitted.items()}
+    told = {s: chosen(model) for s, model in fitted.items()}
     costs = [one["reading_cost"] for one in told.values()]
     assert costs == sorted(costs, reverse=True)
     assert len(set(costs)) > 1
@@ -311,12 +318,6 @@ def test_a_parabola_is_not_told_by_rules_of_one_slope(seed):
 
 # ------------------------------------------------------------------------------------ nothing else
 
-FORMS = {
-    "orders": lambda X, y: (X[::-1, [2, 0, 1]], y[::-1]),
-    "units": lambda X, y: (X * [1e6, 1e-3, 1.0] + [0.0, 1.0, 0.0], 1e-3 * y + 4.0),
-    "a constant column": lambda X, y: (np.column_stack([np.full(len(X), 3.0), X]), y),
-}
-
 
 @cache
 def plain_fit(partition):
@@ -326,15 +327,15 @@ def plain_fit(partition):
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
 @pytest.mark.parametrize("partition", ["grid", "scattered"])
-@pytest.mark.parametrize("form", FORMS)
-def test_the_same_model_whatever_form_the_rows_have(partition, form):
+def test_the_same_model_whatever_form_the_rows_have(partition):
+    """In other units, the other way round, columns in another order, a constant one among them."""
     X, y, plain = plain_fit(partition)
-    X_other, y_other = FORMS[form](X, y)
+    turned = (X * [1e6, 1e-3, 1.0] + [0.0, 1.0, 0.0])[::-1, [2, 0, 1]]
+    X_other, y_other = np.insert(turned, 1, 3.0, axis=1), 1e-3 * y[::-1] + 4.0
     found = clone(plain).fit(X_other, y_other)
     assert [o["rules"] for o in found.structures_] == [o["rules"] for o in plain.structures_]
-    predicted = (found.predict(X_other) - y_other.mean()) * y.std() / y_other.std() + y.mean()
-    expected = plain.predict(X)[:: -1 if form == "orders" else 1]
-    assert_allclose(predicted, expected, atol=1e-5 * y.std())
+    predicted = 1e3 * (found.predict(X_other) - 4.0)
+    assert_allclose(predicted, plain.predict(X)[::-1], atol=1e-5 * y.std())
 
 
 @pytest.mark.parametrize("partition", ["grid", "scattered"])

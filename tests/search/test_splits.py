@@ -6,12 +6,9 @@ from numpy.testing import assert_allclose
 
 from skanfis.antecedent import TreeAntecedent
 from skanfis.antecedent.tree import CRISP, LEAST_WIDTH
-from skanfis.learning.data import StandardisedData
-from skanfis.learning.objective import SeparableProblem
-from skanfis.learning.premise import Premise
-from skanfis.search import tuning
-from skanfis.search.sample import search_sample
 from skanfis.search.splits import _scored, best_splits
+
+from .test_candidates import sample_of, solved
 
 pytestmark = pytest.mark.theory
 
@@ -20,10 +17,7 @@ NOTHING = TreeAntecedent.build([], [[], []], [[]])
 
 def model_of(X, y, antecedent=NOTHING, weight=None):
     """A tree with its consequents, before its cuts move."""
-    rows = search_sample(StandardisedData.of(X, y.reshape(len(X), -1), weight), 20_000)
-    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
-    premise = Premise.of(antecedent, *rows.inputs.box)
-    return tuning.tune(problem, premise, ["slope"], rows.sample_weight.sum(), turns=0)
+    return solved(sample_of(X, y, weight), antecedent)
 
 
 @pytest.mark.parametrize("n_outputs", [1, 2])

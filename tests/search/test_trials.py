@@ -13,7 +13,8 @@ from skanfis.membership import Gaussian
 from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
-from skanfis.search.trials import _ROWS_EACH, FEWEST_ROWS, Plan, Trials
+from skanfis.search.trials import _ROWS_EACH, FEWEST_ROWS, Trials
+from skanfis.training.settings import structure_request
 
 from .. import oracles
 
@@ -21,17 +22,9 @@ pytestmark = pytest.mark.theory
 
 
 def plan_of(n_inputs, n_all, weights=(), order=1, max_rules=None):
-    every = np.arange(n_inputs)
-    return Plan(
-        families=[Gaussian] * n_inputs,
-        order=order,
-        premise_inputs=every,
-        consequent_inputs=every if order else every[:0],
-        weights=dict(weights),
-        seed=0,
-        max_rules=max_rules,
-        n_all=n_all,
-    )
+    names = [f"x{j}" for j in range(n_inputs)]
+    request = structure_request(ANFISRegressor(order=order, max_rules=max_rules), names)
+    return replace(request, weights=dict(weights), n_all=n_all)
 
 
 def trials_of(X, y, n_all=None, **settings):

@@ -85,6 +85,9 @@ class TestAgreement:
         assert agreement >= tuning._most_agreement(apart, left * apart.expected_error)
         # The other weights are those that the evidence found.
         assert found.penalty == replace(apart.penalty, agreement=agreement)
+        # What is given or leaves nothing is not changed.
+        assert tuning.with_most_agreement(apart, premise, FREE[1:], left) is apart
+        assert tuning.with_most_agreement(apart, premise, FREE, 1.0) is apart
 
     def test_consequents_alone_are_followed_to_the_limit(self, two_rules):
         apart = tuning.tune(*two_rules, FREE, 100.0)
@@ -94,12 +97,6 @@ class TestAgreement:
         assert with_agreement(apart, agreement).expected_error <= most
         assert with_agreement(apart, 1.1 * agreement).expected_error > most
         assert_allclose(tuning._most_agreement(apart, np.inf), 1.0, rtol=0.05)
-
-    def test_what_is_given_or_leaves_nothing_is_not_changed(self, two_rules):
-        problem, premise = two_rules
-        apart = tuning.tune(problem, premise, FREE, 100.0)
-        assert tuning.with_most_agreement(apart, premise, FREE[1:], 2.0) is apart
-        assert tuning.with_most_agreement(apart, premise, FREE, 1.0) is apart
 
 
 def test_agreement_is_not_raised_where_the_error_is_not_known():

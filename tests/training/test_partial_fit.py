@@ -1,9 +1,9 @@
 """Rows in chunks make the model that one least-squares fit of all rows makes."""
 
 import pickle
-import warnings
 from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -53,6 +53,10 @@ def premises():
     return quick([3, 2], **GIVEN).fit(*surface(seed=1))
 
 
+def chunk(premises, **settings):
+    return ANFISRegressor(partition=premises, solver="lse", **settings)
+
+
 def in_chunks(model, X, y, sizes, weight=None, **options):
     start = 0
     for size in sizes:
@@ -82,17 +86,17 @@ def tolerance(one, other):
 @pytest.fixture(scope="module", params=KINDS)
 def whole_and_settings(request, premises):
     """One fit of all rows."""
-    settings = {"partition": premises, "solver": "lse", **KINDS[request.param]}
-    return ANFISRegressor(**settings).fit(*surface()), settings
+    settings = KINDS[request.param]
+    return chunk(premises, **settings).fit(*surface()), settings
 
 
 @pytest.mark.parametrize("chunking", CHUNKINGS)
-def test_any_chunks_equal_one_fit(whole_and_settings, chunking):
+def test_any_chunks_equal_one_fit(premises, whole_and_settings, chunking):
     """But for the penalty's extents, which are about the rules' centres in the first model."""
     X, y = surface()
     whole, settings = whole_and_settings
-    model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS[chunking])
-    once = ANFISRegressor(**settings).partial_fit(X, y)
+    model = in_chunks(chunk(premises, **settings), X, y, CHUNKINGS[chunking])
+    once = chunk(premises, **settings).partial_fit(X, y)
     assert weights_of(model) == pytest.approx(weights_of(once), rel=0.01)
     assert "alpha" not in settings or weights_of(model) == weights_of(once)
     assert difference(model, once, X) < tolerance(model, once)
@@ -117,23 +121,21 @@ def test_any_chunks_equal_one_fit(whole_and_settings, chunking):
 def test_weights_zeros_and_several_outputs(premises):
     X, y = surface(n_outputs=2)
     weight = np.random.default_rng(3).integers(0, 4, len(X)).astype(float)
-    settings = {"partition": premises, "solver": "lse"}
-    whole = ANFISRegressor(**settings).partial_fit(X, y, weight)
-    model = in_chunks(ANFISRegressor(**settings), X, y, CHUNKINGS["uneven"], weight)
+    whole = chunk(premises).partial_fit(X, y, weight)
+    model = in_chunks(chunk(premises), X, y, CHUNKINGS["uneven"], weight)
     assert difference(model, whole, X) < EXACT
     repeated = np.repeat(np.arange(len(X)), weight.astype(int))
-    again = ANFISRegressor(**settings).partial_fit(X[repeated], y[repeated])
+    again = chunk(premises).partial_fit(X[repeated], y[repeated])
     assert difference(model, again, X) < EXACT
     assert model.n_samples_seen_ == np.count_nonzero(weight)
 
 
 def test_forgetting_is_a_fit_with_fading_weights(premises):
     X, y = surface()
-    factor = 0.98
-    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.0}
-    whole = ANFISRegressor(**settings).fit(X, y, factor ** np.arange(299.0, -1.0, -1.0))
+    new = partial(chunk, premises, agreement=0.01, alpha=0.0)
+    whole = new().fit(X, y, 0.98 ** np.arange(299.0, -1.0, -1.0))
     for sizes in ([300], [1] * 20 + [280], [100, 200]):
-        model = in_chunks(ANFISRegressor(**settings), X, y, sizes, forgetting=factor)
+        model = in_chunks(new(), X, y, sizes, forgetting=0.98)
         assert difference(model, whole, X) < EXACT
     assert model.noise_std_ > 0.0
 
@@ -143,9 +145,9 @@ def test_drift_of_inputs_costs_no_digits(premises):
     X, y = surface()
     near = X.copy()
     near[:150, 0] = 0.0 + 1e-4 * np.arange(150)
-    settings = {"partition": premises, "solver": "lse", "agreement": 0.01, "alpha": 0.01}
-    whole = ANFISRegressor(**settings).partial_fit(near, y)
-    model = in_chunks(ANFISRegressor(**settings), near, y, [150, 150])
+    new = partial(chunk, premises, agreement=0.01, alpha=0.01)
+    whole = new().partial_fit(near, y)
+    model = in_chunks(new(), near, y, [150, 150])
     assert difference(model, whole, near) < EXACT
 
 
@@ -195,10 +197,9 @@ def test_noise_of_one_rule_is_that_of_a_line():
 
 def test_merged_equals_all_rows(premises):
     X, y = surface()
-    settings = {"partition": premises, "solver": "lse"}
-    whole = ANFISRegressor(**settings).partial_fit(X, y)
+    whole = chunk(premises).partial_fit(X, y)
     parts = [slice(0, 90), slice(90, 91), slice(91, 300)]
-    models = [ANFISRegressor(**settings).partial_fit(X[part], y[part]) for part in parts]
+    models = [chunk(premises).partial_fit(X[part], y[part]) for part in parts]
     before = models[0].predict(X[:90])
     for order in ([0, 1, 2], [2, 0, 1]):
         first, *others = (models[i] for i in order)
@@ -214,28 +215,26 @@ def test_chunks_forget_what_the_premises_were_known_to_rise_with():
     X = np.random.default_rng(0).uniform(-1.0, 1.0, (200, 2))
     y = X[:, 0] + np.tanh(3.0 * X[:, 0]) * (1.5 + X[:, 1])
     known = ANFISRegressor(n_mfs=2, monotonic_cst=[1, 0]).fit(X, y)
-    settings = {"partition": known, "solver": "lse", "alpha": 0.0, "agreement": 0.0}
-    whole, chunks = ANFISRegressor(**settings).fit(X, y), ANFISRegressor(**settings)
-    chunks.partial_fit(X[:100], y[:100]).partial_fit(X[100:], y[100:])
+    free = partial(chunk, known, alpha=0.0, agreement=0.0)
+    whole, chunks = free().fit(X, y), in_chunks(free(), X, y, [100, 100])
     beyond = X[:50] + np.sign(X[:50])
-    with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
-        assert np.allclose(chunks.predict(beyond), whole.predict(beyond), atol=1e-9)
+    assert np.allclose(chunks.predict(beyond), whole.predict(beyond), atol=1e-9)
     with pytest.raises(AttributeError, match="has no attribute 'merge'"):
         chunks.set_params(monotonic_cst=[1, 0]).merge(chunks)
 
 
 def test_merge_says_how_premises_differ(premises):
     X, y = surface()
-    model = ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y)
+    model = chunk(premises).partial_fit(X, y)
     other = ANFISRegressor(n_mfs=[3, 2], solver="lse").partial_fit(X[:100], y[:100])
     with pytest.raises(ValueError, match=r"term 0, 'low' of 'x0', has center .* in one and"):
         model.merge(other)
     with pytest.raises(ValueError, match="6 and 4 rules"):
         model.merge(ANFISRegressor(n_mfs=2, solver="lse").partial_fit(X, y))
     with pytest.raises(ValueError, match="linear in x0, x1 and in none"):
-        model.merge(ANFISRegressor(partition=premises, solver="lse", order=0).partial_fit(X, y))
+        model.merge(chunk(premises, order=0).partial_fit(X, y))
     frame = pd.DataFrame(X, columns=["a", "b"])
-    named = ANFISRegressor(partition=premises, solver="lse").partial_fit(frame, y)
+    named = chunk(premises).partial_fit(frame, y)
     with pytest.raises(ValueError, match="inputs are x0, x1 and a, b"):
         model.merge(named)
     with pytest.raises(ValueError, match="Model 1 of merge has not been trained by partial_fit"):
@@ -244,7 +243,7 @@ def test_merge_says_how_premises_differ(premises):
 
 def test_state_survives_a_file_and_not_a_clone(premises):
     X, y = surface()
-    model = ANFISRegressor(partition=premises, solver="lse").partial_fit(X[:200], y[:200])
+    model = chunk(premises).partial_fit(X[:200], y[:200])
     loaded = pickle.loads(pickle.dumps(model))
     for one in (model, loaded):
         one.partial_fit(X[200:], y[200:])
@@ -273,7 +272,7 @@ def test_rows_far_beyond_the_premises_are_refused_by_name(premises):
 
 def test_unseen_ranges_are_flagged_until_they_are_seen(premises):
     X, y = surface()
-    model = ANFISRegressor(partition=premises, solver="lse").partial_fit(X, y)
+    model = chunk(premises).partial_fit(X, y)
     beyond = np.add(X[:1], [900.0, 0.0])
     assert not model.in_bounds(beyond)[0]
     assert model.coverage(beyond)[0] < 0.1
@@ -281,10 +280,6 @@ def test_unseen_ranges_are_flagged_until_they_are_seen(premises):
     model.partial_fit(rows, np.full(40, y[0]))
     assert model.in_bounds(beyond)[0]
     assert model.coverage(beyond)[0] > 0.9
-
-
-def chunk(premises, **settings):
-    return ANFISRegressor(partition=premises, solver="lse", **settings)
 
 
 @pytest.mark.parametrize("forgetting", [0.0, 1.01, np.nan, "0.9", True, None])

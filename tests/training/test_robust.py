@@ -60,7 +60,9 @@ def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
     assert_allclose(model.robust_weights_, weights, rtol=1e-5, atol=1e-8)
 
 
-@pytest.mark.parametrize("settings", [{}, {"partition": FuzzyCMeans(6, random_state=0)}])
+@pytest.mark.parametrize(
+    "settings", [{"max_rules": 6}, {"partition": FuzzyCMeans(6, random_state=0)}]
+)
 def test_outliers_do_little(settings):
     X, y, truth, is_outlier = with_outliers()
     error = {}

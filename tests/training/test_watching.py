@@ -93,28 +93,21 @@ def test_verbose_writes_a_line_per_iteration(capsys):
 
 @needs_callbacks
 class TestCallbacks:
-    def test_every_iteration_is_told_with_a_usable_model(self):
-        seen = Recorder()
-        model = quick(n_mfs=3).set_callbacks(seen).fit(X, Y)
+    def test_every_iteration_is_told_with_a_usable_model_and_none_changes_it(self):
+        seen, weight = Recorder(), np.full(len(Y), 2.0)
+        model = quick(n_mfs=3).set_callbacks(seen).fit(X, Y, sample_weight=weight)
         assert seen.tasks == ["iteration"] * model.n_iter_ + ["fit"]
         assert_allclose(seen.errors[:-1], model.loss_curve_[1:], rtol=1e-6)
         assert seen.max_subtasks == 500
         assert seen.torn_down
+        assert_array_equal(seen.metadata["sample_weight"], 2.0)
+        plain = quick(n_mfs=3).fit(X, Y, sample_weight=weight)
+        assert_array_equal(plain.predict(X), model.predict(X))
 
     def test_wish_to_stop_is_honoured(self):
         model = quick(n_mfs=3).set_callbacks(Recorder(most=1)).fit(X, Y)
         assert model.n_iter_ == 1
         assert "callback asked for the end" in model.status_
-
-    def test_weights_are_passed_on(self):
-        seen = Recorder()
-        quick().set_callbacks(seen).fit(X, Y, sample_weight=np.full(len(Y), 2.0))
-        assert_array_equal(seen.metadata["sample_weight"], 2.0)
-
-    def test_they_do_not_change_the_model(self):
-        plain = quick(n_mfs=3).fit(X, Y)
-        watched = quick(n_mfs=3).set_callbacks(Recorder()).fit(X, Y)
-        assert_array_equal(plain.predict(X), watched.predict(X))
 
     def test_they_are_torn_down_where_fit_fails(self):
         seen = Recorder()
@@ -123,7 +116,6 @@ class TestCallbacks:
             model.fit(np.full((5, 1), np.nan), np.arange(5.0))
         assert seen.torn_down
 
-    @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
     def test_those_of_scikit_learn_work_through_searches(self, capsys):
         from sklearn.callback import ProgressBar, ScoringMonitor
 
@@ -142,20 +134,15 @@ class TestCallbacks:
         assert np.isfinite(search.best_score_)
 
 
-def interrupt_after(monkeypatch, n_iter):
-    """Ctrl-C at the end of an iteration, as a terminal would send it."""
+def test_an_estimator_that_is_interrupted_is_as_before(monkeypatch):
+    """By Ctrl-C at the end of an iteration, as a terminal would send it."""
 
     def interrupt(self, iteration, evaluation):
-        if iteration == n_iter:
-            raise KeyboardInterrupt
+        raise KeyboardInterrupt
 
-    monkeypatch.setattr(watching.Printer, "__call__", interrupt)
-
-
-def test_an_estimator_that_is_interrupted_is_as_before(monkeypatch):
     model = quick(verbose=True).fit(X, Y)
     before = model.predict(X)
-    interrupt_after(monkeypatch, 1)
+    monkeypatch.setattr(watching.Printer, "__call__", interrupt)
     with pytest.raises(KeyboardInterrupt):
         model.set_params(n_mfs=3).fit(X, Y)
     assert_array_equal(model.predict(X), before)
@@ -180,10 +167,9 @@ def test_callbacks_are_given_the_data_as_they_were_given(settings):
     assert all(seen.tasks)
 
 
-SETTINGS = {"early_stopping": True}
 # Weights that let rules learn the noise.
 FREE = {"agreement": 0.0, "alpha": 1e-6, "solver": VariableProjection(stiffness=0.0)}
-LOOSE = FREE | SETTINGS
+LOOSE = FREE | {"early_stopping": True}
 
 
 def overfitting(n_rows=150, seed=0):
