@@ -16,7 +16,7 @@ from ..learning.data import StandardisedData
 from .sample import DIGITS, search_sample
 
 # Folds, and rows that are enough to judge on.
-_FOLDS, _ENOUGH = 5, 200
+FOLDS, _ENOUGH = 5, 200
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
@@ -31,9 +31,9 @@ def dealt_rows(rows: StandardisedData) -> StandardisedData:
 
 def folds(rows: StandardisedData):
     """Positions of the other rows and of its own, of every fold; whole groups, if there are any."""
-    every, n_folds, groups = np.arange(rows.n_rows), min(_FOLDS, rows.n_rows), rows.groups
+    every, n_folds, groups = np.arange(rows.n_rows), min(FOLDS, rows.n_rows), rows.groups
     if groups is not None and np.unique(groups).size > 1:
-        n_folds = min(_FOLDS, np.unique(groups).size)
+        n_folds = min(FOLDS, np.unique(groups).size)
         return list(GroupKFold(n_folds).split(rows.X, groups=groups))
     return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
 
@@ -48,7 +48,7 @@ def splits(rows: StandardisedData):
         return [(every, every)]
     found = folds(rows)
     if rows.groups is None or np.unique(rows.groups).size == 1:
-        if n_rows >= _FOLDS * _ENOUGH:
+        if n_rows >= FOLDS * _ENOUGH:
             found = [(every[1::2], every[::2])]
         found = found[: int(np.ceil(len(found) * _ENOUGH / n_rows))]
     return [(grow, _in_range(rows.X, grow, judge)) for grow, judge in found]

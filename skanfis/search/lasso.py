@@ -13,7 +13,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Lasso, LassoCV
 
 from ..learning.data import StandardisedData
-from .judging import folds
+from .judging import FOLDS, folds
 
 # The least penalty that is tried, over that at which there are no slopes. Less is hardly ever
 # chosen, and takes most of the time where columns go together.
@@ -22,7 +22,7 @@ _LEAST_PENALTY = 0.01
 
 def lasso_inputs(rows: StandardisedData, inputs):
     """Those of some inputs by which the lasso has slopes, for any output."""
-    if rows.n_rows == 1:
+    if rows.n_rows < FOLDS:
         return inputs
     X, weight, has_slope = rows.X[:, inputs], rows.weights, np.zeros(inputs.size, dtype=bool)
     parts = folds(rows)

@@ -50,7 +50,7 @@ def test_of_some_inputs_those_of_every_output_are_kept(rng):
     assert {3, 5} <= set(found)
     assert found.size <= 6
     assert lasso_inputs(rows_of(X, np.ones(50)), np.arange(40)).size == 0
-    assert_array_equal(lasso_inputs(rows_of(X[:1], y[:1]), np.arange(40)), np.arange(40))
+    assert_array_equal(lasso_inputs(rows_of(X[:4], y[:4]), np.arange(40)), np.arange(40))
 
 
 def test_runs_are_left_out_whole(rng):
