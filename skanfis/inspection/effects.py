@@ -227,11 +227,15 @@ class Study:
         rows = None if X is None else np.clip(read(X), model.minimum, model.maximum)
         if groups and rows is None:
             raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
+        if not isinstance(groups, Mapping | None):
+            raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
         found: dict[str, tuple[int, ...]] = {}
         for name, (column, _) in read.levels.items():
             found[column] = (*found.get(column, ()), model.input_names.index(name))
         found = {column: inputs for column, inputs in found.items() if len(inputs) > 1}
         for label, columns in (groups or {}).items():
+            if isinstance(columns, str) or not len(columns):
+                raise ValueError(f"groups[{label!r}] is {columns!r}: a list of columns is needed.")
             own = {_position(column, model.input_names) for column in columns}
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
                 if not own >= set(found.pop(other)):

@@ -137,21 +137,37 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
         assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
 
 
-def test_groups_enter_as_one():
+@pytest.fixture(scope="module")
+def of_indicators():
+    """A model of a rate and a column for each fibre, and its rows."""
     X, y = categories()
     X = pd.concat([X[["rate"]], pd.get_dummies(X["fibre"], dtype=float)], axis=1)
-    model = quick(n_mfs=[1, 2, 1, 1]).fit(X, y)
+    return quick(n_mfs=[1, 2, 1, 1]).fit(X, y), X
+
+
+def test_groups_enter_as_one(of_indicators):
+    model, X = of_indicators
     found = effects(model, X, groups={"fibre": ["a", "b", "c"]}).table
     assert list(found.index[:2]) in (["rate", "fibre"], ["fibre", "rate"])
     assert_allclose(found.sum(), 1.0)
     with pytest.raises(ValueError, match="groups takes X"):
         effects(model, groups={"fibre": ["a", "b", "c"]})
-    with pytest.raises(ValueError, match="'d' is no input"):
-        effects(model, X, groups={"fibre": ["a", "d"]})
-    with pytest.raises(ValueError, match="some columns of 'one', not all"):
-        effects(model, X, groups={"one": ["a", "b"], "two": ["b", "c"]})
-    with pytest.raises(ValueError, match="called as a column"):
-        effects(model, X, groups={"rate": ["a", "b"]})
+
+
+@pytest.mark.parametrize(
+    ("groups", "match"),
+    [
+        ({"fibre": ["a", "d"]}, "'d' is no input"),
+        ({"one": ["a", "b"], "two": ["b", "c"]}, "some columns of 'one', not all"),
+        ({"rate": ["a", "b"]}, "called as a column"),
+        ({"fibre": "a"}, r"groups\['fibre'\] is 'a': a list of columns is needed"),
+        ({"fibre": []}, "a list of columns is needed"),
+        (["a", "b"], "must be a dict"),
+    ],
+)
+def test_groups_that_are_none_are_refused(of_indicators, groups, match):
+    with pytest.raises(ValueError, match=match):
+        effects(*of_indicators, groups=groups)
 
 
 def test_what_is_held_is_told():
