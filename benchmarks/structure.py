@@ -10,6 +10,7 @@ below a fiftieth of the target's deviation count as that.
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from sklearn.base import clone
@@ -230,7 +231,13 @@ def measure(case, options):
 def _loaded(case):
     if case.kind == "real set":
         return real_sets.load(next(one for one in real_sets.SETS if one.name == case.name))
-    return next((X, y) for name, X, y in part(0) if name == case.name)
+    return tables()[case.name]
+
+
+@cache
+def tables():
+    """X and y by name; to read all takes some seconds."""
+    return {name: (X, y) for name, X, y in part(0)}
 
 
 def cases():
@@ -241,11 +248,11 @@ def cases():
     yield from (Case("weak", "wave", 5000, noise) for noise in (3.0, 4.4, 7.0))
     yield from (Case("Friedman", "Friedman", n, 0.2) for n in (500, 1000))
     yield from (Case("real set", one.name) for one in real_sets.SETS)
-    yield from (Case("table", name) for name, _, _ in part(0))
+    yield from (Case("table", name) for name in tables())
     yield from (Case("formula", name, n, 0.01) for n in (150, 600) for name in FORMULAS)
     yield from (
         Case("few rows", name, int(each * X.shape[1]))
-        for name, X, y in part(0)
+        for name, (X, y) in tables().items()
         if X.shape[1] >= _MANY_COLUMNS and len(y) >= 60 + (2 + _FEW[-1]) * X.shape[1]
         for each in _FEW
     )
