@@ -118,6 +118,8 @@ def test_outputs_are_held_between_limits(dtype, std, tmp_path):
     held = np.clip(expected, *limits.T)
     assert (np.abs(found - held) <= 1e-5 * np.abs(expected).max(axis=0)).all()
     assert np.mean(found != free) > 0.4
+    # These hold a fault too, which without them is seen.
+    assert ["!(y[o] >=" in code.source for code in codes] == [False, True, True]
     # They stand in the place of those by which outputs are held without them.
     assert codes[1].cost.table_bytes == codes[0].cost.table_bytes
     # Proven limits change nothing in the box, but for their own rounding.

@@ -103,6 +103,9 @@ class Source:
             "moves": moves,
             "beyond": linear or (covers and answers),
             "held": self.held is not None,
+            # Limits that were asked for hold what is no number, too; others leave a fault visible.
+            "asked": self.limits is not None,
+            "told": self.held is not None and self.limits is None,
         }
         return {fact for fact, holds in facts.items() if holds}
 

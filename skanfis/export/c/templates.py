@@ -304,8 +304,9 @@ covers|    }
       |    /* Last, so that y may be x. */
       |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
       |        y[o] = $name_offset[o] + sum[o];
-held  |        /* Not (y < low): NaN, of a fault, fails every comparison. */
-held  |        if (!(y[o] >= $name_output_low[o])) {
+asked |        /* Not (y < low): NaN, of a fault, fails every comparison. */
+asked |        if (!(y[o] >= $name_output_low[o])) {
+told  |        if (y[o] < $name_output_low[o]) {
 held  |            y[o] = $name_output_low[o];
 held  |        }
 held  |        if (y[o] > $name_output_high[o]) {
