@@ -27,6 +27,7 @@ from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names
 from .policies import (
+    DIGITS_OF_CASE,
     FARTHEST,
     FARTHEST_ROW,
     MAX_EXTRAPOLATION,
@@ -99,9 +100,7 @@ class TSKModel:
 
     def __post_init__(self):
         if not self.term_names:
-            object.__setattr__(
-                self, "term_names", default_term_names(self.antecedent, self.minimum, self.maximum)
-            )
+            object.__setattr__(self, "term_names", default_term_names(self))
         if not self.output_names:
             object.__setattr__(self, "output_names", default_output_names(self.n_outputs))
 
@@ -156,6 +155,22 @@ class TSKModel:
         if self.support is None:
             return np.tile(self.reference, (self.n_rules, 1))
         return np.where(self.support.share[:, None] > 0.0, self.support.center, self.reference)
+
+    @property
+    def marginals(self) -> list:
+        """Of every input, quantiles of the training rows and values next to its terms, if known."""
+        marginals = () if self.support is None else self.support.marginals
+        scales = zip(self.reference, self.spread, marginals, strict=False)
+        return [[offset + scale * z for z in values] for offset, scale, (_, *values) in scales]
+
+    @property
+    def two_valued(self) -> np.ndarray:
+        """Inputs that are 0 or 1 on all training rows, (n_inputs,); none if these are not known."""
+        found = np.zeros(self.n_inputs, dtype=bool)
+        for j, (quantiles, _) in enumerate(self.marginals):
+            if (self.minimum[j], self.maximum[j]) == (0.0, 1.0):
+                found[j] = np.isin(np.round(quantiles, DIGITS_OF_CASE), (0.0, 1.0)).all()
+        return found
 
     @property
     def output_limits(self) -> np.ndarray:
@@ -302,9 +317,12 @@ class TSKModel:
         """How far "linear" goes from the box towards each row, (n_rows, n_inputs)."""
         return self._followed(self._way(X.T, self._clip(X.T))).T
 
-    def describe_out_of_bounds(self, X) -> str:
-        """Say which inputs leave the box of the training data, in how many rows, and how far."""
-        return describe_out_of_bounds(X, self.minimum, self.maximum, self.input_names)
+    def describe_out_of_bounds(self, X, reach=0.0) -> str:
+        """Say which inputs leave the training data's box by more than a reach, where, and how far.
+
+        Empty where none does.
+        """
+        return describe_out_of_bounds(X, self.minimum, self.maximum, self.input_names, reach)
 
     def as_rule_table(self) -> Self:
         """Return the same model as rules with one term on an input, such as .fis files hold.
@@ -390,9 +408,14 @@ class TSKModel:
             reach = (FARTHEST_ROW * self.spread)[:, None]
             return np.clip(Z - nearest, -reach, reach)
 
+    @property
+    def reach(self) -> np.ndarray:
+        """How far out of the box the tangent is followed, (n_inputs,)."""
+        return self.max_extrapolation * self.spread
+
     def _followed(self, way):
         """The way out of the box, as far as the tangent is followed."""
-        reach = (self.max_extrapolation * self.spread)[:, None]
+        reach = self.reach[:, None]
         return np.clip(way, -reach, reach)
 
     def _hold(self, outputs):

@@ -43,17 +43,20 @@ _MOSTLY_TRUE, _DIGITS_OF_WIDTH = np.log(9.0), 2
 _ROUNDING, _ALIKE = 1e-6, 1e-9
 
 
-def default_term_names(antecedent, minimum, maximum, digits=_DIGITS_OF_WIDTH):
+def default_term_names(model, digits=_DIGITS_OF_WIDTH):
     """Names: of a grid by the order of its terms, else "near 21.3", unique on each input.
 
-    Of a side "> 6.8 ± 0.3", to so many digits of its width; ``minimum`` and ``maximum`` of each
-    input's data.
+    Of a side "> 6.8 ± 0.3", to so many digits of its width; of two terms of an input that is 0 or
+    1, these.
     """
+    antecedent, minimum, maximum = model.antecedent, model.minimum, model.maximum
     inputs, places = antecedent.term_inputs, antecedent.term_places
     names = np.empty(inputs.size, dtype=object)
     for j in np.unique(inputs):
         own = np.flatnonzero(inputs == j)
-        if antecedent.grid_counts is not None:
+        if antecedent.grid_counts is not None and own.size == 2 and model.two_valued[j]:
+            names[own] = "0", "1"
+        elif antecedent.grid_counts is not None:
             numbered = [f"level {k + 1}" for k in range(own.size)]
             names[own] = LINGUISTIC.get(own.size, numbered)
         else:
@@ -127,7 +130,7 @@ def default_output_names(n_outputs):
 def given_term_names(model, names):
     """The user's names, one per term, of every input or by input; ValueError if they do not fit."""
     antecedent, input_names = model.antecedent, model.input_names
-    found = list(default_term_names(antecedent, model.minimum, model.maximum))
+    found = list(default_term_names(model))
     if isinstance(names, Mapping):
         unknown = [key for key in names if key not in input_names]
         if unknown:

@@ -7,6 +7,7 @@ from numbers import Real
 import numpy as np
 
 __all__ = [
+    "DIGITS_OF_CASE",
     "FARTHEST",
     "FARTHEST_ROW",
     "MAX_EXTRAPOLATION",
@@ -31,6 +32,8 @@ MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 FARTHEST_ROW = 1e100
 # More than these tell no two doubles apart, and give back no other double.
 MOST_DIGITS = 17
+# As rounding leaves a 0 or a 1.
+DIGITS_OF_CASE = 6
 # What a prediction may have beyond the range of the target: of a line so many standard deviations
 # at least, whatever the limit of inputs; of rules that bend, for peaks between rows, this part of
 # the range.
@@ -101,18 +104,21 @@ def check_policy(policy, max_extrapolation):
         )
 
 
-def describe_out_of_bounds(X, minimum, maximum, names) -> str:
-    """Say which columns of X leave their range, in how many rows, and how far."""
+def describe_out_of_bounds(X, minimum, maximum, names, reach=0.0) -> str:
+    """Say which columns of X leave their range by more than a reach, in how many rows, and how far.
+
+    Empty where none does.
+    """
+    outside = (np.subtract(minimum, reach) > X) | (np.add(maximum, reach) < X)
     parts = []
-    for column, low, high, name in zip(X.T, minimum, maximum, names, strict=True):
-        outside = (column < low) | (column > high)
-        if outside.any():
-            ends = told_apart([low, high, column.min(), column.max()], "{:.{}g}".format, 6)
-            parts.append(
-                f"{name!r} in {outside.sum()} of {column.size} rows (trained on "
-                f"[{ends[0]}, {ends[1]}], found [{ends[2]}, {ends[3]}])"
-            )
-    return "X lies outside the training data: " + "; ".join(parts) + "."
+    for j in np.flatnonzero(outside.any(axis=0)):
+        ends = [minimum[j], maximum[j], X[:, j].min(), X[:, j].max()]
+        low, high, least, most = told_apart(ends, "{:.{}g}".format, 6)
+        parts.append(
+            f"{names[j]!r} in {outside[:, j].sum()} of {len(X)} rows (trained on [{low}, {high}], "
+            f"found [{least}, {most}])"
+        )
+    return f"X lies outside the training data: {'; '.join(parts)}." if parts else ""
 
 
 def told_apart(values, write, fewest):

@@ -20,9 +20,9 @@ def grid(*counts):
     return oracles.random_grid(np.random.default_rng(0), [Gaussian] * len(counts), counts)
 
 
-def model(antecedent):
-    """What given names are held against."""
-    box = {"minimum": BOX[0], "maximum": BOX[1]}
+def model(antecedent, box=BOX, two_valued=(False, False, False)):
+    """What names are made of, and given ones held against."""
+    box = {"minimum": box[0], "maximum": box[1], "two_valued": two_valued}
     return SimpleNamespace(antecedent=antecedent, input_names=INPUTS, **box)
 
 
@@ -42,7 +42,12 @@ def scattered(centers):
     ],
 )
 def test_terms_of_a_grid_are_named_by_their_order(counts, names):
-    assert default_term_names(grid(*counts), *BOX) == names
+    assert default_term_names(model(grid(*counts))) == names
+
+
+def test_two_terms_of_an_input_that_is_0_or_1_are_called_so():
+    both = model(grid(2, 3, 2), two_valued=[True, True, False])
+    assert default_term_names(both) == ("0", "1", "low", "medium", "high", "low", "high")
 
 
 @pytest.mark.parametrize(
@@ -57,7 +62,7 @@ def test_terms_of_a_grid_are_named_by_their_order(counts, names):
     ],
 )
 def test_other_terms_are_named_by_where_they_stand(places, names):
-    found = default_term_names(scattered(np.transpose([places])), *BOX)
+    found = default_term_names(model(scattered(np.transpose([places]))))
     assert found == tuple(f"near {name}" for name in names)
 
 
@@ -103,13 +108,13 @@ def tree(*cuts):
 )
 def test_a_side_has_the_digits_that_matter_over_its_width(cut, half, name):
     box = np.array([[-2e6], [3e6]])
-    assert default_term_names(tree((0, cut, half)), *box) == (f"> {name}", f"< {name}")
+    assert default_term_names(model(tree((0, cut, half)), box)) == (f"> {name}", f"< {name}")
 
 
 def test_cuts_that_differ_are_told_apart_and_equal_ones_are_not():
-    names = default_term_names(tree((0, 1.001, 0.3), (1, 2.0, 0.3), (0, 1.002, 0.3)), *BOX)
+    names = default_term_names(model(tree((0, 1.001, 0.3), (1, 2.0, 0.3), (0, 1.002, 0.3))))
     assert names[:3] == ("> 1.001 ± 0.3", "> 2 ± 0.3", "> 1.002 ± 0.3")
-    names = default_term_names(tree((0, 1.0, 0.3), (1, 2.0, 0.3), (0, 1.0, 0.3)), *BOX)
+    names = default_term_names(model(tree((0, 1.0, 0.3), (1, 2.0, 0.3), (0, 1.0, 0.3))))
     assert names[3:] == ("< 1 ± 0.3", "< 2 ± 0.3", "< 1 ± 0.3")
 
 
@@ -117,8 +122,8 @@ def test_a_cut_between_two_values_has_no_width():
     box = np.array([[0.0, 2.0, 0.0], [1.0, 5.0, 1.0]])
     crisp = 0.5 / CRISP * np.log(9.0)
     found = tree((0, 0.5, crisp), (1, 3.5, 3.0 * crisp), (2, 0.4, 0.1))
-    assert default_term_names(found, *box)[:3] == ("1", "> 3.5", "> 0.4 ± 0.1")
-    assert default_term_names(found, *box)[3:] == ("0", "< 3.5", "< 0.4 ± 0.1")
+    assert default_term_names(model(found, box))[:3] == ("1", "> 3.5", "> 0.4 ± 0.1")
+    assert default_term_names(model(found, box))[3:] == ("0", "< 3.5", "< 0.4 ± 0.1")
     # In its middle, whatever rounding has left of that.
     box = np.array([[-1.0], [1.0]])
-    assert default_term_names(tree((0, -3e-17, 2.0 * crisp)), *box) == ("> 0", "< 0")
+    assert default_term_names(model(tree((0, -3e-17, 2.0 * crisp)), box)) == ("> 0", "< 0")

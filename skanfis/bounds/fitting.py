@@ -35,6 +35,8 @@ _DEAR, _FAR = 1.02**2, 1.1**2
 # Halvings of the way; boxes of each proof, and of all on the way to the nearest (fewer where there
 # are more terms than so many).
 _HALVINGS, _MOST_BOXES, _ALL_BOXES, _TERMS = 6, 3000, 10_000, 20
+# Standard deviations of the target that rounding may leave between a fixed point and a prediction.
+_OFF = 1e-8
 # Points that are added at once, the worst of many; and what is kept at them, in standard deviations
 # of the target, and of the input.
 _POINTS_A_ROUND, _MARGIN = 20, 0.01
@@ -212,8 +214,10 @@ class _ConstrainedFit:
 
     def _is_certified(self, ordered):
         model, constraints = self._model(ordered.local, ordered.is_line), self.constraints
+        at_points = model.with_out_of_bounds(*self.policy).predict(constraints.points)
+        off = np.abs(at_points - constraints.values) / self.problem.rows.targets.scale
         limits = zip(constraints.lower, constraints.upper, strict=True)
-        return all(
+        return (off <= _OFF).all() and all(
             is_in_order(model, k, signs, of_output)
             for k, (signs, of_output) in enumerate(zip(constraints.signs, limits, strict=True))
         )

@@ -221,7 +221,8 @@ def _table_rates(max_rate, rates):
 
 
 def _ambient_range(given):
-    if np.shape(given) != (2,) or not _COLDEST <= given[0] <= given[1] <= _HOTTEST:
+    is_pair = np.shape(given) == (2,) and all(isinstance(end, Real) for end in given)
+    if not is_pair or not _COLDEST <= given[0] <= given[1] <= _HOTTEST:
         raise ValueError(
             f"ambient_range={given!r} must be two temperatures that do not fall, from {_COLDEST:g} "
             f"or more to {_HOTTEST:g} degC or less."

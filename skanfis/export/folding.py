@@ -394,14 +394,10 @@ def _with_raw_inputs(model, columns, order):
         posterior=posterior and posterior.change_units(model.antecedent, scale, order),
         tangent_at=at if at is None else np.clip(offset + scale * at, low, high)[order],
     )
-    if model.term_names == _default_names(model):
+    if model.term_names == default_term_names(model):
         # Scattered terms are called by where they stand, which is elsewhere in other units.
-        return replace(folded, term_names=_default_names(folded))
+        return replace(folded, term_names=default_term_names(folded))
     return folded
-
-
-def _default_names(model):
-    return default_term_names(model.antecedent, model.minimum, model.maximum)
 
 
 def _with_raw_target(model, label, transformer):

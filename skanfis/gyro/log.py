@@ -254,7 +254,9 @@ class LogFile:
                     values = table[place]
                     if part == "time" and dates:
                         values = dated(table[dates[0]], values)
-                    if part not in LABELS:
+                    if part in LABELS:
+                        values = values.str.strip()
+                    else:
                         values = pd.Series(self._numbers(values, part), table.index)
                     check_values(values, part, self._is_command)
                     columns[part].append(values)

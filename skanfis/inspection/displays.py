@@ -215,6 +215,12 @@ class ResponseSurfaceDisplay:
         both = [_position(feature, model.input_names) for feature in features]
         if both[0] == both[1]:
             raise ValueError(f"features={features!r} is the same input twice.")
+        for j in both:
+            if model.minimum[j] == model.maximum[j]:
+                raise ValueError(
+                    f"features={features!r}: {model.input_names[j]!r} has one value, "
+                    f"{model.minimum[j]:g}. Name two inputs that vary."
+                )
         k = _position(output, model.output_names, "output")
         (xx0, xx1), rows, others = _section(model, both, grid_resolution, held)
         coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)

@@ -21,14 +21,12 @@ import numpy as np
 from ..antecedent.tree import CRISP
 from ..model import TSKModel
 from ..naming import SIGNS, default_term_names, written_side
-from ..policies import MOST_DIGITS
+from ..policies import DIGITS_OF_CASE, MOST_DIGITS
 
 # Digits of the noise's deviation to which numbers are written.
 PRECISION = 2
 # Digits of a deviation of an input to which the places are written that slopes count from.
 _DIGITS_OF_PLACE = 2
-# As rounding leaves a 0 or a 1.
-_DIGITS_OF_CASE = 6
 # Of an output's deviation: numbers are written no finer, and so fine where the noise is not known.
 _FINEST = 1e-4
 
@@ -55,7 +53,7 @@ class Sentences:
         slopes = np.zeros((model.n_rules, model.n_inputs, model.n_outputs))
         slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
         scale, noise = _resolution(model, slopes)
-        two_valued = _two_valued(model)
+        two_valued = model.two_valued
         digits, centers = max(_DIGITS_OF_PLACE, precision), model.rule_centers
         places, common_place = (
             np.where(two_valued, np.round(np.clip(at, 0.0, 1.0)), rounded(at, model.spread, digits))
@@ -70,7 +68,7 @@ class Sentences:
         part = np.where(is_common[:, :, None], common, 0.0)
         if precision < MOST_DIGITS:
             # A case that all rows of a rule are, or none is, changes nothing there.
-            is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
+            is_fixed = two_valued & np.isin(np.round(centers, DIGITS_OF_CASE), (0.0, 1.0))
             slopes[is_fixed[:, :, None] & (common == 0.0)] = 0.0
         of_common = np.einsum("rj,rjo->ro", places - common_place, part)
         # Beside a common slope that of nothing is to be said as well.
@@ -136,33 +134,16 @@ def _resolution(model, slopes):
     return scale, np.clip(noise, _FINEST * scale, scale)
 
 
-def _two_valued(model) -> np.ndarray:
-    """Inputs that are 0 or 1 on all training rows; none where the rows are not known."""
-    found = np.zeros(model.n_inputs, dtype=bool)
-    for j, (quantiles, _) in enumerate(_seen(model)):
-        if (model.minimum[j], model.maximum[j]) == (0.0, 1.0):
-            found[j] = np.isin(np.round(quantiles, _DIGITS_OF_CASE), (0.0, 1.0)).all()
-    return found
-
-
-def _seen(model):
-    """Of every input, quantiles of the training rows and values next to its terms, if known."""
-    marginals = () if model.support is None else model.support.marginals
-    scales = zip(model.reference, model.spread, marginals, strict=False)
-    return [[offset + scale * z for z in values] for offset, scale, (_, *values) in scales]
-
-
 def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
     These are the sides of cuts; a name that somebody has given stays. Where every training row is
     on one side, to so many digits but not to all, the width is left out, and the cut is crisp.
     """
-    antecedent, box = model.antecedent, (model.minimum, model.maximum)
-    default = default_term_names(antecedent, *box)
-    of_digits = default_term_names(antecedent, *box, digits)
+    antecedent = model.antecedent
+    default, of_digits = default_term_names(model), default_term_names(model, digits)
     names, says_where = list(model.term_names), np.zeros(len(default), dtype=bool)
-    groups, start, seen = [], 0, _seen(model)
+    groups, start, seen = [], 0, model.marginals
     sure = np.log(10.0 ** max(digits, PRECISION) - 1.0) if digits < MOST_DIGITS else np.inf
     for group in antecedent.groups:
         theta = _rounded_theta(group, digits)

@@ -50,9 +50,8 @@ class StructureRequest(Plan):
             model = self.partition
             antecedent = imported_antecedent(model, rows)
             self._check_number(antecedent.n_rules)
-            default = default_term_names(model.antecedent, model.minimum, model.maximum)
             # Names that say where terms stand are made anew when these have moved.
-            names = () if model.term_names == default else model.term_names
+            names = () if model.term_names == default_term_names(model) else model.term_names
             return replace(self._tuned(antecedent, rows), term_names=names)
         return self._tuned(self._antecedent(rows), rows)
 

@@ -233,7 +233,9 @@ class _Fit:
         model = replace(model, posterior=posterior)
         assert model.support is not None
         marginals = input_marginals(rows, run.evaluation.antecedent)
-        model = replace(model, support=replace(model.support, marginals=marginals))
+        support = replace(model.support, marginals=marginals)
+        # Terms of an input that is 0 or 1 are called so, which is known from now on.
+        model = replace(model, support=support, term_names=run.start.term_names)
         model = replace(model, rows_extrapolation=extrapolation_distance(model, rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
         if weights is not None:

@@ -181,6 +181,7 @@ def test_sampling_keeps_to_the_durations_asked_for():
         ({"max_rate": 350.0}, "arcsine is not defined"),
         ({"dwell_time": 1.0}, "dwell_time=1.0 must be at least"),
         ({"ambient_range": 20.0}, "ambient_range=20.0 must be two temperatures"),
+        ({"ambient_range": ("a", "b")}, r"=\('a', 'b'\) must be two temperatures"),
         ({"ambient_range": (30.0, 20.0)}, r"=\(30.0, 20.0\) must be .* that do not fall"),
         ({"ambient_range": (-200.0, 20.0)}, "from -60 or more to 100 degC"),
         ({"max_residual_heat": 1.1}, r"in the range \[0.*, 1.*\]. Got 1.1"),

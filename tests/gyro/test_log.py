@@ -33,6 +33,8 @@ def table(folder, log, name="log.csv", **options):
     ("device", "run", "labels"),
     [
         (["a", "a", "b", "b"], [1, 2, 1, 2], ["a / 1", "a / 2", "b / 1", "b / 2"]),
+        # Blanks at their ends are none of theirs.
+        (["a", "a ", "a"], ["1 ", " 1", "2"], ["1", "1", "2"]),
         # Those that read alike are numbered.
         (["x", "x / y", "w"], ["y / z", "z", "z"], ["x / y / z", "x / y / z (2)", "w / z"]),
     ],
@@ -67,9 +69,7 @@ def test_files_that_are_refused(tmp_path, text, options, message):
         read_log(written(tmp_path, text), **options)
 
 
-@pytest.mark.parametrize(
-    "note", ['"a, b,\nc, d"', '"say ""so"", twice"', f'"{200_000 * "long, "}"']
-)
+@pytest.mark.parametrize("note", ['"a, b,\nc, d"', '"say ""so"", twice"', f'"{200_000 * "long,"}"'])
 def test_quotes_hide_separators_and_line_ends(tmp_path, note):
     text = f"note,temperature,output,rate,run\n{note},20,1,2,{note}\n\nb,21,3,4,b\n"
     read = read_log(written(tmp_path, text))

@@ -133,6 +133,13 @@ class TestSurface:
         with pytest.raises(error, match=message):
             ResponseSurfaceDisplay.from_estimator(A_GRID, **settings)
 
+    @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
+    def test_an_input_of_one_value_is_named(self):
+        x = np.linspace(0.0, 1.0, 20)
+        model = quick([2, 1]).fit(np.column_stack([x, 0.0 * x + 3.0]), x)
+        with pytest.raises(ValueError, match=r"'x1' has one value, 3\. Name two"):
+            ResponseSurfaceDisplay.from_estimator(model)
+
     def test_a_model_of_one_input_has_none(self):
         x = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
         with pytest.raises(ValueError, match="one input, and a surface takes two: plot what"):

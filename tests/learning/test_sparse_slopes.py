@@ -46,7 +46,8 @@ def posterior_of(X, y, antecedent=TREE, penalty=PENALTY):
 def test_what_it_takes_from_the_evidence_is_that_of_the_marginal_likelihood(rng, n_outputs):
     X = rng.uniform(-1.7, 1.7, (40, 3))
     y = np.column_stack([np.sin(X[:, 0]) + X[:, 1], X[:, 2]])[:, :n_outputs]
-    problem, evaluation, posterior = posterior_of(X, y + 0.1 * rng.normal(size=y.shape))
+    y += 0.1 * rng.normal(size=y.shape)
+    problem, evaluation, posterior = posterior_of(X, y)
     line, n = problem.common_line, 40
     noise = posterior.noise_variance
     prior = evaluation.normal.penalty + 1e-3 * np.outer(line.height, line.height)

@@ -13,13 +13,13 @@ from skanfis.gyro import LogError, read_log
 from skanfis.inspection.labels import as_label, printable
 
 numbers = st.floats(-1e6, 1e6, allow_subnormal=False)
-# pandas takes blanks off the left of a field, and some words for a missing value.
+# Blanks at the ends of a label are none of it, and some words are missing values.
 labels = st.text(
     st.characters(
         codec="utf-8", exclude_categories=["Cc"], include_characters="\n", exclude_characters=",;|"
     ),
     max_size=20,
-).map(lambda text: f"r{text}")
+).map(lambda text: f"r{text}".strip())
 COLUMNS = ("time", "temperature", "output", "rate")
 
 
