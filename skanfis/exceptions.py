@@ -46,10 +46,9 @@ class InfeasibleConstraintsError(ValueError):
 
 
 class OutOfBoundsWarning(UserWarning):
-    """Rows to predict lie far outside the range of the training data, input by input.
+    """Rows to predict lie outside the range of the training data, input by input.
 
-    From ``predict`` and ``score`` with ``out_of_bounds="linear"``, of rows so far out that the
-    value is held; ``in_bounds(X)`` tells all rows outside.
+    From ``predict`` and ``score`` with ``out_of_bounds="linear"``; ``in_bounds(X)`` tells the rows.
     """
 
 

@@ -317,12 +317,9 @@ class TSKModel:
         """How far "linear" goes from the box towards each row, (n_rows, n_inputs)."""
         return self._followed(self._way(X.T, self._clip(X.T))).T
 
-    def describe_out_of_bounds(self, X, reach=0.0) -> str:
-        """Say which inputs leave the training data's box by more than a reach, where, and how far.
-
-        Empty where none does.
-        """
-        return describe_out_of_bounds(X, self.minimum, self.maximum, self.input_names, reach)
+    def describe_out_of_bounds(self, X) -> str:
+        """Say which inputs leave the box of the training data, in how many rows, and how far."""
+        return describe_out_of_bounds(X, self.minimum, self.maximum, self.input_names)
 
     def as_rule_table(self) -> Self:
         """Return the same model as rules with one term on an input, such as .fis files hold.
@@ -408,14 +405,9 @@ class TSKModel:
             reach = (FARTHEST_ROW * self.spread)[:, None]
             return np.clip(Z - nearest, -reach, reach)
 
-    @property
-    def reach(self) -> np.ndarray:
-        """How far out of the box the tangent is followed, (n_inputs,)."""
-        return self.max_extrapolation * self.spread
-
     def _followed(self, way):
         """The way out of the box, as far as the tangent is followed."""
-        reach = self.reach[:, None]
+        reach = (self.max_extrapolation * self.spread)[:, None]
         return np.clip(way, -reach, reach)
 
     def _hold(self, outputs):

@@ -104,21 +104,18 @@ def check_policy(policy, max_extrapolation):
         )
 
 
-def describe_out_of_bounds(X, minimum, maximum, names, reach=0.0) -> str:
-    """Say which columns of X leave their range by more than a reach, in how many rows, and how far.
-
-    Empty where none does.
-    """
-    outside = (np.subtract(minimum, reach) > X) | (np.add(maximum, reach) < X)
+def describe_out_of_bounds(X, minimum, maximum, names) -> str:
+    """Say which columns of X leave their range, in how many rows, and how far."""
     parts = []
-    for j in np.flatnonzero(outside.any(axis=0)):
-        ends = [minimum[j], maximum[j], X[:, j].min(), X[:, j].max()]
-        low, high, least, most = told_apart(ends, "{:.{}g}".format, 6)
-        parts.append(
-            f"{names[j]!r} in {outside[:, j].sum()} of {len(X)} rows (trained on [{low}, {high}], "
-            f"found [{least}, {most}])"
-        )
-    return f"X lies outside the training data: {'; '.join(parts)}." if parts else ""
+    for column, low, high, name in zip(X.T, minimum, maximum, names, strict=True):
+        outside = (column < low) | (column > high)
+        if outside.any():
+            ends = told_apart([low, high, column.min(), column.max()], "{:.{}g}".format, 6)
+            parts.append(
+                f"{name!r} in {outside.sum()} of {column.size} rows (trained on "
+                f"[{ends[0]}, {ends[1]}], found [{ends[2]}, {ends[3]}])"
+            )
+    return "X lies outside the training data: " + "; ".join(parts) + "."
 
 
 def told_apart(values, write, fewest):

@@ -411,17 +411,14 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Warns
         -----
         OutOfBoundsWarning
-            With ``out_of_bounds="linear"``, if rows lie so far outside the training data that the
-            value is held.
+            With ``out_of_bounds="linear"``, if rows lie outside the training data.
         """
         X = self._check_inputs(X)
         model = self.model_.with_out_of_bounds(*policy_of(self.out_of_bounds))
         inside = model.in_bounds(X)
         if model.out_of_bounds == "linear" and not inside.all():
-            told = model.describe_out_of_bounds(X, model.reach)
-            if told:
-                message = f"{told} The value is held so far out: {model.policy}."
-                warnings.warn(message, OutOfBoundsWarning, stacklevel=2)
+            message = f"{model.describe_out_of_bounds(X)} Policy: {model.policy}."
+            warnings.warn(message, OutOfBoundsWarning, stacklevel=2)
         if not return_std:
             outputs = model.predict(X, inside)
             return outputs[:, 0] if self._single_output else outputs
