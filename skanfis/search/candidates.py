@@ -37,7 +37,7 @@ class Candidate:
     inputs: tuple[int, ...] = ()  # on which these have terms
     is_grown: bool = False  # whether they go on from fewer
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
-    has_sparse_slopes: bool = False  # where the evidence asks for no more
+    slope_worth: float | None = None  # of slopes that are kept (``sparse_slopes``); None: all are
     has_all_slopes: bool = False  # also where rows are few (``lasso``)
 
     @property
@@ -72,7 +72,9 @@ class Candidate:
         elif self.n_rules == 1:
             words = "one rule"
         words += ", all slopes" if self.has_all_slopes else ""
-        return words + (", sparse slopes" if self.has_sparse_slopes else "")
+        if self.slope_worth is not None:
+            words += ", fewest slopes" if self.slope_worth else ", fewer slopes"
+        return words
 
     def with_more_terms(self, j):
         """The grid with one more term on an input."""

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_EACH
+from ..learning.sparse_slopes import SLOPE_WORTHS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, splits
 from .start import Start, started
@@ -87,11 +88,15 @@ class StructureSearch:
 
     def _judge_sparse_slopes(self, one, variance):
         """Judge a candidate with fewer slopes; it counts if there are, and its rules hold alone."""
-        in_folds = [replace(like, has_sparse_slopes=True) for like in one.in_folds]
-        simpler = self._judge(replace(one.candidate, has_sparse_slopes=True), in_folds)
-        most = tolerated(one.squared_error_of_rules, variance, self.simplicity)
-        if simpler.cost == one.cost or simpler.squared_error_of_rules > max(most, variance):
-            self.judged.remove(simpler)
+        most = max(tolerated(one.squared_error_of_rules, variance, self.simplicity), variance)
+        cost = one.cost
+        for worth in SLOPE_WORTHS:
+            in_folds = [replace(like, slope_worth=worth) for like in one.in_folds]
+            simpler = self._judge(replace(one.candidate, slope_worth=worth), in_folds)
+            if simpler.cost < cost and simpler.squared_error_of_rules <= most:
+                cost = simpler.cost
+            else:
+                self.judged.remove(simpler)
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""

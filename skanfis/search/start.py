@@ -15,6 +15,7 @@ from ..learning.evidence import ROWS_EACH
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
+from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
 from .sample import effective_weight, search_sample
@@ -96,12 +97,12 @@ def tuned_start(
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_unbounded = freed, True
-    left, simpler = 1.0, with_sparse_slopes(best, free)
-    error = min(best.expected_error, simpler.expected_error)
+    left, sparse = 1.0, [with_sparse_slopes(best, free, worth) for worth in SLOPE_WORTHS]
+    error = min(one.expected_error for one in (best, *sparse))
     if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))
         most = tolerated(error, variance, simplicity)
-        best = simpler if simpler.expected_error <= most else best
+        best = next(one for one in (*sparse[::-1], best) if one.expected_error <= most)
         left = most / best.expected_error
     return started(best, plan, left, [_as_given(best)], is_unbounded)
 

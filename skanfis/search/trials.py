@@ -180,9 +180,9 @@ class Trials:
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
         if candidate not in self._found:
-            if candidate.has_sparse_slopes:
-                trained = self.tuned(replace(candidate, has_sparse_slopes=False))
-                found = with_sparse_slopes(trained, self.plan.free)
+            if candidate.slope_worth is not None:
+                trained = self.tuned(replace(candidate, slope_worth=None))
+                found = with_sparse_slopes(trained, self.plan.free, candidate.slope_worth)
             elif candidate.n_rules == 1:
                 found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
