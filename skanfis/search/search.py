@@ -88,13 +88,14 @@ class StructureSearch:
 
     def _judge_sparse_slopes(self, one, variance):
         """Judge a candidate with fewer slopes; it counts if there are, and its rules hold alone."""
-        most = max(tolerated(one.squared_error_of_rules, variance, self.simplicity), variance)
-        cost = one.cost
+        most = max((1.0 + self.simplicity) ** 2 * one.squared_error_of_rules, variance)
+        soonest = one
         for worth in SLOPE_WORTHS:
             in_folds = [replace(like, slope_worth=worth) for like in one.in_folds]
             simpler = self._judge(replace(one.candidate, slope_worth=worth), in_folds)
-            if simpler.cost < cost and simpler.squared_error_of_rules <= most:
-                cost = simpler.cost
+            holds = simpler.cost < one.cost and simpler.squared_error_of_rules <= most
+            if holds and simpler is chosen([simpler, soonest]):
+                soonest = simpler
             else:
                 self.judged.remove(simpler)
 
