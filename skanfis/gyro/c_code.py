@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from ..exceptions import OutOfBoundsWarning
-from ..export.c import CCode, export_c
+from ..export.c import CCode
 from ..export.c.dialect import (
     LONGEST_NAME,
     Dialect,
@@ -30,26 +30,12 @@ from ..export.c.header import cost_lines, header_of, input_lines, policy_line
 from ..export.c.self_test import ROWS, TOLERANCE, self_test, size_of_sum
 from ..export.c.source import RulesPart
 from ..export.c.templates import FINITE_INPUT, rejection
-from ..export.folding import found_by_search
 from ..policies import SILENT
-from .compose import FrozenRules, Polynomial, ResidualRegressor, law_and_rules
+from .compose import Polynomial, law_and_rules
 from .physics import past_phase, phase_of
 
 _SUFFIX = "_r"
-SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
 LAW_GOES_ON = "the law goes on as it is"
-_TAKE = "y[0] is the compensated rate: take it in the place of the raw rate."
-
-# Of inputs of a compensator: units, and how they are made.
-_UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
-_NOTES = {
-    "time": "time is that since power-on: zero at the first sample.",
-    "temperature": "temperature is that of the thermometer that was logged in the calibration.",
-    "temperature_rate": "temperature_rate is low-passed, with a time constant of $lag s. At "
-    "power-on: temperature_rate = 0, previous = temperature. At every sample after that, h [s] "
-    "after the one before: temperature_rate += (1 - exp(-h / $lag)) * ((temperature - previous) / "
-    "h - temperature_rate); then previous = temperature.",
-}
 
 _CODE = """
 law   |static $real $name_polynomial(const $real *c, int n, $real t)
@@ -420,42 +406,3 @@ def _steepest(whole, y):
 def _said(part):
     """The policy of a part, where it raises that which says so row by row."""
     return "nan" if part.out_of_bounds in SILENT else part.out_of_bounds
-
-
-def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
-    """Write a GyroCompensator as C; its header says what inputs and output are, and their units."""
-    found, units = found_by_search(compensator.estimator), input_units(compensator)
-    export: Any = export_c_physics
-    if not isinstance(found, ResidualRegressor):
-        export, found = export_c, FrozenRules.of(found, len(compensator.inputs)).model
-        units[found.output_names[0]] = "deg/s"
-    assumed = [f"Unit assumed: {text}" for text in compensator.assumed.values()]
-    return export(
-        found,
-        path,
-        dtype=dtype,
-        std=std,
-        min_coverage=compensator.min_coverage,
-        units=units,
-        notes=notes_on(compensator) + assumed,
-    )
-
-
-def notes_on(compensator):
-    """What to do with the output, and how inputs are made, as sentences."""
-    use = SUBTRACT if compensator.predicts == "error" else _TAKE
-    notes = [f"{use} {raw_rate_of(compensator)}"]
-    notes += [note for name, note in _NOTES.items() if name in compensator.inputs]
-    return [note.replace("$lag", f"{compensator.time_constant:g}") for note in notes]
-
-
-def input_units(compensator):
-    """Units of the inputs of a compensator, and of the rate."""
-    return _UNITS | {"output": compensator.output_unit, "rate": "deg/s"}
-
-
-def raw_rate_of(compensator):
-    """What the raw rate is, as a sentence."""
-    factor = compensator.scale_factor
-    divided = "" if factor == 1.0 else f" divided by {factor:.9g}"
-    return f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."

@@ -30,7 +30,7 @@ from ._options import PROGRAM, check_kind, check_once, make_parser, request_of
 from ._results import Results
 from ._source import open_source
 from ._split import choose_split
-from .c_code import export_c_compensator
+from .c_compensator import export_c_compensator
 from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, specification

@@ -26,7 +26,8 @@ from ._headline import (
     written_text,
 )
 from ._simpler import NAMES, NOTHING
-from .c_code import LAW_GOES_ON, input_units, notes_on
+from .c_code import LAW_GOES_ON
+from .c_compensator import input_units, notes_on
 from .compose import rules_of
 from .displays import signs, three_digits
 from .metrics import rms

@@ -20,13 +20,10 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.export import export_c
 from skanfis.gyro import (
-    GyroCompensator,
     OpenLoopArcsineRegressor,
     ResidualRegressor,
     export_c_physics,
 )
-from skanfis.gyro.c_code import export_c_compensator
-from skanfis.gyro.compensator import features
 from skanfis.gyro.compose import law_and_rules
 from skanfis.gyro.physics import phase_of
 
@@ -228,50 +225,6 @@ def test_header_says_what_goes_in():
 def told(header):
     """The first comment of a header as one line."""
     return " ".join(header.partition("*/")[0].replace("\n *", " ").split())
-
-
-def test_header_of_a_compensator_says_units_and_how_inputs_are_made(log, tmp_path):
-    inputs = ("time", "temperature", "temperature_rate", "output")
-    X = features(log, inputs, 25.0)
-    rules = quick([1, 2, 1, 1]).fit(X, log["output"] / COUNTS - log["rate"])
-    compensator = GyroCompensator(rules, inputs, "error", COUNTS, "counts", 25.0)
-    text = told(export_c_compensator(compensator, tmp_path / "gyro", std="c89").header)
-    (time_0, *_, time_1) = sorted(X["time"])
-    for part in (
-        "subtract y[0] from the raw rate. The raw rate [deg/s] is the output of the gyro [counts] "
-        "divided by -27000.",
-        "time is that since power-on: zero at the first sample.",
-        "temperature_rate is low-passed, with a time constant of 25 s. At power-on: "
-        "temperature_rate = 0, previous = temperature.",
-        "temperature_rate += (1 - exp(-h / 25)) * ((temperature - previous) / h - "
-        "temperature_rate); then previous = temperature.",
-        f"[0] time [s]: {time_0:g} to {time_1:g}",
-        "[1] temperature [degC]: ",
-        "[2] temperature_rate [degC/s]: 0 to ",
-        "[3] output [counts]: ",
-        "[0] y [deg/s]: ",
-        "MISRA C:2012",
-    ):
-        assert part in text
-    law = OpenLoopArcsineRegressor("output", "temperature")
-    model = ResidualRegressor(law, quick([1, 1, 1, 1])).fit(X, log["rate"])
-    compensator = GyroCompensator(model, inputs, "rate", COUNTS, "counts", 25.0)
-    text = told(export_c_compensator(compensator, tmp_path / "gyro", std="c99").header)
-    assert "compensated rate: take it in the place of the raw rate" in text
-    assert "subtract" not in text
-    assert "[0] rate, in deg/s" in text
-    assert "at most: an arcsine, " in text
-
-
-def test_the_rate_of_the_temperature_is_made_as_the_header_says(log):
-    run = log[log["run"] == log["run"].min()]
-    made = features(run, ("temperature_rate",), 25.0).to_numpy()[:, 0]
-    rate, previous, by_hand = 0.0, run["temperature"].iloc[0], [0.0]
-    for h, temperature in zip(np.diff(run["time"]), run["temperature"].iloc[1:], strict=True):
-        rate += (1 - np.exp(-h / 25.0)) * ((temperature - previous) / h - rate)
-        previous = temperature
-        by_hand.append(rate)
-    np.testing.assert_allclose(made, by_hand, atol=1e-15)
 
 
 def test_law_takes_what_its_degrees_do_besides_the_rules():

@@ -11,7 +11,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator
 from skanfis.gyro._simpler import kinds, make_law
-from skanfis.gyro.c_code import export_c_compensator
+from skanfis.gyro.c_compensator import export_c_compensator
 from skanfis.gyro.compensator import as_written
 
 INPUTS = ("time", "temperature", "output")

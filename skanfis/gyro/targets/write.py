@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...export.c.dialect import write_files
-from ..c_code import SUBTRACT, input_units, raw_rate_of
+from ..c_compensator import SUBTRACT, input_units, raw_rate_of
 from ..metrics import rms
 from .autopilots import NOTES, Cubic
 from .error_model import ErrorModel, difference
