@@ -225,5 +225,6 @@ def nearest_in_order(order: RuleOrder, factor, start, to_rules, box, equal, equa
         rows = rows[:, :-1].reshape(short.size, len(to_rules)) @ to_rules
         return rows, order.pairs.least[short] + _MARGIN
 
-    least = np.full(len(slopes), _SLOPE)
+    # Slopes that are none, because the data ask for none, stay so.
+    least = _SLOPE * factor.half_solve(slopes.T).any(axis=0)
     return nearest_by_exchange(factor, start, equal, equal_to, slopes, least, violated)

@@ -210,6 +210,16 @@ def test_points_are_met_by_a_line_where_the_data_ask_for_no_slopes():
     assert held.constraints_["drawn"] == 1.0
 
 
+def test_a_known_input_that_says_nothing_is_not_read():
+    """It rises by not changing, as the free fit has it."""
+    rng = np.random.default_rng(1)
+    X = rng.uniform(size=(200, 3))
+    y = np.sin(6.0 * X[:, 0]) + 0.2 * rng.normal(size=200)
+    free, held = (ANFISRegressor(monotonic_cst=cst).fit(X, y) for cst in (None, [0, 0, 1]))
+    assert not held.consequents_[:, 3].any()
+    assert held.readability_.reading_cost == free.readability_.reading_cost
+
+
 @pytest.mark.parametrize("policy", ["linear", "clip", LinearExtrapolation(np.inf)])
 def test_points_beyond_the_range_are_met_by_the_policy(rng, policy):
     """Zero rate of a campaign that began at some: what is predicted there, not at the edge."""

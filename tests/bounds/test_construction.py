@@ -122,6 +122,23 @@ def test_what_is_in_order_rises(kind):
     assert falls > 30 or kind == "one rule"
 
 
+@pytest.mark.parametrize("kind", ["tree", "grid"])
+def test_slopes_that_are_none_stay_none_in_order(kind, rng):
+    """By an input with which predictions rise too: of the first rule, and of all."""
+    signs = np.array([1, 0])
+    antecedent = with_equal_widths(KINDS[kind](rng, 2), [0])
+    every = tuple(range(antecedent.n_rules))
+    for rules in ((0,), every):
+        penalty = Penalty(alpha=1e-3, slope=1e-3, absent=((0, rules),))
+        problem = problem_of(antecedent, rng).with_penalty(penalty)
+        evaluation = problem.evaluate(antecedent.parameters)
+        model = kept(problem, evaluation, RuleOrder.of(antecedent, signs, FREE, np.arange(2)))
+        assert is_in_order(model, 0, signs)
+        slopes = model.coefficients[:, 1, 0]
+        assert not slopes[list(rules)].any()
+        assert slopes.any() == (rules != every)
+
+
 def test_the_least_change_that_is_in_order(rng):
     """Against a general solver, which has what every pair adds to the slope at many points."""
     antecedent = with_equal_widths(grid(rng, 2), [0])
