@@ -157,7 +157,7 @@ class TSKModel:
         return np.where(self.support.share[:, None] > 0.0, self.support.center, self.reference)
 
     @property
-    def marginals(self) -> list:
+    def seen_values(self) -> list:
         """Of every input, quantiles of the training rows and values next to its terms, if known."""
         marginals = () if self.support is None else self.support.marginals
         scales = zip(self.reference, self.spread, marginals, strict=False)
@@ -167,7 +167,7 @@ class TSKModel:
     def two_valued(self) -> np.ndarray:
         """Inputs that are 0 or 1 on all training rows, (n_inputs,); none if these are not known."""
         found = np.zeros(self.n_inputs, dtype=bool)
-        for j, (quantiles, _) in enumerate(self.marginals):
+        for j, (quantiles, _) in enumerate(self.seen_values):
             if (self.minimum[j], self.maximum[j]) == (0.0, 1.0):
                 found[j] = np.isin(np.round(quantiles, DIGITS_OF_CASE), (0.0, 1.0)).all()
         return found

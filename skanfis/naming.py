@@ -51,10 +51,10 @@ def default_term_names(model, digits=_DIGITS_OF_WIDTH):
     """
     antecedent, minimum, maximum = model.antecedent, model.minimum, model.maximum
     inputs, places = antecedent.term_inputs, antecedent.term_places
-    names = np.empty(inputs.size, dtype=object)
+    names, two_valued = np.empty(inputs.size, dtype=object), model.two_valued
     for j in np.unique(inputs):
         own = np.flatnonzero(inputs == j)
-        if antecedent.grid_counts is not None and own.size == 2 and model.two_valued[j]:
+        if antecedent.grid_counts is not None and own.size == 2 and two_valued[j]:
             names[own] = "0", "1"
         elif antecedent.grid_counts is not None:
             numbered = [f"level {k + 1}" for k in range(own.size)]

@@ -214,13 +214,17 @@ class _ConstrainedFit:
 
     def _is_certified(self, ordered):
         model, constraints = self._model(ordered.local, ordered.is_line), self.constraints
-        at_points = model.with_out_of_bounds(*self.policy).predict(constraints.points)
-        off = np.abs(at_points - constraints.values) / self.problem.rows.targets.scale
         limits = zip(constraints.lower, constraints.upper, strict=True)
-        return (off <= _OFF).all() and all(
+        return self._meets_points(model) and all(
             is_in_order(model, k, signs, of_output)
             for k, (signs, of_output) in enumerate(zip(constraints.signs, limits, strict=True))
         )
+
+    def _meets_points(self, model):
+        """Whether it predicts all fixed points, to rounding."""
+        found = model.with_out_of_bounds(*self.policy).predict(self.constraints.points)
+        off = np.abs(found - self.constraints.values) / self.problem.rows.targets.scale
+        return bool((off <= _OFF).all())
 
     def _refused(self, by_equalities):
         n_points, n_rules = len(self.constraints.points), self.model.n_rules
@@ -326,7 +330,7 @@ class _ConstrainedFit:
 
     def _is_proven(self, model):
         proofs = (self._proof(one, model) for one in self.inequalities)
-        return all(found.bound <= until for found, until in proofs)
+        return self._meets_points(model) and all(found.bound <= until for found, until in proofs)
 
     def _failure(self, one, model):
         """The point where branch and bound finds that an inequality fails, if it does."""

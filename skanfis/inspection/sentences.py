@@ -143,7 +143,7 @@ def _written_terms(model, digits):
     antecedent = model.antecedent
     default, of_digits = default_term_names(model), default_term_names(model, digits)
     names, says_where = list(model.term_names), np.zeros(len(default), dtype=bool)
-    groups, start, seen = [], 0, model.marginals
+    groups, start, seen = [], 0, model.seen_values
     sure = np.log(10.0 ** max(digits, PRECISION) - 1.0) if digits < MOST_DIGITS else np.inf
     for group in antecedent.groups:
         theta = _rounded_theta(group, digits)

@@ -71,7 +71,7 @@ class Candidate:
             words = f"{self.n_rules} scattered rules"
         elif self.n_rules == 1:
             words = "one rule"
-        words += ", all slopes" if self.has_all_slopes else ""
+        words += ", slopes by all inputs" if self.has_all_slopes else ""
         if self.slope_worth is not None:
             words += ", fewest slopes" if self.slope_worth else ", fewer slopes"
         return words

@@ -89,7 +89,7 @@ def test_where_all_inputs_count_all_have_slopes(rng):
     y = X @ weights + 0.5 * rng.standard_normal(80)
     model = ANFISRegressor().fit(X, y)
     chosen = next(one["structure"] for one in model.structures_ if one["chosen"])
-    assert chosen == "one rule, all slopes"
+    assert chosen == "one rule, slopes by all inputs"
     ridge = RidgeCV(np.logspace(-3, 3, 25)).fit(X, y)
     assert error_to(lambda X: X @ weights, model, X_new) < 1.05 * error_to(
         lambda X: X @ weights, ridge, X_new

@@ -81,8 +81,8 @@ def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeyp
     assert quick.loss_curve_[-1] < 1.01 * full.loss_curve_[-1]
     new = np.random.default_rng(1).uniform(-0.99, 0.99, (2000, 2))
     difference = quick.predict(new) - full.predict(new)
-    # The noise's own effect on 9 rules of 3 coefficients is 0.1 sqrt(27 / 12000) = 0.005.
-    assert np.sqrt(np.mean(difference**2)) < 5e-3
+    # Less than the noise's own effect on 9 rules of 3 coefficients.
+    assert np.sqrt(np.mean(difference**2)) < 0.1 * np.sqrt(27 / N_ROWS)
 
 
 @pytest.mark.parametrize("agreement", [0.0, 0.3])
