@@ -1,6 +1,6 @@
 r"""What terms are called: linguistic names for a grid, places for rules with terms of their own.
 
-A side of a cut at c over a width h is "> c ± h log 9": so far from the cut it is 0.9 true. One that
+A Gaussian term at c of width h is "near c ± h". A side of a cut at c over a width h is "> c ± h log 9": so far from the cut it is 0.9 true. One that
 parts two values, with no row between, needs no width: "> c", or the value itself where they are 0
 and 1.
 """
@@ -11,17 +11,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from .antecedent.tree import CRISP
-from .membership import SigmoidFalling, SigmoidRising
+from .membership import Gaussian, SigmoidFalling, SigmoidRising
 from .policies import MOST_DIGITS, told_apart
 
 __all__ = [
     "LINGUISTIC",
-    "SIGNS",
+    "WRITTEN",
     "default_output_names",
     "default_term_names",
     "distinct",
     "given_term_names",
-    "written_side",
+    "parameters_written",
 ]
 
 # Six as in the founding paper, negative large to positive large; seven with zero between them.
@@ -35,19 +35,24 @@ LINGUISTIC = {
     7: ("NL", "NM", "NS", "ZE", "PS", "PM", "PL"),
 }
 
-# Families that are one side of a cut.
-SIGNS = {SigmoidRising: "> ", SigmoidFalling: "< "}
-# A side is 0.9 true this many widths from its cut; digits that are written of that length.
-_MOSTLY_TRUE, _DIGITS_OF_WIDTH = np.log(9.0), 2
+# Families whose terms of a rule's own are written out, with what stands before the place, and in
+# how many widths the length after it is given: a side of a cut is 0.9 true so far from it.
+WRITTEN = {
+    SigmoidRising: ("> ", np.log(9.0)),
+    SigmoidFalling: ("< ", np.log(9.0)),
+    Gaussian: ("near ", 1.0),
+}
+# Digits that are written of that length; what no more than so many tell apart is the same.
+_DIGITS_OF_LENGTH, _MOST_TO_TELL = 2, 9
 # As rounding leaves the cut between two values; and of a range, what no two places differ by.
 _ROUNDING, _ALIKE = 1e-6, 1e-9
 
 
-def default_term_names(model, digits=_DIGITS_OF_WIDTH):
-    """Names: of a grid by the order of its terms, else "near 21.3", unique on each input.
+def default_term_names(model, digits=_DIGITS_OF_LENGTH):
+    """Names: of a grid by the order of its terms; "0" and "1" of two, where an input is that.
 
-    Of a side "> 6.8 ± 0.3", to so many digits of its width; of two terms of an input that is 0 or
-    1, these.
+    Of other rules "> 6.8 ± 0.3" and "near 21.3 ± 4.2", to so many digits of the length, or, of
+    families that do not say it, "near 21.3". Terms of an input that differ have different names.
     """
     antecedent, minimum, maximum = model.antecedent, model.minimum, model.maximum
     inputs, places = antecedent.term_inputs, antecedent.term_places
@@ -63,12 +68,10 @@ def default_term_names(model, digits=_DIGITS_OF_WIDTH):
             names[own] = _near(places[own], maximum[j] - minimum[j])
     start = 0
     for group in antecedent.groups:
-        sign = SIGNS.get(group.family)
-        for j in np.unique(group.inputs) if sign else ():
+        is_written = antecedent.grid_counts is None and group.family in WRITTEN
+        for j in np.unique(group.inputs) if is_written else ():
             own = np.flatnonzero(group.inputs == j)
-            cuts, log_widths = group.theta[:, own]
-            sides = _sides(sign, cuts, log_widths, minimum[j], maximum[j], digits)
-            names[start + own] = sides
+            names[start + own] = _written(group, own, minimum[j], maximum[j], digits)
         start += group.n_terms
     return tuple(names)
 
@@ -80,46 +83,51 @@ def is_crisp(cut, width, low, high):
     return is_between & (2.0 * CRISP * width <= (1.0 + _ROUNDING) * size)
 
 
-def _sides(sign, cuts, log_widths, low, high, fewest):
-    """Of one input and one direction: the cut to the digits that matter over its width.
+def _written(group, own, low, high, fewest):
+    """Terms of one input and one family: the place to the digits that matter over the length.
 
-    More tell cuts apart that would look the same; equal ones, on different paths, have one name.
+    More tell those apart that would look the same; equal ones, of different rules, have one name.
     """
+    sign, per_width = WRITTEN[group.family]
+    places, log_widths = group.theta[:, own]
     widths = np.exp(log_widths)
-    alone = is_crisp(cuts, widths, low, high)
+    alone = (group.family is not Gaussian) & is_crisp(places, widths, low, high)
     # Between two values it is the middle, whatever rounding has left of that.
-    cuts = np.where(alone, 0.5 * (low + high), cuts)
-    halves = np.where(alone, 0.5 * (high - low), widths * _MOSTLY_TRUE)
-    sides = list(zip(cuts, halves, alone, strict=True))
+    places = np.where(alone, 0.5 * (low + high), places)
+    lengths = np.where(alone, 0.5 * (high - low), widths * per_width)
+    terms = list(zip(places, lengths, alone, strict=True))
     names: dict[tuple, str] = {}
-    for digits in range(fewest, MOST_DIGITS + 1):
-        written = {side: sign + _side(*side, digits) for side in sides}
+    most = max(fewest, _MOST_TO_TELL)
+    for digits in range(fewest, most + 1):
+        written = {term: sign + _with_length(*term, digits) for term in terms}
         taken = Counter(written.values())
-        for side, text in written.items():
-            if side not in names and (taken[text] == 1 or digits == MOST_DIGITS):
-                names[side] = text
+        for term, text in written.items():
+            if term not in names and (taken[text] == 1 or digits == most):
+                names[term] = text
         if len(names) == len(written):
             break
     if (low, high) == (0.0, 1.0):
-        names |= {side: "1" if sign == "> " else "0" for side in sides if side[2]}
-    return [names[side] for side in sides]
+        names |= {term: "1" if sign == "> " else "0" for term in terms if term[2]}
+    return [names[term] for term in terms]
 
 
-def _side(cut, half, alone, digits):
-    """Write "6.8 ± 0.3", or the cut alone."""
-    last = digits - 1 - int(np.floor(np.log10(half)))
-    size = int(np.floor(np.log10(abs(cut)))) if cut else -last
-    text = _plain(cut, min(max(size + 1 + last, 1), MOST_DIGITS))
-    return text if alone else f"{text} ± {_plain(half, digits)}"
+def _with_length(place, length, alone, digits):
+    """Write "6.8 ± 0.3", or the place alone."""
+    last = digits - 1 - int(np.floor(np.log10(length)))
+    place = round(place, last) + 0.0
+    size = int(np.floor(np.log10(abs(place)))) if place else -last
+    text = _plain(place, min(max(size + 1 + last, 1), MOST_DIGITS))
+    return text if alone else f"{text} ± {_plain(length, digits)}"
 
 
-def written_side(name, theta):
-    """Cut and log width of the side that is called so; ``theta`` where the name does not say."""
+def parameters_written(name, family, theta):
+    """Place and log width of a term that is called so; ``theta`` where the name does not say."""
     _, *numbers = name.replace("±", "").split()
     if not numbers:
         return theta
-    cut, *half = map(float, numbers)
-    return np.array([cut, np.log(half[0] / _MOSTLY_TRUE) if half else theta[1]])
+    place, *length = map(float, numbers)
+    log_width = np.log(length[0] / WRITTEN[family][1]) if length else theta[1]
+    return np.array([place, log_width])
 
 
 def default_output_names(n_outputs):

@@ -7,7 +7,7 @@ import pytest
 
 from skanfis.antecedent import ScatteredAntecedent, TreeAntecedent
 from skanfis.antecedent.tree import CRISP
-from skanfis.membership import Gaussian
+from skanfis.membership import Bell, Gaussian
 from skanfis.naming import default_term_names, given_term_names
 
 from . import oracles
@@ -26,10 +26,10 @@ def model(antecedent, box=BOX, two_valued=(False, False, False)):
     return SimpleNamespace(antecedent=antecedent, input_names=INPUTS, **box)
 
 
-def scattered(centers):
+def scattered(centers, width=1.0, family=Gaussian):
     centers = np.array(centers, dtype=float)
-    theta = Gaussian.from_center_and_width(centers, np.ones(centers.shape))
-    return ScatteredAntecedent.build(Gaussian, np.arange(centers.shape[1]), theta)
+    theta = family.from_center_and_width(centers, np.full(centers.shape, width))
+    return ScatteredAntecedent.build(family, np.arange(centers.shape[1]), theta)
 
 
 @pytest.mark.parametrize(
@@ -62,8 +62,24 @@ def test_two_terms_of_an_input_that_is_0_or_1_are_called_so():
     ],
 )
 def test_other_terms_are_named_by_where_they_stand(places, names):
-    found = default_term_names(model(scattered(np.transpose([places]))))
+    found = default_term_names(model(scattered(np.transpose([places]), family=Bell)))
     assert found == tuple(f"near {name}" for name in names)
+
+
+@pytest.mark.parametrize(
+    ("places", "width", "names"),
+    [
+        ([2213.4, -3.0], 96.4, ["2213 ± 96", "-3 ± 96"]),
+        ([2213.4, -3.0], 4.66, ["2213.4 ± 4.7", "-3 ± 4.7"]),
+        ([2213.4, 1e-9], 1246.0, ["2200 ± 1200", "0 ± 1200"]),
+        # As many digits as tell them apart; those that differ by rounding have one name.
+        ([259.4, 259.1], 204.0, ["259.4 ± 204", "259.1 ± 204"]),
+        ([1.0, 1.0 + 1e-15, 2.0], 1.0, ["1 ± 1", "1 ± 1", "2 ± 1"]),
+    ],
+)
+def test_gaussian_terms_of_a_rule_say_how_far_they_reach(places, width, names):
+    rules = model(scattered(np.transpose([places]), width))
+    assert default_term_names(rules) == tuple(f"near {name}" for name in names)
 
 
 def test_given_names_replace_the_default():

@@ -152,7 +152,7 @@ class Readability:
         """Rules that are the strongest on fewer training rows than they have numbers."""
         numbers, rows = self._said.n_numbers, self.model.rule_rows
         few = np.flatnonzero(rows < numbers)
-        if not few.size or self.model.n_rules == 1 or not has_training_data(self.model):
+        if not few.size or not has_training_data(self.model):
             return []
         named = _named([f"{r} (rows: {rows[r]:.3g}, numbers: {numbers[r]})" for r in few])
         return [f"Strongest on fewer rows than its sentence has numbers: rule {named}."]

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..antecedent.tree import CRISP
 from ..model import TSKModel
-from ..naming import SIGNS, default_term_names, written_side
+from ..naming import WRITTEN, default_term_names, parameters_written
 from ..policies import DIGITS_OF_CASE, MOST_DIGITS
 
 # Digits of the noise's deviation to which numbers are written.
@@ -137,8 +137,8 @@ def _resolution(model, slopes):
 def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
-    These are the sides of cuts; a name that somebody has given stays. Where every training row is
-    on one side, to so many digits but not to all, the width is left out, and the cut is crisp.
+    A name that somebody has given stays. Where every training row is on one side of a cut, to so
+    many digits but not to all, the width is left out, and the cut is crisp.
     """
     antecedent = model.antecedent
     default, of_digits = default_term_names(model), default_term_names(model, digits)
@@ -147,14 +147,17 @@ def _written_terms(model, digits):
     sure = np.log(10.0 ** max(digits, PRECISION) - 1.0) if digits < MOST_DIGITS else np.inf
     for group in antecedent.groups:
         theta = _rounded_theta(group, digits)
+        is_written = antecedent.grid_counts is None and group.family in WRITTEN
         for k, t in enumerate(range(start, start + group.n_terms)):
-            says_where[t] = group.family in SIGNS and names[t] == default[t]
+            says_where[t] = is_written and names[t] == default[t]
             if says_where[t]:
                 names[t] = of_digits[t]
-                theta[:, k] = cut, log_width = written_side(of_digits[t], group.theta[:, k])
-                on_input = np.concatenate(seen[group.inputs[k]]) if seen else cut
-                nearest = np.abs(on_input - cut).min()
-                if "±" in names[t] and nearest > sure * np.exp(log_width):
+                told = parameters_written(names[t], group.family, group.theta[:, k])
+                theta[:, k] = place, log_width = told
+                on_input = np.concatenate(seen[group.inputs[k]]) if seen else place
+                nearest = np.abs(on_input - place).min()
+                is_side = names[t][0] in "<>" and "±" in names[t]
+                if is_side and nearest > sure * np.exp(log_width):
                     names[t] = names[t].partition(" ±")[0]
                     theta[1, k] -= np.log(CRISP)
         groups.append(replace(group, theta=theta))

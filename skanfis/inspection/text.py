@@ -27,6 +27,7 @@ from .sentences import PRECISION, Sentences, rounded
 _WIDTH, _DIGITS_OF_RANGE = 96, 3
 # What has no part in the model is named up to so many, and else counted.
 MOST_NAMED = 5
+_KEPT = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
 # What shares that sum to one may lack of it.
 _ROUNDING = 1e-9
 # How to compute a prediction; the parts in braces where there is such a thing.
@@ -35,10 +36,12 @@ _HOW = (
     "AND multiplies. {terms}A rule says its value{line}, plus its own slopes. What a rule errs "
     "by is its RMSE, used alone, on the rows on which it is the strongest."
 )
-_CUTS = (
-    "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; x < c ± h is what "
-    "that lacks of 1. "
-)
+# How true a condition is that is written out, by what stands before its place.
+_WRITTEN = {
+    ">": "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; x < c ± h is "
+    "what that lacks of 1. ",
+    "near": "x near c ± h is exp(-((x - c) / h)^2 / 2) true, 0.61 at c + h, 0.14 at c + 2 h. ",
+}
 _TERM = "The truth of {} terms is {}. "
 _LINE = ", less the common line's part in it, plus the common line"
 _IN_PLACE = (
@@ -323,7 +326,9 @@ def _legend(said, precision):
             limits = _range(low, high, precision)
             lines.append(f"No prediction leaves these limits: {name}, {limits}.")
     functions = {term["function"] for term in named}
-    terms = [_CUTS] if any("±" in name for name in model.term_names) else []
+    written = [name for name in compress(model.term_names, said.says_where) if "±" in name]
+    signs = {name.split()[0] for name in written}
+    terms = [text for sign, text in _WRITTEN.items() if sign in signs]
     formulas = {family.name: family.formula for family in families}
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
     how = _HOW.format(terms="".join(terms), line=_LINE if said.common.any() else "")
@@ -357,10 +362,10 @@ def _left_out(model, chosen):
 
 
 def _wrapped(text, first="", later=""):
-    """The text in lines, the first and the later ones indented; no ± ends a line."""
-    text = text.replace("± ", "±\N{NO-BREAK SPACE}")
+    """The text in lines, the first and the later ones indented; none is broken at a ±."""
+    text = text.replace(" ± ", _KEPT)
     lines = fill(text, _WIDTH, initial_indent=first, subsequent_indent=later)
-    return lines.replace("±\N{NO-BREAK SPACE}", "± ")
+    return lines.replace(_KEPT, " ± ")
 
 
 def _range(low, high, precision):

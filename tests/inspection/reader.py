@@ -42,8 +42,11 @@ class Read:
             return by_formula(self.formulas[function], row[name], numbers)
         if re.fullmatch("[01]", term):
             return float(row[name] == float(term))
-        sign, cut, *half = term.replace("± ", "").split()
-        away = (row[name] - float(cut)) * (1.0 if sign == ">" else -1.0)
+        sign, place, *half = term.replace("± ", "").split()
+        away = row[name] - float(place)
+        if sign == "near":
+            return np.exp(-0.5 * (away / float(half[0])) ** 2)
+        away *= 1.0 if sign == ">" else -1.0
         return sigmoid(away * np.log(9.0) / float(half[0])) if half else float(away > 0.0)
 
     def value(self, output, said, row):

@@ -74,7 +74,7 @@ class TestMemberships:
         model = quick(partition=SubtractiveClustering(radius=0.6), max_iter=0)
         display = MembershipDisplay.from_estimator(model.fit(x, np.sin(x[:, 0])))
         (axes,) = display.axes_
-        near = [float(one.get_text()[5:]) for one in axes.get_legend().get_texts()]
+        near = [float(one.get_text().split()[1]) for one in axes.get_legend().get_texts()]
         assert near == sorted(near)
         curves = [line for line in axes.get_lines() if line.get_linestyle() == "-"]
         peaks = [display.inputs[0].grid[line.get_ydata().argmax()] for line in curves]
