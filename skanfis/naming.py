@@ -1,8 +1,8 @@
 r"""What terms are called: linguistic names for a grid, places for rules with terms of their own.
 
-A Gaussian term at c of width h is "near c ± h". A side of a cut at c over a width h is "> c ± h log 9": so far from the cut it is 0.9 true. One that
-parts two values, with no row between, needs no width: "> c", or the value itself where they are 0
-and 1.
+A Gaussian term at c of width h is "near c ± h". A side of a cut at c over a width h is
+"> c ± h log 9": so far from the cut it is 0.9 true. One that parts two values, with no row between,
+needs no width: "> c", or the value itself where they are 0 and 1.
 """
 
 from collections import Counter
