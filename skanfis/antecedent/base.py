@@ -79,6 +79,10 @@ class Antecedent(ABC):
     # Of a term, in standardised units; what is narrower is crisp, and does not move.
     least_width: ClassVar[float] = 0.0
 
+    def without_implied(self, tolerance) -> "Antecedent":
+        """The same without terms that other terms of the same rule imply, but for so little."""
+        return self
+
     @property
     def n_terms(self):
         """Number of membership functions."""

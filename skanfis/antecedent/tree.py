@@ -23,6 +23,8 @@ from .rule_table import RuleTableAntecedent
 # A side is 0.9 true 0.1 standard deviations from its cut, no sooner: the error hardly tells a soft
 # split from a jump, and a reader does.
 LEAST_WIDTH = 0.1 / np.log(9.0)
+# Where a product of two sides is looked at, in widths from either cut.
+_AROUND = np.linspace(-6.0, 6.0, 49)
 # Of two values: in lengths of its width, each is so far from the cut that its side is one to the
 # last bit.
 CRISP = 40.0
@@ -87,9 +89,39 @@ class TreeAntecedent(RuleTableAntecedent):
         theta = np.column_stack([nodes.theta, [cut, log_width]])
         return self.build(np.append(nodes.inputs, j), theta, paths)
 
+    def without_implied(self, tolerance):
+        """A table of the rules without sides that another side on the same path implies.
+
+        As "x < 9 ± 1" follows from "x < 7.1 ± 0.7": nowhere is x below the one cut and above the
+        other, the truth of one times that of the other, by more than the tolerance.
+        """
+        nodes, table = self.groups[0], self.table.copy()
+        # Below cut k, and above cut m, by (k, m).
+        is_less = nodes.inputs[:, None] == nodes.inputs
+        is_less &= nodes.theta[0][:, None] < nodes.theta[0]
+        for k, m in np.argwhere(is_less):
+            if not _overlap(nodes.theta[:, [k, m]]) <= tolerance:
+                is_less[k, m] = False
+        for row in table:
+            on_path = row[row >= 0]
+            above = on_path[on_path < self.n_nodes]
+            below = on_path[on_path >= self.n_nodes] - self.n_nodes
+            implied = [m + self.n_nodes for m in below if is_less[below, m].any()]
+            implied += [k for k in above if is_less[k, above].any()]
+            row[np.isin(row, implied)] = -1
+        return self if (table == self.table).all() else RuleTableAntecedent(self.groups, table)
+
     def factors(self, Z):
         return np.exp(self.log_memberships(Z))
 
     def normalise(self, log_mu):
         strengths = np.exp(self._contains @ log_mu)
         return strengths, strengths
+
+
+def _overlap(theta):
+    """The most that x is below the first of two cuts times above the second."""
+    widths = np.exp(theta[1])
+    # The product has its peak within some widths of one of them.
+    x = (theta[0] + _AROUND[:, None] * widths).ravel()
+    return (SigmoidFalling.value(x, theta[:, :1]) * SigmoidRising.value(x, theta[:, 1:])).max()

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass, replace
 from itertools import repeat
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -169,6 +169,7 @@ class _Column:
     scale: float = 1.0
     encode: Callable[..., np.ndarray] | None = None
     place: int = -1
+    categories: tuple[str, ...] = ()  # of the raw column, if there can be no more
 
     def values(self, X):
         """The input on the rows of the user's table."""
@@ -261,8 +262,20 @@ def _encoded(label, encoder, columns):
     names = zip(
         by_column.get_feature_names_out(given), encoder.get_feature_names_out(given), strict=True
     )
+    known: dict[str, tuple[str, ...]] = {}
+    if encoder.handle_unknown == "error" and not hasattr(encoder, "infrequent_categories_"):
+        known = {
+            column: tuple(map(str, categories))
+            for column, categories in zip(sources, encoder.categories_, strict=True)
+        }
     return [
-        _Column(sources[column], str(name), encode=encode, place=place)
+        _Column(
+            sources[column],
+            str(name),
+            encode=encode,
+            place=place,
+            categories=known.get(column, ()),
+        )
         for place, (column, name) in enumerate(names)
     ]
 
@@ -326,6 +339,19 @@ def _model_of(label, estimator):
     return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
 
 
+class Level(NamedTuple):
+    """A level of a raw column, and all others, where there can be no more."""
+
+    column: str
+    level: str
+    others: tuple[str, ...]
+
+    def said(self, value):
+        """Say "fibre is PM" of a 1; of a 0 "fibre is not PM", or, of two levels, the other."""
+        is_not = self.others[0] if len(self.others) == 1 else f"not {self.level}"
+        return f"{self.column} is {self.level if value else is_not}"
+
+
 @dataclass(frozen=True)
 class Reader:
     """Takes the inputs of a model out of tables with columns of these names."""
@@ -335,14 +361,16 @@ class Reader:
     is_named: bool
 
     @property
-    def levels(self) -> dict[str, tuple[str, str]]:
-        """By the name of an indicator its raw column and level: "fibre_PM", ("fibre", "PM")."""
-        encoded = [one for one in self.inputs if one.encode is not None]
-        columns = [str(self.names[one.source]) for one in encoded]
-        return {
-            one.name: (column, one.name.removeprefix(f"{column}_"))
-            for one, column in zip(encoded, columns, strict=True)
-        }
+    def levels(self) -> dict[str, Level]:
+        """What each indicator tells, by its name, such as "fibre_PM"."""
+        found = {}
+        for one in self.inputs:
+            if one.encode is not None:
+                column = str(self.names[one.source])
+                level = one.name.removeprefix(f"{column}_")
+                others = tuple(name for name in one.categories if name != level)
+                found[one.name] = Level(column, level, others)
+        return found
 
     def __call__(self, X) -> np.ndarray:
         """The rows; ValueError for other columns, and for numbers that are not finite."""

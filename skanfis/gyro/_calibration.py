@@ -17,7 +17,7 @@ from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
 from ..exceptions import OutOfBoundsWarning
-from ._checks import find_glitches
+from ._checks import LARGEST_AT_REST, find_glitches
 from ._columns import SIGNALS, ask
 from ._simpler import NAMES, ROUNDS, Simpler, make_law, simpler_compensations
 from ._split import Split
@@ -152,7 +152,12 @@ class Calibration:
 
         Errors are in a unit of which ``per_unit`` are 1 deg/s.
         """
-        found = []
+        found = [self.split.caution] if self.split.caution else []
+        if "output" not in self.recipe.inputs and np.abs(self.rate).max() > LARGEST_AT_REST:
+            found.append(
+                "the gyro turned, and its output is no input: what is learnt as its bias has the "
+                "error of the scale factor at these rates in it."
+            )
         for rows, where in ((self.inside, "in range"), (~self.inside, "out of range")):
             answered = rows & np.isfinite(self.after)
             if not answered.any():

@@ -27,11 +27,14 @@ _NOISE = 5.0  # degC by which a few rows may differ
 # Fewer rows tell neither a line in every input nor what is left of it.
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
-_LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
+LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
 _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
 # Steps of 20 times the usual one are no noise; glitches are rare.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LEAST_CORRELATION = 0.9  # of output and rate
+# Rows at which one value of the output is no chance, and the part of the range of rates that they
+# then have.
+_FEWEST_SATURATED, _SATURATED = 3, 0.02
 # What an error says of it; of a file its name is put in.
 RATE_COLUMN = "column of the rate"
 
@@ -124,12 +127,12 @@ def columns_of(inputs):
     return dict.fromkeys(part for name in inputs for part in made.get(name, (name,)))
 
 
-def check_rows(log, units, runs):
+def check_rows(log, units, runs, may_lack=()):
     """LogError for the first bad row; ``runs`` are the numbers of each row's run."""
     for part in QUANTITIES:
         if part not in log:
             continue
-        check_values(log[part], part)
+        check_values(log[part], part, part in may_lack)
         if part in _PLAUSIBLE and units[part] not in SIGNALS:
             _check_plausible(log[part].to_numpy(), part, units[part])
     if "output" in log and units["output"] in SIGNALS and len(log):
@@ -184,7 +187,7 @@ def check_at_rest(log, unit):
     if "rate" in log:
         rate = log["rate"].to_numpy()
         row = int(np.argmax(np.abs(rate)))
-        if abs(rate[row]) > _LARGEST_AT_REST:
+        if abs(rate[row]) > LARGEST_AT_REST:
             raise LogError(f"{rate[row]:.4g} deg/s: the gyro was not at rest.", "rate", row)
     output = log["output"].to_numpy()
     if np.ptp(output) == 0.0:
@@ -256,7 +259,9 @@ def _check_plausible(values, part, unit):
 
 def _check_output_follows_rate(log, units):
     output, rate = log["output"].to_numpy(), log["rate"].to_numpy()
-    several = "Log at several rates, or learn the bias: leave output out of the inputs."
+    several = "Log at several rates"
+    # At another rate than zero the scale factor's error would be learnt as the bias.
+    several += ", or learn the bias: leave output out of the inputs." if not rate.any() else "."
     other = "Is another column the gyro's (--columns output=NAME)?"
     for part, values, advice in (("rate", rate, several), ("output", output, other)):
         if values.max() == values.min():
@@ -274,6 +279,7 @@ def _check_output_follows_rate(log, units):
             "output",
             next(iter(glitches), None),
         )
+    _check_saturation(output, rate)
     slope = np.polyfit(rate, output, 1)[0]
     if units["output"] in SIGNALS or 0.5 < slope < 2.0:
         return
@@ -289,6 +295,23 @@ def _check_output_follows_rate(log, units):
         "of its own is declared as counts.",
         "output",
     )
+
+
+def _check_saturation(output, rate):
+    """LogError where the output stands at its largest or smallest while the rate goes on."""
+    values = np.unique(output)
+    # As many rates as the resolution of the output leaves to one value, and no more than noise.
+    step = np.ptp(rate) * max(_SATURATED, 3.0 / values.size)
+    for value, end in ((values[-1], "largest"), (values[0], "smallest")):
+        at = np.flatnonzero(output == value)
+        low, high = rate[at].min(), rate[at].max()
+        if at.size >= _FEWEST_SATURATED and high - low > step:
+            raise LogError(
+                f"stands at {value:.6g}, the {end} value, in {at.size} rows, at rates from "
+                f"{low:.4g} to {high:.4g} deg/s: it is saturated. Leave these rows out.",
+                "output",
+                int(at[0]),
+            )
 
 
 def find_glitches(log, error):

@@ -77,7 +77,7 @@ class Request:
     """What is asked of a reading; ValueError where it names a part or unit that is unknown.
 
     With ``guess``, as the command reads: columns are guessed, the clock tells runs, rows that lack
-    a value are left out, and every row is checked.
+    a value are left out, but of the ``optional`` parts, and every row is checked.
     """
 
     columns: dict = field(default_factory=dict)
@@ -85,6 +85,7 @@ class Request:
     require: tuple[str, ...] = ("temperature", "output", "rate")
     guess: bool = False
     assumed: dict | None = None  # units of columns that name none; else by the values
+    optional: tuple[str, ...] = ()
 
     def __post_init__(self):
         for name, parts in (("columns", self.columns), ("require", self.require)):
@@ -173,6 +174,13 @@ def _guess(source, request, layout, first):
         layout.dates = [k for k, clock in moments.items() if clock.form][:1]
     _settle_units(columns, layout, of_first)
     layout.notes.append(_sentence(layout))
+    if "time" not in layout.places:
+        named = [column for column in columns if column.score("time") > 0.0 and column.numbers.size]
+        layout.notes += [
+            f"{column.name!r} is not used: it neither rises nor falls throughout, as a time would"
+            for column in named[:1]
+            if not column.can_be("time")
+        ]
 
 
 class _Column:

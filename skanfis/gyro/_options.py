@@ -133,14 +133,15 @@ def check_kind(parser, options):
         raise UsageError(f"{named}: of no use with{'' if options.apply else 'out'} --apply.")
 
 
-def request_of(options, require, assumed=None):
+def request_of(options, require, assumed=None, optional=()):
     """What the options ask of a reading; UsageError where they name an unknown part or unit.
 
-    ``assumed`` are units of columns that name none; None leaves them to the values.
+    ``assumed`` are units of columns that name none; None leaves them to the values. Rows that lack
+    a value of the ``optional`` parts are kept.
     """
     columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
     try:
-        return Request(columns, units, tuple(require), True, assumed)
+        return Request(columns, units, tuple(require), True, assumed, optional)
     except ValueError as error:
         raise UsageError(str(error)) from error
 

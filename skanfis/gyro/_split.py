@@ -142,13 +142,15 @@ def _clearest_tolerance(gaps, smallest):
 class Split:
     """Folds of a cross-validation: every row is tested once, by a model that is new to its group.
 
-    ``labels`` are those that a report lists, ``sentence`` says what was held out and why.
+    ``labels`` are those that a report lists, ``sentence`` says what was held out and why, and
+    ``caution`` what that cannot show.
     """
 
     kind: str
     folds: list
     labels: np.ndarray
     sentence: str
+    caution: str = ""
 
 
 def choose_split(log, kind="auto", *, uses_output=True):
@@ -183,7 +185,13 @@ def choose_split(log, kind="auto", *, uses_output=True):
     what = " and ".join(_WORDS[part][0] for part in parts)
     counted = ", ".join(f"{counts[part]} {_WORDS[part][1]}" for part in parts)
     sentence = f"{what} held out ({counted}, {len(folds)} folds; {reason})"
-    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence)
+    caution, n_levels = "", counts.get("level", 0)
+    if 1 < n_levels < _FEWEST["level"] and "level" not in parts:
+        caution = (
+            f"the table stood still at {n_levels} rates alone, but for their sign, too few to hold "
+            "one out: what is left at all others is not known, and may be any."
+        )
+    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, caution)
 
 
 def _choose(groups, counts, has_time):

@@ -39,6 +39,7 @@ from .targets.write import FILES, write_targets
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
 INCOMPLETE = 5  # a target was refused; all else is written
+NOT_KEPT = 6  # all is written; a limit is not kept, or not measured
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 # What a calibration may write.
@@ -103,7 +104,9 @@ def _calibrate(options, tell):
         for name, told, is_written in targets
     )
     tell("done, but see the warnings" if calibration.cautions() else "done")
-    return DONE if all(done for *_, done in targets) else INCOMPLETE
+    if not all(done for *_, done in targets):
+        return INCOMPLETE
+    return DONE if all(check.result == "pass" for check in checks) else NOT_KEPT
 
 
 def _where_from_and_to(options):
@@ -256,7 +259,9 @@ def _apply(options, tell):
     if units.get("output") in SIGNALS and "output" not in compensator.assumed:
         del units["output"]  # which is asked for again
     tell(f"compensating {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
-    reading = read(paths, request_of(options, sorted(needed), units), tell=tell)
+    # The true rate is no input: where it is known, the errors are told.
+    optional = tuple({"temperature", "rate"} - needed)
+    reading = read(paths, request_of(options, sorted(needed), units, optional), tell=tell)
     unit, due = reading.units["output"], compensator.output_unit
     if (unit if unit in SIGNALS else "deg/s") != due:
         raise UsageError(
@@ -278,6 +283,7 @@ def _apply(options, tell):
         # Twelve digits are beyond any gyro, and short beside the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
     _say([f"written        {target}: {n_rows}", *of_rates(compensator, log, rates)])
+    _say(f"note           {note}" for note in reading.notes)
     tell("done")
     return DONE
 

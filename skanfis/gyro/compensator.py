@@ -208,13 +208,16 @@ def _text_of(compensator):
 
 
 def features(log, inputs, time_constant):
-    """Columns that are known on board, in the order of ``inputs``."""
+    """Columns that are known on board, in the order of ``inputs``.
+
+    Time counts from power-on: where ``read_log`` found it, else from the first row of each run.
+    """
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log))
     columns = {}
     for name in inputs:
         if name == "time":
-            since = log["time"] - log["time"].groupby(runs).transform("first")
-            columns[name] = since.to_numpy(dtype=float)
+            start = log.get("power_on", log["time"].groupby(runs).transform("first"))
+            columns[name] = (log["time"] - start).to_numpy(dtype=float)
         elif name == "temperature_rate":
             rate = ThermalRate(time_constant, time="time", run="run")
             parts = log[["time", "temperature"]].assign(run=runs)

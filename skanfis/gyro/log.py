@@ -28,7 +28,7 @@ from .metrics import rows_by_run
 _ROWS = 100_000  # of a piece, which is all that is held of a file's texts
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s
-_STEPS = 50.0
+_STEPS, _NOTED_STEPS = 50.0, 5.0
 _FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
 _SHORTEST_RUN = 3  # rows, at the end of a file
 _BEGINNING = 0.1  # part of a run, where a clock is again that has been set anew
@@ -65,7 +65,8 @@ def read_log(
     -------
     log : DataFrame of shape (n_rows, n_parts)
         Columns by their parts, in the order above: numbers in s, degC and deg/s (a raw signal in
-        its own unit), run and device as categories of strings.
+        its own unit), run and device as categories of strings. Where runs were logged from later
+        than power-on, "power_on" is where the clock was then [s].
 
     Raises
     ------
@@ -161,6 +162,9 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
         held = [rows[::every] for rows in rows_by_run(table["run"], n_rows)]
         table = table.iloc[np.sort(np.concatenate(held))]
         notes.append(f"of {n_rows:,} rows {len(table):,} are used, one in {every} of each run")
+    if "power_on" in table:
+        table, told = _since_power_on(table)
+        notes += told
     file, code, row = table["file"].to_numpy(), table["run"].to_numpy(), table.index.to_numpy()
     log = table.drop(columns=["file", "run"]).set_axis(pd.RangeIndex(len(table)))
     del table
@@ -187,7 +191,7 @@ class LogFile:
     """
 
     def __init__(self, path, request, first=None):
-        self.path, self._is_command = path, request.guess
+        self.path, self._is_command, self._optional = path, request.guess, request.optional
         self.source = open_source(path)
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
@@ -216,6 +220,7 @@ class LogFile:
         if self._is_command:
             log = self._in_order(log)
         missing = log.isna()
+        missing[[part for part in self._optional if part in log]] = False
         # A gap in one column is none in the clock.
         log = log[~missing[[part for part in ("time", *LABELS) if part in log]].any(axis=1)]
         for part in LABELS:
@@ -223,6 +228,9 @@ class LogFile:
         if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
             runs = self._told_by_clock(log["time"].to_numpy())
             log = log[: len(runs)].assign(run=runs)
+        if "time" in log:
+            # Of all rows, those that lack a value too.
+            log["power_on"] = log.groupby(list(LABELS), observed=True)["time"].transform("first")
         is_whole = ~missing.any(axis=1)
         if not is_whole.all():
             self._note_gaps(missing)
@@ -232,7 +240,7 @@ class LogFile:
         log = log.drop(columns="device").assign(run=by_run.ngroup().to_numpy(np.int32))
         if self._is_command:
             try:
-                check_rows(log, self.layout.units, log["run"].to_numpy())
+                check_rows(log, self.layout.units, log["run"].to_numpy(), self._optional)
             except LogError as error:
                 raise self.located(error, log.index) from error
         return log
@@ -315,6 +323,12 @@ class LogFile:
             )
             code = code[:-n_last]
         if not code[-1]:
+            usual = np.median(steps[1:]) if len(steps) > 1 else 0.0
+            if (far := np.count_nonzero(steps > _NOTED_STEPS * usual)) and usual > 0.0:
+                self.notes.append(
+                    f"{self.path}: is taken as one run, although the time steps by up to "
+                    f"{steps.max():.4g} s, {far} time(s) by more than {_NOTED_STEPS:g} usual steps"
+                )
             return self._unlabelled(code)
         self.notes.append(
             f"{self.path}: is split into {code[-1] + 1} runs, where the time begins anew or steps "
@@ -362,6 +376,28 @@ class LogFile:
         rate = f"column {self.layout.name('rate')!r} of the rate"
         reason = error.reason.replace(RATE_COLUMN, rate)
         return LogError(f"{where}, column {name!r}{part}: {reason}")
+
+
+def _since_power_on(log):
+    """The log with the time of each run's power-on, where that is not its first row; notes.
+
+    Clocks of several runs that overlap, one of them from zero on, all begin at power-on: of a run
+    that was logged from later on too.
+    """
+    runs = log.groupby("run")
+    times, start = runs["time"], runs["power_on"].first()
+    earliest, step = start.min(), log["time"].diff().abs().median()
+    notes = []
+    if 0.0 <= earliest <= step and earliest + step < start.max() < times.last().min():
+        late = np.count_nonzero(start > earliest + step)
+        notes.append(
+            f"the clock of {late} run(s) begins up to {start.max():.4g} s after power-on, which is "
+            f"at {earliest:.4g} s as in the others"
+        )
+        log["power_on"] = earliest
+    if (log["power_on"] == times.transform("first")).all():
+        log = log.drop(columns="power_on")
+    return log, notes
 
 
 def _longest_step(time):

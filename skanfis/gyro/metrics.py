@@ -23,6 +23,8 @@ _PPM = 1e6
 HYSTERESIS_BINS, ROWS_PER_MEAN = 20, 5
 # A nonlinearity is looked for in means over such parts of the range of rates.
 _RATE_BINS = 101
+# Part of the largest rate up to which a gyro is at rest, and rows that its bias is read off then.
+_AT_REST, _FEWEST_AT_REST = 1e-4, 10
 # The largest value of a resample says nothing of the largest to come.
 LARGEST_VALUES = ("residual_peak", "residual_peak_to_peak")
 ALLAN_FIGURES = {
@@ -69,7 +71,7 @@ class _Figure(NamedTuple):
 
 def figures_of_merit(full_scale=1.0):
     """All figures but those of Allan, in the order of the report."""
-    rates, error, residual = ("rate", "output"), ("error",), ("residual",)
+    rates, residual = ("rate", "output"), ("residual",)
     heat, ramp = "temperature", "temperature_rate"
     largest, root = (partial(_nonlinearity, full_scale=full_scale, size=s) for s in (_peak, rms))
     full = "ppm of full scale"
@@ -77,8 +79,11 @@ def figures_of_merit(full_scale=1.0):
     short, long = (partial(_squares_of_means, over=seconds) for seconds in (10.0, 100.0))
     timed, pooled = ("error", "time"), _pooled_deviation
 
-    def bias(error):
-        return PER_HOUR * error.mean()
+    def bias(error, rate):
+        # All rows give the line's intercept, which has the nonlinearity in it.
+        at_rest = np.abs(rate) <= _AT_REST * np.abs(rate).max()
+        enough = np.count_nonzero(at_rest) >= _FEWEST_AT_REST
+        return PER_HOUR * (error[at_rest] if enough else error).mean()
 
     def spread(values):
         return np.std(values, ddof=1)
@@ -102,8 +107,8 @@ def figures_of_merit(full_scale=1.0):
             "scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread
         ),
         _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
-        _Figure("bias", "deg/h", bias, error),
-        from_run_to_run("bias_repeatability", "deg/h", bias, error, combine=spread),
+        _Figure("bias", "deg/h", bias, ("error", "rate")),
+        from_run_to_run("bias_repeatability", "deg/h", bias, ("error", "rate"), combine=spread),
         _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), also=ramp),
         _Figure(
             "bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), also=heat

@@ -230,8 +230,9 @@ class Study:
         if not isinstance(groups, Mapping | None):
             raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
         found: dict[str, tuple[int, ...]] = {}
-        for name, (column, _) in read.levels.items():
-            found[column] = (*found.get(column, ()), model.input_names.index(name))
+        for name, level in read.levels.items():
+            of_column = found.get(level.column, ())
+            found[level.column] = (*of_column, model.input_names.index(name))
         found = {column: inputs for column, inputs in found.items() if len(inputs) > 1}
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):

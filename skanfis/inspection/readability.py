@@ -1,6 +1,7 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import check_finite, positive_weights
-from ..export.folding import fold_with_reader
+from ..export.folding import Level, fold_with_reader
 from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
@@ -42,6 +43,8 @@ class Readability:
         The model that was measured.
     measures : Measures
         The figures as arrays.
+    levels : dict, default={}
+        What indicators of a ``OneHotEncoder`` tell, by name; the functions here find them.
 
     Attributes
     ----------
@@ -75,10 +78,11 @@ class Readability:
 
     model: TSKModel
     measures: Measures
+    levels: Mapping[str, Level] = field(default_factory=dict)
 
     @property
     def _said(self):
-        return Sentences.of(self.model)
+        return Sentences.of(self.model, levels=self.levels)
 
     @property
     def rules(self) -> Any:
@@ -86,7 +90,9 @@ class Readability:
         found, model = self.measures, self._said.model
         return pd.DataFrame(
             {
-                "if": np.repeat(np.array(premise_texts(model), dtype=object), model.n_outputs),
+                "if": np.repeat(
+                    np.array(premise_texts(model, self.levels), dtype=object), model.n_outputs
+                ),
                 "output": list(model.output_names) * model.n_rules,
                 "weight": np.repeat(found.rule_weights, model.n_outputs),
                 "rows": np.repeat(found.rule_rows, model.n_outputs),
@@ -261,7 +267,7 @@ def _readability(estimator, X, y, sample_weight):
         sample_weight = column_or_1d(check_array(sample_weight, dtype=float, ensure_2d=False))
         positive_weights(sample_weight, n_rows)
     check_consistent_length(X, y, sample_weight)
-    return Readability(model, measure(model, read, n_rows, y, sample_weight))
+    return Readability(model, measure(model, read, n_rows, y, sample_weight), reader.levels)
 
 
 def readability_of_rows(model, X, y=None, sample_weight=None):
@@ -283,9 +289,11 @@ def _on_signs(said):
             is_clear = heavy & (np.abs(slopes) > _DEVIATIONS * deviations[:, place, k])
             up, down = (np.flatnonzero(is_clear & (sign * slopes > 0.0)) for sign in (1.0, -1.0))
             if up.size and down.size:
-                name = model.input_names[j] + (f" (of {output})" if model.n_outputs > 1 else "")
+                name, of_output = model.input_names[j], f" (of {output})" * (model.n_outputs > 1)
+                level = said.levels.get(name)
+                cause = f"by {name}" if level is None else f"if {level.said(True)},"
                 rises, falls = map(_rules, (up, down))
-                found.append(f"by {name} up in {rises} and down in {falls}")
+                found.append(f"{cause}{of_output} up in {rises} and down in {falls}")
     named = _named(found, "; ")
     return [f"Rules go different ways, beyond chance: {named}."] if found else []
 

@@ -8,8 +8,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from .._validation import check_count
-from ..export import fold, fold_with_rows
-from ..export.folding import last_step
+from ..export import fold
+from ..export.folding import fold_with_reader, last_step
 from ..model import TSKModel
 from ..policies import MOST_DIGITS
 from .sentences import Sentences
@@ -38,12 +38,9 @@ def premise_texts(model, levels=()):
 
 def condition(name, term, levels=()):
     """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator."""
-    if term.startswith(("<", ">")):
-        return f"{name} {term}"
     if term in ("0", "1") and name in levels:
-        column, level = levels[name]
-        return f"{column} is {'' if term == '1' else 'not '}{level}"
-    return f"{name} is {term}"
+        return levels[name].said(term == "1")
+    return f"{name} {term}" if term.startswith(("<", ">")) else f"{name} is {term}"
 
 
 def shown_rules(model, max_shown):
@@ -66,7 +63,7 @@ def parts_led(model):
     return rows / rows.sum() if has_training_data(model) else model.rule_weights
 
 
-def readability_in_training(estimator, model):
+def readability_in_training(estimator, model, levels):
     """The fit's ``readability_`` in the names of ``model``, the whole; None where there is none."""
     last = None if isinstance(estimator, TSKModel) else last_step(estimator)
     found = getattr(last, "readability_", None)
@@ -75,10 +72,11 @@ def readability_in_training(estimator, model):
     # Columns that were moved and not scaled have the same numbers, rounded as they were.
     own, fitted = (np.sort(one.coefficients, axis=1) for one in (model, found.model))
     if np.array_equal(own, fitted):
-        return replace(found, model=model)
+        return replace(found, model=model, levels=levels)
     # Behind a scaler: numbers are rounded in other units now, and what they err is not known.
     unknown = np.full(model.n_outputs, np.nan)
-    return replace(found, model=model, measures=replace(found.measures, printed_errors=unknown))
+    measures = replace(found.measures, printed_errors=unknown)
+    return replace(found, model=model, measures=measures, levels=levels)
 
 
 def rename(model, feature_names, output_names):
@@ -188,7 +186,8 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     >>> bool(abs(table["contribution"].sum() - model.predict(X[:1])[0]) < 1e-12)
     True
     """
-    model, rows = fold_with_rows(estimator, X)
+    model, read = fold_with_reader(estimator)
+    rows = read(X)
     inside = model.in_bounds(rows)
     if model.out_of_bounds == "raise" and not inside.all():
         raise ValueError(model.describe_out_of_bounds(rows))
@@ -216,7 +215,11 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     has_line = np.take_along_axis(has_line, order[:, :, None], axis=1)
     row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
     source = order[row, place]
-    texts = [*premise_texts(model), *(f"beyond {name}" for name in model.input_names), "held"]
+    texts = [
+        *premise_texts(model, read.levels),
+        *(f"beyond {name}" for name in model.input_names),
+        "held",
+    ]
     return pd.DataFrame(
         {
             "row": row,

@@ -19,9 +19,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..antecedent.tree import CRISP
+from ..export.folding import Level
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..policies import DIGITS_OF_CASE, MOST_DIGITS
+from ..reading_cost import NEXT_TO_NOTHING
 
 # Digits of the noise's deviation to which numbers are written.
 PRECISION = 2
@@ -45,7 +47,7 @@ class Sentences:
     common_place: np.ndarray  # (n_inputs,)
     common: np.ndarray  # the common line; zero where nothing is in common, (n_inputs, n_outputs)
     two_valued: np.ndarray  # inputs that are 0 or 1, (n_inputs,)
-    levels: Mapping[str, tuple[str, str]]  # as ``Reader.levels``
+    levels: Mapping[str, Level]  # as ``Reader.levels``
 
     @classmethod
     def of(cls, model: TSKModel, precision: int = PRECISION, levels=None):
@@ -138,7 +140,8 @@ def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
     A name that somebody has given stays. Where every training row is on one side of a cut, to so
-    many digits but not to all, the width is left out, and the cut is crisp.
+    many digits but not to all, the width is left out, and the cut is crisp. So are conditions that
+    others of the same rule imply.
     """
     antecedent = model.antecedent
     default, of_digits = default_term_names(model), default_term_names(model, digits)
@@ -163,6 +166,8 @@ def _written_terms(model, digits):
         groups.append(replace(group, theta=theta))
         start += group.n_terms
     written = replace(antecedent, groups=tuple(groups))
+    if digits < MOST_DIGITS:
+        written = written.without_implied(NEXT_TO_NOTHING)
     return replace(model, antecedent=written, term_names=tuple(names)), says_where
 
 

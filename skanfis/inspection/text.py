@@ -203,7 +203,7 @@ def _said(estimator, precision=PRECISION, feature_names=None, output_names=None)
     folded, reader = fold_with_reader(estimator)
     model = rename(folded, feature_names, output_names)
     said = Sentences.of(model, precision, reader.levels)
-    return said, readability_in_training(estimator, model)
+    return said, readability_in_training(estimator, model, said.levels)
 
 
 def _inputs_and_rows(model):
@@ -312,8 +312,10 @@ def _legend(said, precision):
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
     for name, own in categories.items():
-        levels = [said.levels[model.input_names[j]][1] for j in own]
-        levels += ["other"] if model.reference[own].sum() < 1.0 - _ROUNDING else []
+        known = [said.levels[model.input_names[j]] for j in own]
+        levels = [level.level for level in known]
+        if model.reference[own].sum() < 1.0 - _ROUNDING:
+            levels += [other for other in known[0].others if other not in levels] or ["other"]
         lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
     if unnamed:
         is_few = len(unnamed) <= MOST_NAMED

@@ -8,7 +8,7 @@ import numpy as np
 
 from .._validation import check_choice
 from ..antecedent import TreeAntecedent
-from ..export.folding import fold_with_reader
+from ..export.folding import Level, fold_with_reader
 from ..model import TSKModel
 from .displays import _axes, _position, _section
 from .labels import as_label, title_of
@@ -40,7 +40,7 @@ class TreeDisplay:
         Whose values stand at the leaves.
     kind : {"tree", "plane"}, default="tree"
     levels : dict, default={}
-        Column and level, ("fibre", "PM"), by the name of an indicator of a ``OneHotEncoder``.
+        What indicators of a ``OneHotEncoder`` tell, by name; ``from_estimator`` finds them.
 
     Examples
     --------
@@ -56,7 +56,7 @@ class TreeDisplay:
     model: TSKModel
     output: int = 0
     kind: str = "tree"
-    levels: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    levels: Mapping[str, Level] = field(default_factory=dict)
 
     @classmethod
     def from_estimator(
