@@ -68,6 +68,13 @@ def _check_kind(table, what):
             f"{masked.size} rows, first at row {masked.argmax()}: drop these rows"
             + (", or impute X.filled(numpy.nan) in a Pipeline." if what == "X" else ".")
         )
+    for name, dtype in zip(names, dtypes, strict=True):
+        categories = getattr(getattr(dtype, "categories", None), "dtype", None)
+        if what == "X" and getattr(categories, "kind", "O") in "iuf":
+            raise ValueError(
+                f"Column {name!r} of X is a category of numbers: encode it, as by OneHotEncoder in "
+                f"a ColumnTransformer, or take its numbers, X[{name!r}].astype(float)."
+            )
     name, count = Counter(names).most_common(1)[0] if names else ("", 0)
     if count > 1:
         raise ValueError(

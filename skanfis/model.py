@@ -196,8 +196,27 @@ class TSKModel:
                 terms.append(term | numbers)
         return terms
 
+    def _rows(self, X) -> np.ndarray:
+        """Rows as an array: the inputs of a table by their names; ValueError where it lacks any."""
+        if hasattr(X, "columns"):
+            lacking = [name for name in self.input_names if name not in X.columns]
+            if lacking:
+                raise ValueError(
+                    f"X lacks the column {lacking[0]!r}: the model takes "
+                    f"{', '.join(map(repr, self.input_names))}."
+                )
+            X = X[list(self.input_names)]
+        X = np.asarray(X, dtype=float)
+        if X.ndim != 2 or X.shape[1] != self.n_inputs:
+            raise ValueError(
+                f"X has the shape {X.shape}; the model takes (n_rows, {self.n_inputs}): "
+                f"{', '.join(map(repr, self.input_names))}."
+            )
+        return X
+
     def in_bounds(self, X) -> np.ndarray:
         """Whether each row lies in the box of the training data, shape (n_rows,)."""
+        X = self._rows(X)
         return ((self.minimum <= X) & (self.maximum >= X)).all(axis=1)
 
     def strengths(self, X) -> np.ndarray:
@@ -210,6 +229,7 @@ class TSKModel:
 
     def predict(self, X, inside=None) -> np.ndarray:
         """Outputs (n_rows, n_outputs) by the policy; ``inside`` is what :meth:`in_bounds` gives."""
+        X = self._rows(X)
         inside = self.in_bounds(X) if inside is None else inside
         if inside.all():
             return self._by_block(X, self._outputs, self.n_outputs)
@@ -231,7 +251,7 @@ class TSKModel:
 
         NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
         """
-        posterior, n_values = self.posterior, 2 * self.n_outputs
+        X, posterior, n_values = self._rows(X), self.posterior, 2 * self.n_outputs
         if posterior is None:
             raise ValueError(self._why_no_posterior())
         inside = self.in_bounds(X) if inside is None else inside
@@ -286,7 +306,7 @@ class TSKModel:
 
         see :class:`~skanfis.support.RuleSupport`. Zero everywhere where the model knows of no data.
         """
-        support = self.support
+        X, support = self._rows(X), self.support
         if support is None:
             return np.zeros(X.shape[0])
 
@@ -315,6 +335,7 @@ class TSKModel:
 
     def way_out(self, X) -> np.ndarray:
         """How far "linear" goes from the box towards each row, (n_rows, n_inputs)."""
+        X = self._rows(X)
         return self._followed(self._way(X.T, self._clip(X.T))).T
 
     def describe_out_of_bounds(self, X) -> str:
@@ -380,6 +401,7 @@ class TSKModel:
 
         It takes ``n_more`` values per row besides strengths and outputs.
         """
+        X = self._rows(X)
         n_rows = X.shape[0]
         values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms + n_more
         step = max(BLOCK_BYTES // (8 * values_per_row), FEWEST_ROWS)

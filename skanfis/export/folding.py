@@ -18,6 +18,7 @@ import pandas as pd
 from sklearn.compose import ColumnTransformer, TransformedTargetRegressor
 from sklearn.feature_selection import SelectorMixin
 from sklearn.frozen import FrozenEstimator
+from sklearn.impute import SimpleImputer
 from sklearn.pipeline import Pipeline
 from sklearn.preprocessing import (
     FunctionTransformer,
@@ -44,7 +45,8 @@ def fold(estimator: Any) -> TSKModel:
     ----------
     estimator : fitted estimator or TSKModel
         An ANFIS estimator; a Pipeline that ends in one, with steps in front that scale every column
-        alone, select columns or encode them (OneHotEncoder), or a ColumnTransformer of these; a
+        alone, select columns, impute (SimpleImputer: what is missing stays with who applies the
+        model) or encode them (OneHotEncoder), or a ColumnTransformer of these; a
         TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
         GridSearchCV over these. A TSKModel is returned as it is.
 
@@ -170,12 +172,14 @@ class _Column:
     encode: Callable[..., np.ndarray] | None = None
     place: int = -1
     categories: tuple[str, ...] = ()  # of the raw column, if there can be no more
+    fill: Any = None  # in the place of what is missing
 
     def values(self, X):
         """The input on the rows of the user's table."""
         if self.encode is not None:
             return self.encode(X)[:, self.place].astype(np.float64)
-        return _as_numbers(_part_of(X, [self.source]))[:, 0]
+        numbers = _as_numbers(_part_of(X, [self.source]))[:, 0]
+        return numbers if self.fill is None else np.where(np.isnan(numbers), self.fill, numbers)
 
     def edge(self, z, side):
         """The x of an edge of the box, to the lower (-1) or upper (1) side.
@@ -232,6 +236,8 @@ def _columns_after(label, step, columns):
         return columns
     if type(step) is OneHotEncoder:
         return _encoded(label, step, columns)
+    if type(step) is SimpleImputer:
+        return _imputed(label, step, columns)
     if isinstance(step, SelectorMixin):
         return [columns[j] for j in step.get_support(indices=True)]
     if type(step) is ColumnTransformer:
@@ -247,16 +253,36 @@ def _columns_after(label, step, columns):
     ]
 
 
+def _imputed(label, imputer, columns):
+    """The columns, with what stands for missing values."""
+    if imputer.add_indicator or not pd.isna(imputer.missing_values):
+        _refuse(
+            label, imputer, "only add_indicator=False and missing_values=nan leave numbers alone"
+        )
+    if pd.isna(imputer.statistics_).any():
+        _refuse(label, imputer, "it drops a column that has no values")
+    return [
+        replace(column, fill=value if column.scale == 1.0 else column.offset + column.scale * value)
+        for column, value in zip(columns, imputer.statistics_.tolist(), strict=True)
+    ]
+
+
 def _encoded(label, encoder, columns):
     """Indicators in the place of the columns that an encoder is given."""
-    if any(column != _Column(column.source, column.name) for column in columns):
+    if any(replace(column, fill=None) != _Column(column.source, column.name) for column in columns):
         _refuse(label, encoder, "it must be given columns of the table as they are")
+    fills = [column.fill for column in columns]
     sources = {column.name: column.source for column in columns}
     given = None if hasattr(encoder, "feature_names_in_") else list(sources)
     by_column = copy(encoder).set_params(feature_name_combiner=lambda name, _: name)
 
     def encode(X):
-        encoded = encoder.transform(_part_of(X, list(sources.values())))
+        table = _part_of(X, list(sources.values()))
+        if any(fill is not None for fill in fills):
+            table = pd.DataFrame(table)
+            table = table.fillna(dict(zip(table.columns, fills, strict=True)))
+            table = table if hasattr(encoder, "feature_names_in_") else table.to_numpy()
+        encoded = encoder.transform(table)
         return encoded.toarray() if hasattr(encoded, "toarray") else np.asarray(encoded)
 
     names = zip(
@@ -313,9 +339,9 @@ def _offsets_and_scales(label, scaler):
 def _refuse(label, step, reason):
     raise ValueError(
         f"{_described(label, step)} cannot be folded into the rules: {reason}. StandardScaler, "
-        "MinMaxScaler, MaxAbsScaler, RobustScaler, OneHotEncoder, column selections and "
-        "ColumnTransformers of these can. For rules in the units of that step's output, give what "
-        "is behind it: pipeline[-1], or regressor_ of a TransformedTargetRegressor."
+        "MinMaxScaler, MaxAbsScaler, RobustScaler, SimpleImputer, OneHotEncoder, column selections "
+        "and ColumnTransformers of these can. For rules in the units of that step's output, give "
+        "what is behind it: pipeline[-1], or regressor_ of a TransformedTargetRegressor."
     )
 
 

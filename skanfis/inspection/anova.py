@@ -222,8 +222,10 @@ class DrawnAnova:
     def __init__(self, model, output, blocks):
         self.model, self.output, self.blocks = model, output, blocks
         self.n_rules, self.n_blocks = model.n_rules, len(blocks)
-        self.rng, self.mean = np.random.default_rng(0), 0.0
-        self.rows = draw(blocks, N_DRAWS, self.rng)
+        has_part = model.consequents[:, 1:, output].any(axis=0)
+        has_part[model.antecedent.term_inputs] = True
+        self.has_part = [has_part[list(block.inputs)].any() for block in blocks]
+        self.mean, self.rows = 0.0, draw(blocks, N_DRAWS, np.random.default_rng(0))
         self.y = self._given((), self.rows, self.rows)
         self.mean = float(self.y.mean())
         self.y -= self.mean
@@ -245,8 +247,16 @@ class DrawnAnova:
         return np.maximum([self.variance - self.closed(every - {g}) for g in every], 0.0)
 
     def conditionals(self, subsets, X):
-        """At rows X in the box, y with all but x_v drawn, less the mean: on average E[y | x_v]."""
-        return np.array([self._given(v, X, draw(self.blocks, len(X), self.rng)) for v in subsets])
+        """At rows X in the box, y with all but x_v drawn, less the mean: on average E[y | x_v].
+
+        What has no part in any rule changes neither that nor what is drawn.
+        """
+        found = np.zeros((len(subsets), len(X)))
+        for one, subset in zip(found, subsets, strict=True):
+            if parts := sorted(g for g in subset if self.has_part[g]):
+                draws = draw(self.blocks, len(X), np.random.default_rng([1, *parts]))
+                one[:] = self._given(parts, X, draws)
+        return found
 
     def curve(self, subset, X):
         """E[y | x_v] at rows X, less the mean, over the same draws of all others at each."""

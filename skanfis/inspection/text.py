@@ -244,10 +244,18 @@ def _conclusion(said, r, k):
 def _slopes(said, slopes, places, is_said):
     """Say "+5.8 per rooms from 6.3", "-2.1 if private is 1"; what does most comes first.
 
-    Of no slope, which stands in place of a common one, "no change with rooms".
+    Levels of one category stand together. Of no slope, which stands in place of a common one, "no
+    change with rooms".
     """
     parts, does = [], np.abs(slopes) * said.model.spread
-    for j in sorted(np.flatnonzero(is_said), key=lambda j: -does[j]):
+    owner = {
+        j: said.levels[name].column if (name := said.model.input_names[j]) in said.levels else name
+        for j in np.flatnonzero(is_said)
+    }
+    most: dict[str, float] = {}
+    for j, column in owner.items():
+        most[column] = max(most.get(column, 0.0), does[j])
+    for j in sorted(owner, key=lambda j: (-most[owner[j]], owner[j], -does[j])):
         name, slope, place = said.model.input_names[j], slopes[j], places[j]
         if said.two_valued[j]:
             other = 1.0 - place

@@ -73,7 +73,7 @@ def test_cuts_are_called_as_in_the_text(rng):
     pipe = make_pipeline(encoder, quick(partition="tree", max_rules=3, order=0)).fit(X, y)
     told = re.findall(r"^  IF (.*)$", export_text(pipe), flags=re.MULTILINE)
     asked = {part for premise in told for part in premise.split(" AND ")}
-    assert {"shelf is b", "shelf is not b"} < asked
+    assert {"shelf is b", "shelf is a"} < asked
     display = TreeDisplay.from_estimator(pipe)
     shown = {text.replace(r"\$", "$") for text in texts(display)}
     assert shown == asked | set(display.leaves)
