@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -258,3 +259,19 @@ def test_apply_gives_the_strongest_rule_and_of_equals_the_first(counts):
     equal = np.flatnonzero(np.isclose(strengths, strengths.max(), rtol=1e-12))
     assert equal.size >= 2
     assert estimator.apply(middle)[0] == equal[0]
+
+
+def test_a_table_is_read_by_its_names_and_other_shapes_are_refused(rng):
+    frozen = MODELS["grid"]
+    X = around(frozen, rng)
+    table = pd.DataFrame(X, columns=frozen.input_names).assign(more=0.0).iloc[:, ::-1]
+    for ask in ("predict", "in_bounds", "strengths", "coverage", "gradient", "way_out"):
+        assert_array_equal(getattr(frozen, ask)(table), getattr(frozen, ask)(X))
+    assert_array_equal(frozen.predict(X.tolist()), frozen.predict(X))
+    name = frozen.input_names[1]
+    with pytest.raises(ValueError, match=f"X lacks the column '{name}': the model takes '"):
+        frozen.predict(table.drop(columns=name))
+    with pytest.raises(
+        ValueError, match=r"X has the shape \(200, 2\); the model takes \(n_rows, 3\)"
+    ):
+        frozen.strengths(X[:, :2])

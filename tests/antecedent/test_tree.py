@@ -150,3 +150,34 @@ class TestOneTermEach:
         twice = RuleTableAntecedent(table.groups, np.array([[0, 1], [2, 4]]))
         with pytest.raises(ValueError, match="Rule 0 has 2 terms of 'a'"):
             twice.with_one_term_each(["a", "b", "c"])
+
+
+@pytest.mark.parametrize(
+    ("cuts", "widths", "left"),
+    [
+        # 0.9 true at 1 and at 2: next to nothing lies between.
+        ([0.0, 3.0], [1.0, 1.0], [0]),
+        ([0.0, 1.9], [1.0, 1.0], [0, 1]),
+        # A wide side reaches over a narrow one, whichever is the outer.
+        ([0.0, 3.0], [2.5, 0.1], [0, 1]),
+        ([0.0, 3.0], [0.1, 2.5], [0, 1]),
+        ([0.0, 7.0, 3.5], [1.0, 1.0, 1.0], [0]),
+    ],
+)
+def test_sides_that_follow_from_others_are_left_out(cuts, widths, left):
+    theta = np.array([cuts, np.log(np.array(widths) / np.log(9.0))])
+    # Down one path, ever below; and up one, ever above, on a mirror.
+    for sign, is_above in ((1.0, False), (-1.0, True)):
+        path = [(node, is_above) for node in range(len(cuts))]
+        others = [[*path[:k], (k, not is_above)] for k in range(len(cuts))]
+        found = TreeAntecedent.build([0] * len(cuts), theta * [[sign], [1.0]], [path, *others])
+        shorter = found.without_implied(0.011)
+        kept = [t % len(cuts) for t in shorter.rule_terms[0] if t >= 0]
+        assert kept == left
+        Z = np.linspace(-15.0, 15.0, 2001)[None]
+        assert np.abs(shorter.strengths(Z) - found.strengths(Z)).max() < 0.011
+
+
+def test_what_says_no_less_is_the_same_tree():
+    whole = tree(5)
+    assert whole.without_implied(0.0) is whole

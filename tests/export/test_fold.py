@@ -201,7 +201,8 @@ def test_one_hot_encoded_columns_are_inputs(options, fibres):
     ("step", "message"),
     [
         (PCA(2), r"step 'pca' \(PCA\) cannot be folded into the rules: .* every column alone"),
-        (SimpleImputer(), "SimpleImputer"),
+        (SimpleImputer(add_indicator=True), "SimpleImputer.*add_indicator=False"),
+        (SimpleImputer(missing_values=0.0), "SimpleImputer.*missing_values=nan"),
         (FunctionTransformer(np.negative), "FunctionTransformer"),
         (FeatureUnion([("a", StandardScaler())]), "FeatureUnion"),
         (MinMaxScaler(clip=True), "clip=True bends it"),
@@ -232,10 +233,38 @@ def test_a_bent_target_is_refused(settings):
 
 def test_what_is_behind_a_step_that_does_not_fold_does():
     X, y = data()
-    pipe = make_pipeline(SimpleImputer(), StandardScaler(), regressor(n_mfs=2)).fit(X, y)
+    pipe = make_pipeline(PCA(2), StandardScaler(), regressor(n_mfs=2)).fit(X, y)
     with pytest.raises(ValueError, match=r"give what is behind it: pipeline\[-1\]"):
         fold(pipe)
-    assert_allclose(fold(pipe[1:]).predict(X)[:, 0], pipe.predict(X), rtol=1e-9)
+    assert_allclose(fold(pipe[1:]).predict(pipe[0].transform(X))[:, 0], pipe.predict(X), rtol=1e-9)
+
+
+def test_what_stands_for_missing_values_stands_for_them_in_tables(rng):
+    X, y = data()
+    table = pd.DataFrame(X, columns=NAMES).assign(fibre=rng.choice(["PM", "SM"], len(X)))
+    for name in ("kelvin", "fibre"):
+        table.loc[rng.choice(len(X), 30), name] = np.nan
+    table["fibre"] = table["fibre"].astype(object)
+    numbers = make_pipeline(SimpleImputer(strategy="median"), StandardScaler())
+    scaled_first = make_pipeline(MinMaxScaler(), SimpleImputer())
+    encoder = OneHotEncoder(drop="if_binary", sparse_output=False)
+    words = make_pipeline(SimpleImputer(strategy="most_frequent"), encoder)
+    every = ColumnTransformer(
+        [("n", numbers, NAMES[:2]), ("s", scaled_first, NAMES[2:]), ("w", words, ["fibre"])]
+    )
+    pipe = make_pipeline(every, regressor(n_mfs=[2, 2, 1, 1])).fit(table, y)
+    assert list(fold(pipe).input_names) == [*NAMES, "fibre_SM"]
+    model, rows = fold_with_rows(pipe, table)
+    assert_allclose(model.predict(rows)[:, 0], pipe.predict(table), rtol=1e-9)
+
+
+def test_an_imputer_that_drops_a_column_is_refused():
+    X, y = data()
+    X[:, 1] = np.nan
+    with pytest.warns(UserWarning, match="without any observed values"):
+        pipe = make_pipeline(SimpleImputer(), regressor(n_mfs=2)).fit(X, y)
+    with pytest.raises(ValueError, match=r"SimpleImputer.* drops a column that has no values"):
+        fold(pipe)
 
 
 def test_what_has_no_rules_is_refused():

@@ -254,3 +254,15 @@ AT_REST = {"rate": [0.0, 0.0]}
 def test_what_cannot_be_found_is_said(name, columns, message):
     with pytest.raises(ValueError, match=message):
         figure(name, **columns)
+
+
+def test_the_bias_is_of_the_rows_at_rest_where_there_are_some():
+    rate = np.repeat([-100.0, -50.0, 0.0, 50.0, 100.0], 10)
+    output = np.where(rate > 0.0, 1.0015, 1.0005) * rate + 5.0 / HOUR
+    error = input_error(rate, output)
+    # An asymmetry moves the line, not the output at rest.
+    assert figure("bias", error=error, rate=rate) == pytest.approx(5.0, rel=1e-2)
+    moving = rate != 0.0
+    of_line = figure("bias", error=error[moving], rate=rate[moving])
+    assert of_line == pytest.approx(HOUR * error[moving].mean(), rel=1e-12)
+    assert of_line > 50.0

@@ -216,3 +216,13 @@ def test_a_row_less_moves_no_other_row_to_another_fold():
     for lost in (0, 700, 1799):
         less = tested_with(log.drop(index=lost).reset_index(drop=True))
         np.testing.assert_array_equal(less, np.delete(whole, lost))
+
+
+@pytest.mark.parametrize(("rates", "n_levels"), [([-50, 50], 1), ([-50, 0, 50], 2), (LEVELS, 5)])
+def test_too_few_levels_to_hold_one_out_are_told(rates, n_levels):
+    log = make_ofog(n_devices=1, n_runs=4, sampling_interval=60.0, rates=rates, random_state=0)
+    split = choose_split(log)
+    assert ("level" in split.kind) == (n_levels >= 5)
+    expected = "the table stood still at 2 rates alone" if n_levels == 2 else ""
+    assert split.caution[: len(expected)] == expected
+    assert bool(split.caution) == (n_levels == 2)

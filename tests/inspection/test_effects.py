@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
+from sklearn.cluster import KMeans
 from sklearn.compose import make_column_transformer
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
@@ -247,3 +248,16 @@ def test_a_constant_output_has_no_shares():
     model = quick(n_mfs=2).fit(X, np.full(30, 3.0))
     assert_allclose(effects(model, X).table, 0.0)
     assert_allclose(model.feature_importances_, 0.0)
+
+
+def test_of_draws_what_no_rule_names_has_no_share_at_all(rng):
+    X = rng.normal(size=(300, 3))
+    y = np.tanh(2.0 * X[:, 0]) + X[:, 1] + 0.1 * rng.standard_normal(300)
+    model = quick(
+        partition=KMeans(3, n_init=1, random_state=0),
+        premise_features=[0],
+        consequent_features=[0, 1],
+    ).fit(X, y)
+    table = effects(model, X).table
+    assert_allclose(table.loc[[name for name in table.index if "x2" in name]], 0.0, atol=1e-12)
+    assert table.loc["x1", "sobol"] > 0.2

@@ -267,6 +267,7 @@ def test_a_category_is_listed_by_its_levels(rng):
     # Where it takes levels that it has not seen, they are others.
     unseen = OneHotEncoder(handle_unknown="ignore", drop="if_binary", sparse_output=False)
     encoder = make_column_transformer((unseen, ["sort", "on"]), remainder="passthrough")
+    y += X["on"] == "y"
     told = export_text(make_pipeline(encoder, ANFISRegressor(n_mfs=1)).fit(X, y))
     assert "\n  on: y, other\n" in told
 
@@ -473,3 +474,22 @@ def test_names_are_text_whatever_they_contain():
     for _, attributes in page.tags:
         assert not any(name.startswith("on") for name in attributes)
         assert not {"src", "href"} & set(attributes)
+
+
+def test_slopes_of_one_category_stand_together_and_its_signs_are_told_by_its_levels(rng):
+    X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 900), "z": rng.uniform(-1, 1, 900)})
+    X["w"] = rng.normal(size=900)
+    jump = np.where(X["z"] > 0, 1.0, -1.0)
+    effect = X["sort"].map({"a": 3.0, "b": 0.0, "c": 0.5})
+    y = jump * (effect + 4.0) + jump * X["w"] + 0.1 * rng.standard_normal(900)
+    encoder = OneHotEncoder(drop=["b"], sparse_output=False)
+    encoder = make_column_transformer((encoder, ["sort"]), remainder="passthrough")
+    text = export_text(
+        make_pipeline(encoder, ANFISRegressor(partition="tree", max_rules=2)).fit(X, y)
+    )
+    # By size the slope in w stands between the two.
+    assert re.findall(r"(sort|w) (?:is|from)", text.partition("Inputs")[0]) == 2 * [
+        *("sort", "sort", "w")
+    ]
+    joined = " ".join(text.split())
+    assert re.search(r"if sort is a, up in rule 0 and down in rule 1; if sort is c, up", joined)
