@@ -1,13 +1,13 @@
 """What a calibration does beside its fits, without the time that these take."""
 
 from functools import partial
-from itertools import islice
 
 import pytest
 
-from skanfis.gyro import _calibration, _results, _simpler
+from skanfis.gyro import _calibration, _results
 
 from ..quick import quick
+from .planted import with_few_rivals
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +45,17 @@ def say(capsys):
 
 @pytest.fixture
 def few_rivals(monkeypatch):
-    """Of what is simpler than rules the simplest alone; test_calibration.py asks for the others."""
-    every = _simpler.kinds
-    monkeypatch.setattr(_simpler, "kinds", lambda *given: islice(every(*given), 3))
+    with_few_rivals(monkeypatch)
+
+
+@pytest.fixture
+def no_drawing(monkeypatch):
+    """Pictures are made but not painted, which takes longer than all else."""
+    painter = "matplotlib.backends.backend_agg.FigureCanvasAgg.print_png"
+    monkeypatch.setattr(painter, lambda *_, **__: None)
+
+
+@pytest.fixture
+def no_pictures(monkeypatch, no_drawing):
+    """The report's words and tables, with few pictures."""
+    monkeypatch.setattr(_results, "_PICTURES", {})

@@ -110,6 +110,9 @@ def variant(number, logs, seed=0):
     return Variant(number, source, ".csv", content, is_determined, np.arange(len(log)), name)
 
 
+RATES = {"deg/s": 1.0, "rad/s": np.pi / 180, "deg/h": 3600.0, "mdeg/s": 1e3, "counts": -27e5}
+
+
 def rows_of(log, noise):
     """What a row of an instrument may be made of, in every unit."""
     start = 7200.0 * log["run"].astype(float) if "run" in log else 0.0
@@ -125,19 +128,9 @@ def rows_of(log, noise):
             "moment": moment,
             "t": {"s": t, "ms": 1e3 * t, "us": 1e6 * t + 4.2e7, "min": t / 60.0},
             "T": {"C": heat, "F": 1.8 * heat + 32.0},
-            "y": in_units(output),
+            "y": {unit: factor * output for unit, factor in RATES.items()},
             "a": a,
             "b": b,
-            "r": in_units(rate),
+            "r": {unit: factor * rate for unit, factor in RATES.items()},
             "vdd": 3300.0 + 1e4 * a,
         }
-
-
-def in_units(rate):
-    return {
-        "deg/s": rate,
-        "rad/s": np.radians(rate),
-        "deg/h": 3600.0 * rate,
-        "mdeg/s": 1e3 * rate,
-        "counts": -27e5 * rate,
-    }

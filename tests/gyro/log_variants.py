@@ -46,10 +46,12 @@ def clean_logs():
     runs = make_ofog(n_devices=1, n_runs=4, duration=1200.0, sampling_interval=10.0,
                      random_state=1)  # fmt: skip
     levels = make_ofog(n_devices=1, n_runs=1, profile="ramps", duration=7200.0, random_state=2,
-                       sampling_interval=10.0, rates=np.arange(-90.0, 91.0, 15.0))  # fmt: skip
-    time = np.arange(0.0, 14_400.0, 20.0)
+                       sampling_interval=20.0, rates=np.arange(-90.0, 91.0, 15.0))  # fmt: skip
+    time = np.arange(0.0, 14_400.0, 40.0)
     heat = 20.0 - 40.0 * np.sin(2.0 * np.pi * time / 7200.0)
-    bias = 0.4 + 0.01 * heat + 1e-4 * heat**2 + 1e-3 * np.random.default_rng(0).normal(size=720)
+    bias = (
+        0.4 + 0.01 * heat + 1e-4 * heat**2 + 1e-3 * np.random.default_rng(0).normal(size=time.size)
+    )
     rest = pd.DataFrame({"time": time, "temperature": heat, "output": bias})
     parts = ["time", "temperature", "output", "rate"]
     return {"runs": runs[[*parts, "run"]].astype({"run": str}), "levels": levels[parts],

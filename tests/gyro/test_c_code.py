@@ -19,11 +19,7 @@ from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.export import export_c
-from skanfis.gyro import (
-    OpenLoopArcsineRegressor,
-    ResidualRegressor,
-    export_c_physics,
-)
+from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_physics
 from skanfis.gyro.compose import law_and_rules
 from skanfis.gyro.physics import phase_of
 
@@ -35,6 +31,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsW
 
 COUNTS = -27_000.0  # per deg/s
 MIN_COVERAGE = 0.2
+SELF_TEST = ["-DGYRO_SELF_TEST", "-DGYRO_SELF_TEST_MAIN"]
 
 
 @cache
@@ -43,11 +40,6 @@ def simulated():
     rate = np.gradient(log["temperature"]) / 20.0
     log["output"] = COUNTS * log["output"] + 3e4
     return log.assign(thermal_rate=rate, unused=np.ones(len(log)))
-
-
-@pytest.fixture(name="log")
-def simulated_log():
-    return simulated()
 
 
 @cache
@@ -141,10 +133,10 @@ def expected(model, X):
 
 @needs_compiler
 @pytest.mark.parametrize(
-    ("dtype", "tolerance", "std"), [("double", 1e-12, "c99"), ("float", 1e-5, "c89")]
+    ("dtype", "limit", "std"), [("double", 1e-12, "c99"), ("float", 1e-5, "c89")]
 )
 @pytest.mark.parametrize("case", CASES)
-def test_answers_as_predict(log, case, dtype, tolerance, std, tmp_path):
+def test_answers_as_predict(case, dtype, limit, std, tmp_path):
     real = np.float32 if dtype == "float" else np.float64
     model, X = case()
     # The text is the same but for the names of types, and for what policies do.
@@ -166,9 +158,9 @@ def test_answers_as_predict(log, case, dtype, tolerance, std, tmp_path):
     answered = sure & np.isfinite(wanted)
     off = np.abs(y[:-3, 0] - wanted)
     # Full scale in range, and that of the rates which rows far out of range mean.
-    scale = np.abs(wanted[bits == 0] if "cubic" in case.__name__ else log["rate"]).max()
-    assert off[bits == 0].max() < tolerance * scale
-    assert off[answered].max() < tolerance * np.abs(wanted[answered]).max()
+    scale = np.abs(wanted[bits == 0] if "cubic" in case.__name__ else simulated()["rate"]).max()
+    assert off[bits == 0].max() < limit * scale
+    assert off[answered].max() < limit * np.abs(wanted[answered]).max()
     is_silent = case in (silent, rules_raise, silent_cubic)
     assert (answered < sure).any() == is_silent
     silence = y[np.append(answered < sure, [True] * 3), 0]
@@ -192,20 +184,19 @@ def test_no_rate_where_the_law_has_none(tmp_path):
 
 @pytest.mark.theory
 @needs_compiler
-def test_files_make_a_program_that_tests_itself(log, tmp_path):
+def test_files_make_a_program_that_tests_itself(tmp_path):
     model, X = whole()
     folds = KFold(2, shuffle=True, random_state=0)
-    search = GridSearchCV(model, {"residual__n_mfs": [1, 2]}, cv=folds).fit(X, log["rate"])
+    search = GridSearchCV(model, {"residual__n_mfs": [1, 2]}, cv=folds).fit(X, simulated()["rate"])
     code = export_c_physics(search, tmp_path / "gyro-7", name="gyro", dtype="float", std="c89")
     assert (tmp_path / "gyro-7.c").read_text() == code.source
-    flags = ["-std=c89", *STRICT, *SANITIZE, "-DGYRO_SELF_TEST", "-DGYRO_SELF_TEST_MAIN"]
-    gcc([*flags, "gyro-7.c", "-o", "test", "-lm"], tmp_path)
+    gcc(["-std=c89", *STRICT, *SANITIZE, *SELF_TEST, "gyro-7.c", "-o", "test", "-lm"], tmp_path)
     assert run(["./test"], tmp_path).returncode == 0
     # A wrong coefficient is found out.
     wrong = code.source.replace("gyro_sagnac[2] =\n{ ", "gyro_sagnac[2] =\n{ 2.0f * ")
     assert wrong != code.source
     (tmp_path / "gyro-7.c").write_text(wrong)
-    gcc([*flags, "gyro-7.c", "-o", "test", "-lm"], tmp_path)
+    gcc(["-std=c89", *SELF_TEST, "gyro-7.c", "-o", "test", "-lm"], tmp_path)
     assert run(["./test"], tmp_path).returncode == 1
 
 
@@ -254,7 +245,8 @@ def test_of_misra_c_is_kept_what_the_header_says(tmp_path):
     assert found <= set(re.findall(r"\d+\.\d+", named))
 
 
-def refused(log, base=None, residual=None):
+def refused(base=None, residual=None):
+    log = simulated()
     base = OpenLoopArcsineRegressor("output", "temperature") if base is None else base
     residual = quick(n_mfs=1) if residual is None else residual
     return ResidualRegressor(base, residual).fit(log[["output", "temperature"]], log["rate"])
@@ -277,15 +269,15 @@ def refused(log, base=None, residual=None):
     ],
 )
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
-def test_refuses_what_it_cannot_write(log, parts, error, message):
+def test_refuses_what_it_cannot_write(parts, error, message):
     with pytest.raises(error, match=message):
-        export_c_physics(refused(log, **parts), name="gyro")
+        export_c_physics(refused(**parts), name="gyro")
 
 
-def test_refuses_what_is_no_composition(log):
+def test_refuses_what_is_no_composition():
     with pytest.raises(TypeError, match="fitted ResidualRegressor"):
         export_c_physics(ANFISRegressor(n_mfs=1), name="gyro")
-    model = refused(log)
+    model = refused()
     with pytest.raises(ValueError, match="with 14 or fewer"):
         export_c_physics(model, name="gyroscope_number")
     model.base_.amplitude_ = model.base_.amplitude_ * 1e40

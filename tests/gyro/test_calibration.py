@@ -1,47 +1,22 @@
 """From a log to a verdict: planted truths, held out by hand, and structures chosen within folds."""
 
-from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 import pandas as pd
 import pytest
-from sklearn.model_selection import GroupKFold
 
 from skanfis.gyro import _calibration, _simpler
-from skanfis.gyro._calibration import Recipe, _shared_rows, calibrate, fit_model
+from skanfis.gyro._calibration import Recipe, _shared_rows, fit_model
 from skanfis.gyro._headline import errors_and_verdict, formula_of, headline
-from skanfis.gyro._split import Split
+
+from .planted import NOISE, calibrated, evaluated, log_of
 
 pytestmark = pytest.mark.theory
 
-N_RUNS, N_ROWS = 8, 60
-NOISE = 2e-4
 
-
-def log_of(error, seed=0):
-    """Runs at temperatures and rates that overlap, with a planted error of both [deg/s]."""
-    rng = np.random.default_rng(seed)
-    run = np.repeat(np.arange(N_RUNS), N_ROWS)
-    temperature = rng.uniform(0.0, 50.0, run.size)
-    rate = rng.uniform(-100.0, 100.0, run.size)
-    output = rate + error(temperature, rate) + NOISE * rng.normal(size=run.size)
-    columns = {"run": run, "temperature": temperature, "rate": rate, "output": output}
-    return pd.DataFrame(columns)
-
-
-def folds_of(log, n_folds=2):
-    return list(GroupKFold(n_folds).split(log, groups=log["run"]))
-
-
-def split_of(log, n_folds=2):
-    labels = log["run"].astype(str).to_numpy(dtype=object)
-    return Split("run", folds_of(log, n_folds), labels, "runs held out")
-
-
-def calibrated(log, **options):
-    recipe = Recipe(("temperature", "output"), **options)
-    return calibrate(log, split_of(log), recipe, lambda text: None)
+def constant(temperature, rate):
+    return 0.005 + 0.0 * temperature
 
 
 def law(temperature, rate):
@@ -51,7 +26,7 @@ def law(temperature, rate):
 
 
 PLANTED = {
-    "constant": (lambda t, r: 0.005 + 0.0 * t, (2, 2)),
+    "constant": (constant, (2, 2)),
     "straight line": (lambda t, r: 0.005 + 2e-4 * t + 1e-5 * r, (2, 2)),
     "arcsine law": (law, (2, 3)),
     "cubic polynomial": (lambda t, r: 2e-9 * (t - 25.0) * r**2 * 1e2, (1, 1)),
@@ -62,7 +37,7 @@ PLANTED = {
 @pytest.mark.parametrize("truth", PLANTED)
 def test_the_planted_truth_is_recommended(truth):
     error, terms = PLANTED[truth]
-    calibration = calibrated(log_of(error), terms=terms)
+    calibration = calibrated(log_of(error, n_rows=40), terms=terms)
     verdict = calibration.verdict
     assert verdict.recommended == truth, verdict
     title, sentence = headline(calibration, "deg/s")
@@ -71,43 +46,56 @@ def test_the_planted_truth_is_recommended(truth):
         return
     assert title.startswith("Use ")
     assert title.endswith(f"{truth} instead of the fuzzy rules")
-    assert f"more than the scatter over the {N_RUNS} held-out runs" in sentence
+    assert "more than the scatter over the 8 held-out runs" in sentence
+
+
+BOTH, INPUTS = "arcsine law and a line", ("time", "temperature", "output")
+SLOWLY = {"n_folds": 4, "terms": (1, 1, 1)}
+
+
+@pytest.fixture(scope="module")
+def law_and_line():
+    """What follows the arcsine law, and goes up with the time since power-on."""
+    log = log_of(law)
+    log["time"] = 60.0 * log.groupby("run").cumcount()
+    log["output"] += 2e-6 * log["time"]
+    return calibrated(log, INPUTS, **SLOWLY)
 
 
 @pytest.mark.floors
-def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended(monkeypatch):
-    log = log_of(law)
-    log["time"] = np.tile(np.arange(N_ROWS) * 60.0, N_RUNS)
-    log["output"] += 2e-6 * log["time"]
-    split = split_of(log, 4)
-    recipe = Recipe(("time", "temperature", "output"), terms=(1, 1, 1))
-    calibration = calibrate(log, split, recipe, lambda text: None)
-    verdict = calibration.verdict
-    assert verdict.recommended == "arcsine law and a line", verdict
+def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended(law_and_line, monkeypatch):
+    verdict = law_and_line.verdict
+    assert verdict.recommended == BOTH, verdict
     # Law and line are fitted in turns: what is left is a little more than the noise.
-    assert verdict.rms["arcsine law and a line"] < 0.5 * verdict.rms["arcsine law"]
-    assert verdict.rms["arcsine law and a line"] < 3.0 * NOISE
+    assert verdict.rms[BOTH] < 0.5 * verdict.rms["arcsine law"]
+    assert verdict.rms[BOTH] < 3.0 * NOISE
     every = _simpler.kinds
     monkeypatch.setattr(_simpler, "kinds", lambda *given: islice(every(*given), 1))
     # The single rule of --physics --terms 1,1,1 is that line.
-    alone = calibrate(log, split, replace(recipe, physics=True), lambda text: None)
-    assert alone.verdict.rms["this model"] == pytest.approx(
-        verdict.rms["arcsine law and a line"], rel=0.01
-    )
-    law_text, line = formula_of(calibration, "arcsine law and a line").split("added the line:\n")
-    assert law_text.startswith("rate [deg/s] = arcsin(")
-    names = calibration.X.to_dict("series")
-    for step in line.replace("\n    ", " ").replace("^", "**").split("\n"):
-        variable, _, value = step.partition(" = ")
-        names[variable] = eval(value, {}, names)
-    simple = next(each for each in calibration.simpler if each.name == "arcsine law and a line")
-    added = simple.estimator.residual_.predict(calibration.X)
-    np.testing.assert_allclose(names["line"], added, atol=1e-8)
+    alone = calibrated(law_and_line.log, INPUTS, physics=True, **SLOWLY).verdict
+    assert alone.rms["this model"] == pytest.approx(verdict.rms[BOTH], rel=0.01)
+
+
+@pytest.mark.floors
+@pytest.mark.parametrize("name", ["constant", "straight line", "cubic polynomial", BOTH])
+def test_the_formula_of_what_is_simpler_can_be_computed(law_and_line, name):
+    formula, columns = formula_of(law_and_line, name), law_and_line.X.to_dict("series")
+    estimator = next(each for each in law_and_line.simpler if each.name == name).estimator
+    if name == BOTH:
+        law_text, line = formula.split("added the line:\n")
+        assert law_text.startswith("rate [deg/s] = arcsin(")
+        found = evaluated(line, columns)["line"]
+        expected = estimator.residual_.predict(law_and_line.X)
+    else:
+        rate, _, error = formula.partition("\n")
+        found = evaluated(f"{error}\n{rate}", columns)["rate"]
+        expected = law_and_line.before - estimator.predict(law_and_line.X)
+    np.testing.assert_allclose(found, expected, atol=1e-8)
 
 
 @pytest.mark.usefixtures("few_rivals")
 def test_before_after_and_what_is_simpler_are_of_the_same_rows():
-    log = log_of(PLANTED["constant"][0])
+    log = log_of(constant)
     # A run at a temperature of its own is out of range, and 30 times worse.
     hot = log["run"] == 3
     log.loc[hot, "temperature"] += 200.0
@@ -120,7 +108,7 @@ def test_before_after_and_what_is_simpler_are_of_the_same_rows():
     assert verdict.rms["no compensation"] == pytest.approx(np.sqrt(np.mean(before[rows] ** 2)))
     # The constant of every fold by hand.
     left = before.copy()
-    for train, test in folds_of(log):
+    for train, test in calibration.split.folds:
         left[test] -= before[train].mean()
     assert verdict.rms["constant"] == pytest.approx(np.sqrt(np.mean(left[rows] ** 2)))
     shown = errors_and_verdict(calibration)[0]
@@ -131,7 +119,7 @@ def test_before_after_and_what_is_simpler_are_of_the_same_rows():
 
 @pytest.mark.floors
 def test_a_gyro_at_rest_has_no_law():
-    log = log_of(PLANTED["constant"][0]).assign(rate=0.0)
+    log = log_of(constant).assign(rate=0.0)
     log["output"] = 0.01 + 1e-4 * log["temperature"]
     calibration = calibrated(log, terms=(1, 1))
     found = {simple.name: simple for simple in calibration.simpler}
@@ -141,16 +129,15 @@ def test_a_gyro_at_rest_has_no_law():
 
 @pytest.mark.usefixtures("few_rivals")
 def test_what_a_fold_holds_out_has_no_say_in_its_model(monkeypatch):
-    log = log_of(PLANTED["constant"][0])
-    split, seen = split_of(log), []
+    log, seen = log_of(constant), []
 
     def spy(X, target, groups, recipe):
         seen.append(X.index.to_numpy())
         return fit_model(X, target, groups, recipe)
 
     monkeypatch.setattr(_calibration, "fit_model", spy)
-    calibrate(log, split, Recipe(("temperature",), terms=(1,)), lambda text: None)
-    for rows, (train, _) in zip(seen[:-1], split.folds, strict=True):
+    folds = calibrated(log, ("temperature",), terms=(1,)).split.folds
+    for rows, (train, _) in zip(seen[:-1], folds, strict=True):
         np.testing.assert_array_equal(rows, train)
     np.testing.assert_array_equal(seen[-1], log.index)
 
@@ -169,9 +156,7 @@ def test_terms_are_for_what_the_law_leaves():
 
 def test_rows_that_one_group_alone_reaches_do_not_choose_terms():
     # Four groups, each of eleven temperatures; the first begins 2 lower, the last ends 3 higher.
-    first = np.array([-2.0, 0.0, 0.0, 0.0])
-    last = np.array([10.0, 10.0, 10.0, 13.0])
-    heat = np.concatenate([np.linspace(*ends, 11) for ends in zip(first, last, strict=True)])
+    heat = np.linspace([-2.0, 0.0, 0.0, 0.0], [10.0, 10.0, 10.0, 13.0], 11, axis=1).ravel()
     X, groups = pd.DataFrame({"temperature": heat, "output": 1.0}), np.repeat(list("abcd"), 11)
     found = _shared_rows(X, groups)
     np.testing.assert_array_equal(found, np.flatnonzero((heat >= 0.0) & (heat <= 10.0)))

@@ -5,7 +5,7 @@ import os
 import re
 import shutil
 import sys
-from itertools import islice, pairwise
+from itertools import pairwise
 
 import joblib
 import numpy as np
@@ -22,20 +22,28 @@ from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, _simpler, command
 from skanfis.gyro._options import make_parser
 from skanfis.gyro.command import main
+from skanfis.gyro.compensator import features
+from skanfis.gyro.log import read_log
 
-pytestmark = pytest.mark.usefixtures("given_weights", "coarse_report")
+from ..quick import quick
+from .planted import with_few_rivals
 
+pytestmark = pytest.mark.usefixtures("coarse_report", "no_report")
+
+REPORT, KINDS = command.report_page, _simpler.kinds
 RAW = "--columns time=t_ms temperature=T output=counts --units time=ms temperature=K output=counts"
 FACTOR = -27_000.0
 FILES = ["compensator.joblib", "compensator.json", "report.html", "rules.txt"]
 # A fit of the smallest kind, where it is not the question.
 SMALL = "--inputs temperature output --terms 1,2"
+PARTS = ["time", "temperature", "output", "rate"]
+EVERY = ("time", "temperature", "temperature_rate", "output")
 
 
 @pytest.fixture(scope="module")
 def log():
     log = make_ofog(n_devices=1, n_runs=5, duration=900.0, random_state=0)
-    return log[["time", "temperature", "output", "rate", "run"]]
+    return log[[*PARTS, "run"]]
 
 
 @pytest.fixture
@@ -55,17 +63,13 @@ def names_in(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-@pytest.fixture
-def no_report(monkeypatch, few_rivals):
-    """Leave out the report and what it compares with, which take longer than all else together."""
-    monkeypatch.setattr(command, "report_page", lambda results, title: title)
-
-
-@pytest.fixture
-def no_pictures(monkeypatch):
-    """A report of words and tables; of other pictures nothing is painted."""
-    monkeypatch.setattr("skanfis.gyro._results._PICTURES", {})
-    monkeypatch.setattr("matplotlib.figure.Figure.savefig", lambda *_, **__: None)
+@pytest.fixture(scope="module")
+def no_report(given_weights):
+    """Without the report and what it compares with, which take longer than all else together."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(command, "report_page", lambda results, title: title)
+        with_few_rivals(patch)
+        yield
 
 
 def raw(log, kelvin=273.15):
@@ -81,16 +85,12 @@ def raw(log, kelvin=273.15):
 
 
 @pytest.fixture(scope="module")
-def calibrated(tmp_path_factory, log, given_weights):
-    """A folder after one calibration from raw columns; without a report."""
+def calibrated(tmp_path_factory, log, no_report):
+    """A folder after one calibration from raw columns."""
     folder = tmp_path_factory.mktemp("calibrated")
     raw(log).assign(table=log["rate"]).to_csv(folder / "raw.csv", index=False)
     typed = f"{RAW} --columns rate=table --terms 1,2,1,3 --c c99 --write rules".split()
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(command, "report_page", lambda results, title: title)
-        every = _simpler.kinds
-        patch.setattr(_simpler, "kinds", lambda *given: islice(every(*given), 2))
-        assert main([str(folder / "raw.csv"), *typed, "--output", str(folder / "out")]) == 0
+    assert main([str(folder / "raw.csv"), *typed, "--output", str(folder / "out")]) == 0
     return folder
 
 
@@ -100,7 +100,7 @@ def test_it_writes_what_it_says_and_the_compensator_knows_units(calibrated, log)
     slope = np.polyfit(log["rate"], FACTOR * log["output"], 1)[0]
     assert compensator.scale_factor == pytest.approx(slope, rel=1e-9)
     assert compensator.output_unit == "counts"
-    assert compensator.inputs == ("time", "temperature", "temperature_rate", "output")
+    assert compensator.inputs == EVERY
     compensated = compensator.apply(log.assign(output=FACTOR * log["output"]))
     assert (compensated["rate_compensated"] - log["rate"]).std() < 0.01
     same = joblib.load(calibrated / "out" / "compensator.joblib")
@@ -138,7 +138,6 @@ def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path
     assert "before" not in out
 
 
-@pytest.mark.usefixtures("no_pictures")
 @pytest.mark.parametrize(
     ("write", "kind", "c"),
     [
@@ -148,7 +147,11 @@ def test_apply_flags_what_is_out_of_range_and_needs_no_rate(calibrated, tmp_path
         ("line", "a straight line", "c99"),
     ],
 )
-def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind, c, run):
+def test_what_is_recommended_or_asked_for_is_written(
+    tmp_path, log, write, kind, c, run, monkeypatch
+):
+    if write in ("recommended", "cubic"):
+        monkeypatch.setattr(_simpler, "kinds", KINDS)
     log = log[log["run"] < 4]
     code, said, _ = run(log, f"--inputs temperature output --terms 1,1 --c {c} --write {write}")
     assert (code, f"written is     {kind}, as" in said) == (0, True)
@@ -175,20 +178,17 @@ def test_what_is_recommended_or_asked_for_is_written(tmp_path, log, write, kind,
     goes_on = "Outside this range the law goes on as it is." in header
     assert goes_on == (write == "recommended")
     assert "the rules" not in header
-    page = (out / "report.html").read_text(encoding="utf-8")
-    assert page.index("&#39;output&#39; has no unit, taken as deg/s") < page.index("<section>")
     assert compensator.units["output"] == "deg/s"
-    # That of the report's first table is the error of what is written.
     text = (out / "rules.txt").read_text(encoding="utf-8")
     assert text.startswith("rate [deg/s] = arcsin(" if write == "recommended" else "rate = output")
 
 
-@pytest.mark.usefixtures("no_report")
 def test_progress_and_summary(tmp_path, log, say, monkeypatch):
     monkeypatch.chdir(tmp_path)
     log[log["run"] < 3].to_csv("log.csv", index=False)
     limits = ["residual_rms=90deg/s", "residual_rms=1e-9deg/s"]
-    code, out, err = say("log.csv", "--inputs", "temperature", "output", "--limits", *limits)
+    # The folder is called after the first file of a pattern.
+    code, out, err = say("l*.csv", "--inputs", "temperature", "output", "--limits", *limits)
     # All is written, and a limit is not kept.
     assert code == 6
     assert "specification  1 of 2 limits are kept; not kept: residual rms" in out
@@ -200,7 +200,6 @@ def test_progress_and_summary(tmp_path, log, say, monkeypatch):
     assert "held-out rows in range" in out
 
 
-@pytest.mark.usefixtures("no_report")
 def test_physics_and_policy(tmp_path, log, run):
     log, out = log[log["run"] < 3], tmp_path / "out"
     typed = "--physics --terms 1,2,1,1 --outside nan --quiet --write rules --c c99"
@@ -217,13 +216,14 @@ def test_physics_and_policy(tmp_path, log, run):
     assert (hot["status"] == 1 + 8).all()
 
 
-@pytest.mark.usefixtures("no_report")
 def test_targets_are_written_or_refused_by_name(tmp_path, log, run):
     typed, out = f"{SMALL} --quiet --write line", tmp_path / "out"
-    code, told, _ = run(log, f"{typed} --target rate-table --target px4:x")
+    both = "--inputs temperature output --terms 1,1 --physics --write rules"
+    code, told, _ = run(log, f"{both} --target rate-table --target px4:x --target table")
     assert code == 5
     assert "target         rate-table: it differs from the model by " in told
-    assert "REFUSED        px4:x: the model needs temperature and output, and this target" in told
+    for name in ("px4:x", "table"):
+        assert f"REFUSED        {name}: the model needs temperature and output, and this" in told
     assert names_in(out) == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
     # What an earlier run has written goes with it, what is not the command's stays.
     for name in ("compensator.c", "px4.params", "notes.txt"):
@@ -235,8 +235,7 @@ def test_targets_are_written_or_refused_by_name(tmp_path, log, run):
 
 def one_run_without_levels(log):
     rate = log["output"] + np.random.default_rng(0).normal(size=len(log))
-    warming = np.linspace(0.0, 40.0, len(log))
-    clock = 10.0 * np.arange(len(log))
+    warming, clock = np.linspace(0.0, 40.0, len(log)), 10.0 * np.arange(len(log))
     return log.assign(run=1, device=1, time=clock, rate=rate, temperature=warming)
 
 
@@ -248,32 +247,24 @@ def groups_apart(log):
     return apart
 
 
+def largest_number(log):
+    """A glitch that hides all else."""
+    return log.assign(output=(1e4 * log["output"]).where(log.index != 100, 2**31 - 1))
+
+
 @pytest.mark.parametrize(
     ("spoil", "typed", "message"),
     [
         (
             lambda log: log.assign(time=log["time"].round(-2)),
             "",
-            "log.csv, line 3, column 'time': time does not increase",
+            "line 3, column 'time': time does",
         ),
+        (lambda log: log.assign(temperature=20.0), "", "'temperature': the temperature spans 0"),
+        (one_run_without_levels, "", r"not be checked: the log has 1 device\(s\), 1 run\(s\)"),
+        (groups_apart, f"{SMALL} --groups run", "every row lies outside the range"),
         (
-            lambda log: log.assign(temperature=20.0),
-            "",
-            "column 'temperature': the temperature spans 0",
-        ),
-        (
-            one_run_without_levels,
-            "",
-            r"could not be checked: the log has 1 device\(s\), 1 run\(s\)",
-        ),
-        (
-            groups_apart,
-            "--terms 1,1 --inputs temperature output --groups run",
-            "every row lies outside the range",
-        ),
-        (
-            # A glitch that hides all else is named by its line.
-            lambda log: log.assign(output=(1e4 * log["output"]).where(log.index != 100, 2**31 - 1)),
+            largest_number,
             "--units output=counts",
             r"log.csv, line 102, column 'output': does not follow the rate .* the wrong one\? No "
             r"other row supports the output of 2.147e\+09 at a rate of",
@@ -309,6 +300,9 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
         ("--target ardupilot:x:0", "(1 to 3)"),
         ("--target table table:q15", "--target: table is given twice"),
         ("--limits bias=5", "bias takes deg/s or deg/h; found ''"),
+        ("--apply m --terms 1 --write law", "--terms, --write: of no use with --apply."),
+        ("--apply m --scale-factor 3", "--scale-factor: of no use with --apply."),
+        ("--trust", "--trust: of no use without --apply."),
     ],
 )
 def test_options_that_make_no_sense(tmp_path, log, typed, message, run):
@@ -325,7 +319,6 @@ def test_help_names_every_option(say):
         assert text in told
 
 
-@pytest.mark.usefixtures("no_report")
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")
 @pytest.mark.parametrize("apply", [False, True])
 def test_a_log_whose_name_is_not_utf8(calibrated, tmp_path, apply, monkeypatch, say):
@@ -347,7 +340,6 @@ def test_an_output_that_cannot_be_written_is_found_out_first(tmp_path, log, run)
     assert "reading" not in err
 
 
-@pytest.mark.usefixtures("no_report")
 def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, run):
     def fail(*_):
         raise OSError(28, "No space left on device")
@@ -382,7 +374,6 @@ def test_an_encoding_of_the_terminal_that_lacks_signs(tmp_path, log, monkeypatch
     assert rb"log-\xb0.csv" in told.buffer.getvalue()
 
 
-@pytest.mark.usefixtures("no_report")
 def test_a_compensation_that_makes_it_worse_says_so(log, run):
     # Each of five runs has an offset, and their mean is zero: that of the others is minus a quarter
     # of one's own, and time tells nothing.
@@ -395,15 +386,16 @@ def test_a_compensation_that_makes_it_worse_says_so(log, run):
     assert err.endswith("done, but see the warnings\n")
 
 
-@pytest.mark.usefixtures("no_pictures", "few_rivals")
-def test_a_glitch_is_named_by_its_line(tmp_path, log, run):
+def test_a_glitch_is_named_by_its_line(tmp_path, log, run, monkeypatch, no_pictures):
+    monkeypatch.setattr(command, "report_page", REPORT)
     spoilt = log.assign(output=log["output"] + 140.0 * (log.index == 100))
     code, out, _ = run(spoilt, SMALL)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     warning = f"WARNING        {tmp_path / 'log.csv'}, line 102: the output of"
     assert (code, out.splitlines()[-1].startswith(warning)) == (0, True)
-    # In the headline: before the first section.
-    assert page.index("line 102") < page.index("<section>")
+    # In the headline: before the first section, as are units that nobody has said.
+    for told in ("line 102", "&#39;output&#39; has no unit, taken as deg/s"):
+        assert page.index(told) < page.index("<section>")
 
 
 def thermal_cycle(*turns, n_rows=300, lag=0.05):
@@ -418,7 +410,6 @@ def thermal_cycle(*turns, n_rows=300, lag=0.05):
     return pd.DataFrame(table | {"gyro_x_dps": bias + noise[0], "gyro_y_dps": noise[1] - bias})
 
 
-@pytest.mark.usefixtures("no_report")
 def test_a_thermal_cycle_at_rest(tmp_path, run):
     typed = "--terms 3,1 --write rules"
     code, said, _ = run(thermal_cycle(20, -20, 60, -20, 60, 20), typed)
@@ -434,7 +425,6 @@ def test_a_thermal_cycle_at_rest(tmp_path, run):
     assert compensator.apply(log)["rate_compensated"].abs().max() < 0.02
 
 
-@pytest.mark.usefixtures("no_report")
 def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(run):
     log = thermal_cycle(20, -20, 60, 20).rename(columns={"gyro_y_dps": "rate [dps]"})
     log["rate [dps]"] *= 0.05
@@ -451,7 +441,6 @@ def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(run):
     assert "the output is 3 throughout: no gyro gives that." in said
 
 
-@pytest.mark.usefixtures("no_report")
 def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_path, run):
     log = thermal_cycle(-20, 60, -20)
     log["gyro_x_lsb"] = (131.0 * log["gyro_x_dps"]).round()
@@ -472,7 +461,6 @@ def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_p
     assert (compensator.scale_factor, compensator.output_unit) == (131.0, "counts")
 
 
-@pytest.mark.usefixtures("no_report")
 def test_a_scale_factor_needs_rates_that_the_output_follows_whatever_the_inputs(tmp_path, log, run):
     steady = log.assign(rate=50.0, output=131.0 * (50.0 + 0.01 * log["temperature"]))
     jitter = 1e-3 * np.random.default_rng(0).normal(size=len(log))
@@ -489,7 +477,6 @@ def test_a_scale_factor_needs_rates_that_the_output_follows_whatever_the_inputs(
     assert (rates - 50.0).abs().max() < 0.5
 
 
-@pytest.mark.usefixtures("no_report")
 def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, run):
     log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
     noise = np.random.default_rng(0).normal(size=len(log))
@@ -516,3 +503,70 @@ def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, r
     whole = GyroCompensator.read_json(model).apply(log)
     np.testing.assert_allclose(rates["rate_compensated"], whole["rate_compensated"], atol=1e-9)
     assert rates["run"].tolist() == [f"run{number}" for number in log["run"]]
+
+
+@pytest.fixture(scope="module")
+def two_devices():
+    """Two devices of two runs, on clocks that begin anew with each."""
+    return make_ofog(n_devices=2, n_runs=2, duration=600.0, sampling_interval=2.0, random_state=0)
+
+
+@pytest.fixture(scope="module")
+def model(two_devices, tmp_path_factory):
+    log = two_devices
+    runs = log["device"].astype(str) + log["run"].astype(str)
+    X = features(log.assign(run=runs), EVERY, time_constant=60.0)
+    error = log["output"] - log["rate"]
+    estimator = quick([2, 2, 2, 1]).fit(X, error)
+    path = tmp_path_factory.mktemp("model") / "compensator.json"
+    GyroCompensator(estimator, EVERY).write_json(path)
+    return path
+
+
+def labelled(log):
+    return log[[*PARTS, "device", "run"]]
+
+
+def interleaved(log):
+    """The devices side by side, as one logger writes them."""
+    table = log[[*PARTS, "device", "run"]]
+    return table.sort_values(["run", "time", "device"], kind="stable")
+
+
+def told_by_the_clock(log):
+    """No labels: the clock begins anew, and once it jumps."""
+    table = log[log["device"] == log["device"].iloc[0]][PARTS].reset_index(drop=True)
+    table.loc[500:, "time"] += 5000.0
+    return table
+
+
+def one_run(log):
+    return log[:300][PARTS]
+
+
+@pytest.mark.parametrize("kind", [labelled, interleaved, told_by_the_clock, one_run])
+def test_pieces_give_what_the_whole_gives(two_devices, model, kind, tmp_path, monkeypatch, say):
+    path = tmp_path / "log.csv"
+    kind(two_devices).to_csv(path, index=False)
+    tables, said = [], []
+    for rows in (100_000, 197):
+        monkeypatch.setattr("skanfis.gyro.log._ROWS", rows)
+        target = tmp_path / f"rates{rows}.csv"
+        code, out, err = say("--apply", model, path, "--output", target)
+        assert code == 0
+        tables.append(pd.read_csv(target))
+        notes = [line.partition("note:")[2] for line in err.splitlines() if "note:" in line]
+        said.append(out.splitlines()[1:] + notes)
+    whole, pieces = tables
+    assert said[0] == said[1]
+    assert list(whole.columns) == list(pieces.columns)
+    for name in whole:
+        if whole[name].dtype.kind == "f":
+            np.testing.assert_allclose(pieces[name], whole[name], rtol=1e-9, atol=1e-11)
+        else:
+            assert whole[name].tolist() == pieces[name].tolist()
+    if "run" in kind(two_devices):
+        # By the compensator itself, which knows nothing of files and pieces.
+        direct = GyroCompensator.read_json(model).apply(read_log(path))
+        found, expected = (each["rate_compensated"] for each in (pieces, direct))
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)

@@ -13,12 +13,8 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis.datasets import make_ofog
 from skanfis.export import export_c
-from skanfis.gyro import (
-    GyroCompensator,
-    OpenLoopArcsineRegressor,
-    ResidualRegressor,
-    export_c_physics,
-)
+from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
+from skanfis.gyro.c_code import export_c_physics
 from skanfis.gyro.compensator import features
 
 from ..export.mutations import mutated_numbers, with_number
@@ -151,6 +147,18 @@ def of_law(**changes):
     return lambda document: document | {"law": document["law"] | changes}
 
 
+def of_cubic(**changes):
+    """The same of a cubic polynomial in the place of the law."""
+    cubic = {"center": [0.0] * 2, "scale": [1.0] * 2, "coefficients": [0.0] * 10} | changes
+    return lambda document: (
+        document
+        | {
+            **{"law": None, "inputs": document["columns"]},
+            "polynomial": {key: value for key, value in cubic.items() if value is not None},
+        }
+    )
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -183,6 +191,11 @@ def of_law(**changes):
         (of_law(thermometer_lag=5.0), "no column for the temperature's rate"),
         (of_law(max_phase="1"), r"law\.max_phase: '1' is not a number from 0 to 1.57"),
         (of_law(out_of_bounds="hold"), "out_of_bounds='hold' must be one of"),
+        (of_cubic(scale=None), "must be an object of center, scale"),
+        (of_cubic(scale=[0.0, 1.0]), r"polynomial.scale\[0\]"),
+        (of_cubic(coefficients=[0.0] * 11), "must be a list of 10 number"),
+        (lambda document: document | {"units": {"output": "mph"}}, "output has no unit 'mph'"),
+        (lambda document: document | {"assumed": ["x"]}, "assumed is .* must be an object of text"),
     ],
 )
 def test_other_files_are_refused(physics_json, tmp_path, change, message):
@@ -199,18 +212,20 @@ def physics_json(log, tmp_path_factory):
     return path.read_text()
 
 
-def test_other_estimators_are_not_written(log, tmp_path):
+def test_what_could_not_be_read_is_not_written(log, compensator, tmp_path):
     path = tmp_path / "never.json"
     for estimator in (LinearRegression(), ResidualRegressor(LinearRegression(), quick(1))):
         estimator.fit(np.random.default_rng(0).random((30, 4)), np.arange(30.0))
         with pytest.raises(TypeError):
             GyroCompensator(estimator, INPUTS).write_json(path)
+    with pytest.raises(ValueError, match="scale_factor, in size: 0"):
+        replace(compensator, scale_factor=0.0).write_json(path)
     assert not path.exists()
 
 
 @pytest.mark.theory
 @pytest.mark.parametrize("with_law", [False, True])
-def test_no_number_that_is_read_makes_a_rate_that_is_not_finite(
+def test_what_is_read_makes_no_rate_that_is_not_finite(
     log, compensator, physics_json, tmp_path, with_law
 ):
     path = tmp_path / "compensator.json"
@@ -229,13 +244,6 @@ def test_no_number_that_is_read_makes_a_rate_that_is_not_finite(
         assert np.isfinite(applied["rate_compensated"][answered]).all(), (where, value)
         assert applied["coverage"].between(0.0, 1.0 + 1e-9).all(), (where, value)
     assert n_read > 10
-
-
-def test_a_number_that_could_not_be_read_is_not_written(compensator, tmp_path):
-    path = tmp_path / "compensator.json"
-    with pytest.raises(ValueError, match="scale_factor, in size: 0"):
-        replace(compensator, scale_factor=0.0).write_json(path)
-    assert not path.exists()
 
 
 def test_what_is_no_json_is_refused(tmp_path):

@@ -73,7 +73,7 @@ def shifted_runs(rng):
 
 def test_groups_reach_the_part_that_chooses_by_them():
     x, y, run = shifted_runs(np.random.default_rng(0))
-    part = make_pipeline(StandardScaler(), ANFISRegressor(partition="grid"))
+    part = make_pipeline(StandardScaler(), ANFISRegressor(partition="grid", max_rules=6))
     model = ResidualRegressor(LinearRegression(), part)
     n_rules = [model.fit(x, y, groups=g).residual_[-1].n_rules_ for g in (None, run)]
     # Rows of one run tell of each other; another run knows nothing of them.

@@ -127,10 +127,6 @@ def test_numbers_have_three_digits(value, text):
 def test_bad_columns_are_named(log):
     rate, before, after = log["rate"], log["output"], log["after"]
     draw, columns = GroupResidualDisplay.from_predictions, {"groups": log["groups"]}
-    with pytest.raises(ValueError, match=r"after has 1999 rows where the other columns have 2000"):
-        draw(rate, before, after[1:], **columns)
-    with pytest.raises(ValueError, match="after must be finite; 1 of its 2000"):
-        draw(rate, before, after.where(after.index > 0, np.inf), **columns)
     with pytest.raises(ValueError, match="rate must be finite"):
         draw(rate.where(rate.index > 0), before, after, **columns)
     with pytest.raises(ValueError, match="after is NaN in all rows"):
@@ -206,11 +202,9 @@ def test_scale_factor_error_is_that_of_the_law(log):
 
 
 def test_surface_counts_and_averages():
-    rate = np.array([-10.0, -10.0, 10.0, 10.0, 10.0])
-    left = np.array([0.1, 0.3, 0.5, np.nan, 0.7])
-    display = ResidualSurfaceDisplay.from_predictions(
-        rate, rate, rate + left, temperature=[0.0, 0.0, 0.0, 40.0, 40.0]
-    )
+    rate, temperature = np.array([-10.0, -10.0, 10.0, 10.0, 10.0]), [0.0, 0.0, 0.0, 40.0, 40.0]
+    after = np.add(rate, [0.1, 0.3, 0.5, np.nan, 0.7])
+    display = ResidualSurfaceDisplay.from_predictions(rate, rate, after, temperature=temperature)
     cells = display.tables()["cells"]
     corners = cells[cells["rows"] > 0]
     assert corners.index.tolist() == [0, 24 * 23, 24 * 24 - 1]

@@ -4,38 +4,27 @@ import re
 from functools import cache
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import OpenLoopArcsineRegressor
-from skanfis.gyro._calibration import Recipe, calibrate
+from skanfis.gyro._calibration import Recipe
 from skanfis.gyro._headline import flagged_text, law_text, proven_bounds, rules_text
-from skanfis.gyro._split import choose_split
+
+from .planted import NOISE, calibrated, evaluated, log_of
 
 pytestmark = pytest.mark.usefixtures("given_weights", "few_rivals")
 
-N_RUNS, N_ROWS = 12, 40
-NOISE, SCATTER = 2e-4, 5e-4
 
-
-def calibrated(error, gain=1.0, scatter=SCATTER, **options):
-    """Runs that are off by a bias each, of a gyro with an error of temperature and rate."""
-    rng = np.random.default_rng(3)
-    run = np.repeat(np.arange(N_RUNS), N_ROWS)
-    temperature = rng.uniform(0.0, 50.0, run.size)
-    rate = rng.uniform(-100.0, 100.0, run.size)
-    off = scatter * rng.normal(size=N_RUNS)[run] + NOISE * rng.normal(size=run.size)
-    output = gain * rate + error(temperature) + off
-    columns = {"run": run, "temperature": temperature, "rate": rate, "output": output}
-    log = pd.DataFrame(columns)
-    recipe = Recipe(("temperature", "output"), write="rules", terms=(1, 1), **options)
-    return calibrate(log, choose_split(log, "run"), recipe, lambda text: None)
+def of_rules(slope, gain, **options):
+    """Rules for an error that is a line of the temperature, and a scale factor."""
+    log = log_of(lambda t, r: 0.005 + slope * t + (gain - 1.0) * r, n_runs=12, n_rows=40, seed=3)
+    return calibrated(log, n_folds=4, write="rules", terms=(1, 1), **options)
 
 
 @cache
 def a_line():
-    return calibrated(lambda t: 0.005 + 1e-3 * t, gain=1.001, scatter=0.0)
+    return of_rules(1e-3, 1.001)
 
 
 def test_largest_compensation_of_a_line_is_that_of_its_corner():
@@ -64,15 +53,13 @@ def test_the_text_of_the_rules_gives_what_they_give():
 
 def test_flagged_rows_are_counted_by_the_input_to_blame():
     calibration = a_line()
-    X, labels, counts = calibration.X, calibration.split.labels, {}
-    for name in X:
-        # The rows beyond all that the other folds' runs reach.
-        folds = [(np.isin(labels, labels[test]), test) for _, test in calibration.split.folds]
-        ends = [(X[name][~own].min(), X[name][~own].max(), test) for own, test in folds]
-        counts[name] = sum((~X[name].iloc[test].between(*at)).sum() for *at, test in ends)
-    named = ", ".join(
-        f"{name} in {counts[name]}" for name in sorted(counts, key=lambda name: -counts[name])
-    )
+    X, counts = calibration.X, dict.fromkeys(calibration.X, 0)
+    for train, test in calibration.split.folds:
+        for name in X:
+            reached = X[name].iloc[train]
+            counts[name] += (~X[name].iloc[test].between(reached.min(), reached.max())).sum()
+    most_first = sorted(counts, key=counts.get, reverse=True)
+    named = ", ".join(f"{name} in {counts[name]}" for name in most_first)
     assert min(counts.values()) > 0
     assert f"were flagged ({named})." in flagged_text(calibration)
 
@@ -80,23 +67,15 @@ def test_flagged_rows_are_counted_by_the_input_to_blame():
 @pytest.mark.parametrize(("unit", "gain"), [("deg/s", -0.5), ("counts", -131.0)])
 def test_rate_goes_with_the_output_or_is_not_proven(unit, gain):
     """An axis mounted the other way round: its scale factor's sign is found of counts alone."""
-    calibration = calibrated(lambda t: 1e-3 * t, gain=gain, output_unit=unit)
+    calibration = of_rules(1e-3, gain, output_unit=unit)
     assert proven_bounds(calibration)[1] is (unit == "counts")
 
 
 def computed(text, columns):
-    """What a reader of the first line computes."""
-    formula, _, temperature = text.splitlines()[0].partition(", t = ")
-    t, right = 0.0, formula.split(" = ")[1]
-
-    def evaluate(expression):
-        plain = re.sub(r" \[[^]]*\]| s (?=\*)", lambda unit: " " * (unit[0] == " s "), expression)
-        plain = re.sub(r"(?<=[0-9]) t", " * t", plain).replace("^", "**")
-        return eval(plain, {"arcsin": np.arcsin, "t": t, **columns})
-
-    if temperature:
-        t = evaluate(temperature)
-    return evaluate(right)
+    """What a reader of the law's first line computes, units aside."""
+    plain = re.sub(r" \[[^]]*\]| s(?= \*)", "", text.splitlines()[0])
+    rate, _, t = re.sub(r"(?<=\d) t", " * t", plain).partition(", t = ")
+    return evaluated(f"t = {t or 0}\n{rate}", columns)["rate"]
 
 
 @pytest.mark.parametrize(

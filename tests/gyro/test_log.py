@@ -6,7 +6,7 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError, check_log, read_log
-from skanfis.gyro._checks import check_at_rest
+from skanfis.gyro._checks import check_at_rest, find_glitches
 
 CALLED_T = {"columns": {"temperature": "T"}}
 MEASURED = ["time", "temperature", "output", "rate", "run"]
@@ -95,8 +95,9 @@ def test_names_of_columns_up_to_blanks_and_capitals(tmp_path):
 
 def test_files_that_are_no_log_together_are_refused(tmp_path, log):
     path = table(tmp_path, log)
-    with pytest.raises(LogError, match=r"log.csv: holds the same bytes as .*log.csv"):
-        read_log([path, tmp_path / "." / "log.csv"])
+    for again in (path, table(tmp_path, log, "a.csv")):
+        with pytest.raises(LogError, match=rf"{again.name}: holds the same bytes as .*log.csv"):
+            read_log([path, again])
     with pytest.raises(LogError, match=r"b.csv: the files differ in having time"):
         read_log([path, table(tmp_path, log.drop(columns="time"), "b.csv")])
 
@@ -212,3 +213,50 @@ def test_a_log_at_rest_is_told_from_one_that_moves(log):
     levels["output"] += 300.0 * (np.arange(len(log)) // 10 % 3)
     with pytest.raises(LogError, match=r"jumps \d+ times by more than 20 times its usual step"):
         check_at_rest(levels, "counts")
+
+
+def simulated(**options):
+    return make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=0, **options)
+
+
+def glitches(log):
+    return [row for row, _ in find_glitches(log, (log["output"] - log["rate"]).to_numpy())]
+
+
+@pytest.mark.parametrize(("part", "by"), [("output", 20.0), ("rate", -50.0), ("temperature", 40.0)])
+def test_one_row_that_no_other_supports_is_named(part, by):
+    log, row = simulated(), 77
+    log.loc[row, part] += by
+    assert glitches(log) == [row]
+
+
+def test_three_rows_are_named_and_more_support_each_other():
+    log = simulated()
+    rows = [10, 100, 200, 300]
+    for count in (2, 3):
+        spoilt = log.copy()
+        spoilt.loc[rows[:count], "output"] += 40.0
+        assert glitches(spoilt) == rows[:count]
+    log.loc[rows, "output"] += 40.0
+    assert glitches(log) == []
+
+
+def test_the_sentence_on_a_glitch_says_what_is_odd():
+    log = simulated().assign(rate=0.0)
+    log["output"] = 0.01 * np.random.default_rng(0).normal(size=len(log))
+    log.loc[7, "output"] = 99.0
+    log.loc[8, "temperature"] = 150.0
+    odd, hot = find_glitches(log, log["output"].to_numpy())
+    assert odd == (7, "the output of 99 at a rate of 0 deg/s")
+    assert hot == (8, "the temperature of 150 degC")
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"profile": "ramps"}, {"profile": "ramps", "rates": [-100, 0, 100]}]
+)
+def test_sound_logs_have_no_glitches(options):
+    log, g = simulated(**options), np.random.default_rng(0)
+    assert glitches(log) == []
+    # Digits lost, and noise of heavy tails.
+    assert glitches(log.round({"temperature": 0, "output": 2})) == []
+    assert glitches(log.assign(output=log["output"] + 0.05 * g.standard_t(3, len(log)))) == []

@@ -17,9 +17,7 @@ from skanfis.gyro.metrics import (
 
 HOUR = 3600.0
 TAU = 2.0 ** np.arange(16)
-needs_allantools = pytest.mark.skipif(
-    find_spec("allantools") is None, reason="allantools is not installed"
-)
+needs_allantools = pytest.mark.skipif(not find_spec("allantools"), reason="it is not installed")
 
 
 def figure(name, full_scale=100.0, **columns):
@@ -151,9 +149,8 @@ def test_what_falls_behind_a_hump_is_no_white_noise():
     """White noise beside steps, which lift the curve at the time of a dwell and fall behind it."""
     white, steps = 180.0 / TAU, np.zeros(TAU.size)
     steps[5:] = 4e4 / (TAU[5:] / TAU[5]) ** 1.0
-    assert read(TAU, np.sqrt(white + steps))[0]["angle_random_walk"] == pytest.approx(
-        np.sqrt(180.0) / 60.0, rel=1e-9
-    )
+    values, _ = read(TAU, np.sqrt(white + steps))
+    assert values["angle_random_walk"] == pytest.approx(np.sqrt(180.0) / 60.0, rel=1e-9)
     values, notes = read(TAU[4:], np.sqrt(white + steps)[4:])
     assert np.isnan(values["angle_random_walk"])
     assert notes["angle_random_walk"] == "no slope of -1/2"
@@ -217,6 +214,7 @@ def test_runs_too_short_for_an_allan_deviation_are_refused():
 
 INDEPENDENT = "do not change independently"
 AT_REST = {"rate": [0.0, 0.0]}
+WARMER = {"error": [1, 2], "temperature": [1, 2]}
 
 
 @pytest.mark.parametrize(
@@ -239,16 +237,8 @@ AT_REST = {"rate": [0.0, 0.0]}
         ("bias_stability_10s", {"error": [1, 2], "time": [1, 1], **AT_REST}, "time must increase"),
         ("bias_stability_10s", {"error": [1, 2], "time": [0, 60], **AT_REST}, "are 60 s apart"),
         ("bias_stability_10s", {"error": [1, 2], "time": [0, 1], **AT_REST}, "as long as two"),
-        (
-            "hysteresis",
-            {"error": [1, 2], "temperature": [1, 2], "temperature_rate": [1, 1]},
-            "does not both rise and fall",
-        ),
-        (
-            "hysteresis",
-            {"error": [1, 2], "temperature": [1, 2], "temperature_rate": [1, -1]},
-            "share no temperature",
-        ),
+        ("hysteresis", {**WARMER, "temperature_rate": [1, 1]}, "does not both rise and fall"),
+        ("hysteresis", {**WARMER, "temperature_rate": [1, -1]}, "share no temperature"),
     ],
 )
 def test_what_cannot_be_found_is_said(name, columns, message):

@@ -1,6 +1,7 @@
 """Logs as they come: what a logger, a spreadsheet or a bench writes is read as it was meant."""
 
 import sys
+import time
 
 import numpy as np
 import pandas as pd
@@ -136,9 +137,8 @@ def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
 @pytest.mark.parametrize("name", ["U_mV", "gyro_mV", "U [mV]"])
 def test_a_raw_signal_is_no_rate(tmp_path, truth, name):
     """The lone rate of a log is the gyro's own, but not where a voltage follows it."""
-    table = truth[["time", "temperature"]].assign(
-        **{name: -8.0 * truth["output"], "rate_dps": truth["rate"]}
-    )
+    table = truth[["time", "temperature"]].assign(rate_dps=truth["rate"])
+    table[name] = -8.0 * truth["output"]
     reading = found_in(tmp_path, table, require=("temperature", "output", "rate", "time"))
     layout = reading.files[0].layout
     assert (layout.name("output"), layout.name("rate")) == (name, "rate_dps")
@@ -159,9 +159,6 @@ def test_many_files_a_pattern_and_headers_that_nearly_agree(tmp_path, truth):
     same(reading, truth[truth["run"].astype(int) < 3])
     assert list(reading.log["run"].cat.categories) == ["r1", "r2", "r3"]
     assert reading.name_row(60).endswith("r2.csv, line 2")
-    (folder / "r4.csv").write_bytes((folder / "r2.csv").read_bytes())
-    with pytest.raises(LogError, match=r"r4.csv: holds the same bytes as .*r2.csv"):
-        found([*paths, str(folder / "r4.csv")])
     table.rename(columns={"output": "gyro_counts"}).to_csv(folder / "r4.csv", index=False)
     with pytest.raises(LogError, match=r"r4.csv: the output is in counts, in .* in deg/s"):
         found([*paths, str(folder / "r4.csv")])
@@ -217,12 +214,18 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
         (b"temp,gyro\n20,1\n21,\x81\n", "is not text"),
         (b"time,temp,gyro\n10:00:00,20,2\nnoon,21,2\n10:00:02,22,3\n", "line 3, column 'time': 'n"),
         (b"temp,gyro\n20,1\n21,1e999\n22,3\n", "line 3, column 'gyro' .output.: .* (inf|not a n)"),
+        (",".join(f"c{k}" for k in range(10**6)).encode(), "line 1: is longer than"),
+        (b"a,b\n1,2\n" + b"," * 2**22, "line 3: is longer than"),
+        (b"," * 20_000 + b"\n1,2\n", "line 1: has 20,001 columns"),
+        ((b"," * 999 + b"\n") * 1000, "has no row of numbers in its first 60 lines"),
     ],
 )  # fmt: skip
-def test_what_is_no_log_is_refused_in_words(tmp_path, content, message):
+def test_what_is_no_log_is_refused_in_words_and_at_once(tmp_path, content, message):
     (tmp_path / "log.csv").write_bytes(content)
+    begin = time.perf_counter()
     with pytest.raises(LogError, match=message):
         found(tmp_path / "log.csv")
+    assert time.perf_counter() - begin < 1.0
 
 
 @pytest.mark.parametrize("kind", [("parquet", "pyarrow"), ("xlsx", "openpyxl"), ("mat", "scipy")])
@@ -346,9 +349,8 @@ def test_a_file_of_excel_with_lines_above_the_header(tmp_path, truth):
     np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-5)
     assert reading.name_row(0).endswith("row 4")
     assert reading.assumed == {}
-    assert {"of 2 sheets 'data' is read", "2 rows above the header are passed over"} <= set(
-        reading.notes
-    )
+    for told in ("of 2 sheets 'data' is read", "2 rows above the header are passed over"):
+        assert told in reading.notes
 
 
 @pytest.mark.parametrize(("name", "library"), [("log.xlsx", "openpyxl"), ("log.mat", "h5py")])

@@ -128,21 +128,17 @@ class TestBeyondTheSine:
             beyond = law.predict([[edge + 50 * np.sign(edge) * step, REFERENCE]])[0]
         assert beyond == pytest.approx(at + slope * 50 * np.sign(edge) * step, rel=1e-4)
 
-    def test_nan_refuses(self, rng):
-        law = self.fitted(rng, out_of_bounds="nan")
-        predicted = law.predict(np.vstack([self.row(1.3), self.row(0.5), [[1e9, REFERENCE]]]))
-        np.testing.assert_array_equal(np.isnan(predicted), [True, False, True])
-
-    def test_raise_refuses_all(self, rng):
-        law = self.fitted(rng, out_of_bounds="raise")
-        with pytest.raises(ValueError, match=r"1 of 2 rows cannot be inverted.*max_phase=1 rad"):
-            law.predict(np.vstack([self.row(1.3), self.row(0.5)]))
-
-    def test_flags(self, rng):
-        law = self.fitted(rng)
+    def test_what_is_refused_and_flagged(self, rng):
         rows = np.vstack([self.row(0.5), self.row(1.3), [[1e9, REFERENCE]], [[0.0, 80.0]]])
+        law = self.fitted(rng)
         np.testing.assert_array_equal(law.in_bounds(rows), [True, False, False, False])
         np.testing.assert_array_equal(np.isnan(phase_of(law, rows)), [False, False, True, False])
+        assert not self.fitted(rng).set_params(max_phase=0.4).in_bounds(rows).any()
+        predicted = law.set_params(out_of_bounds="nan").predict(rows[:3])
+        np.testing.assert_array_equal(np.isnan(predicted), [False, True, True])
+        law.set_params(out_of_bounds="raise")
+        with pytest.raises(ValueError, match=r"1 of 2 rows cannot be inverted.*max_phase=1 rad"):
+            law.predict(rows[:2])
 
     def test_law_goes_on_outside_the_training_data_and_says_so(self, rng):
         X, rate = calibration(rng, max_rate=65.0)

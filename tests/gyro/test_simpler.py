@@ -1,7 +1,5 @@
 """Simple compensations as they are written: the same rates as the model, the flags of its rows."""
 
-import json
-
 import numpy as np
 import pytest
 from sklearn.linear_model import LinearRegression
@@ -90,23 +88,3 @@ def test_beyond_the_box_a_polynomial_keeps_its_policy(log, policy):
         assert np.isnan(found[outside]).all()
     else:
         np.testing.assert_allclose(found, at_edge, atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("spoil", "message"),
-    [
-        (lambda d: d["polynomial"].pop("scale"), "must be an object of center, scale"),
-        (lambda d: d["polynomial"]["scale"].__setitem__(0, 0.0), r"polynomial.scale\[0\]"),
-        (lambda d: d["polynomial"]["coefficients"].append(1.0), "must be a list of 20 number"),
-        (lambda d: d["units"].update(output="mph"), "output has no unit 'mph'"),
-        (lambda d: d.update(assumed=["x"]), "assumed is .* must be an object of texts"),
-    ],
-)
-def test_a_file_that_was_changed_is_refused(log, tmp_path, spoil, message):
-    compensator = GyroCompensator(fitted("cubic polynomial", log)[0], INPUTS)
-    compensator.write_json(tmp_path / "it.json")
-    document = json.loads((tmp_path / "it.json").read_text())
-    spoil(document)
-    (tmp_path / "it.json").write_text(json.dumps(document))
-    with pytest.raises(ValueError, match=message):
-        GyroCompensator.read_json(tmp_path / "it.json")

@@ -99,12 +99,16 @@ def test_choice(options, kind):
     every_row_once(split, len(log))
 
 
-def test_a_choice_never_leaks():
-    log = log_of(n_devices=1, n_runs=4, rates=LEVELS)
-    for train, test in choose_split(log).folds:
+@pytest.fixture(scope="module")
+def levels_and_runs():
+    return log_of(n_devices=1, n_runs=4, rates=LEVELS)
+
+
+def test_a_choice_never_leaks(levels_and_runs):
+    for train, test in choose_split(levels_and_runs).folds:
         # Levels of one size and two signs are held out together.
-        assert not np.isin(log["rate"].abs()[test], log["rate"].abs()[train]).any()
-        assert not np.isin(log["run"][test], log["run"][train]).any()
+        for part in (levels_and_runs["rate"].abs(), levels_and_runs["run"]):
+            assert not np.isin(part[test], part[train]).any()
 
 
 def test_a_rate_of_one_row_or_two_is_no_level():
@@ -118,18 +122,13 @@ def test_a_rate_of_one_row_or_two_is_no_level():
         choose_split(pd.DataFrame(columns)[5:], "level")
 
 
-def test_levels_do_not_matter_to_a_compensator_that_does_not_see_the_output():
-    log = log_of(n_devices=1, n_runs=4, rates=LEVELS)
-    assert choose_split(log, uses_output=False).kind == "run"
-
-
-def test_asked_for():
-    log = log_of(n_devices=1, n_runs=4, rates=LEVELS)
-    split = choose_split(log, "run")
+def test_asked_for_or_for_a_compensator_that_does_not_see_the_output(levels_and_runs):
+    assert choose_split(levels_and_runs, uses_output=False).kind == "run"
+    split = choose_split(levels_and_runs, "run")
     assert len(split.folds) == 4
     assert "whole runs held out (4 runs, 4 folds; as asked for)" in split.sentence
-    assert np.array_equal(split.labels, log["run"].astype(str))
-    by_level = choose_split(log, "level")
+    assert np.array_equal(split.labels, levels_and_runs["run"].astype(str))
+    by_level = choose_split(levels_and_runs, "level")
     assert len(by_level.folds) == 5
     assert set(by_level.labels) == {f"|{level:g}| °/s" for level in (0, 25, 50, 75, 100)}
 

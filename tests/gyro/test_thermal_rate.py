@@ -68,9 +68,17 @@ void rates(const double *t, const double *T, double *rates, int n)
 FEATURE = ThermalRate(20.0, time="t", run="run")
 
 
-def test_future_does_not_alter_the_past(log):
-    columns = log[["t", "T", "run"]]
-    features = clone(FEATURE).fit_transform(columns)
+@pytest.fixture
+def columns(log):
+    return log[["t", "T", "run"]]
+
+
+@pytest.fixture
+def features(columns):
+    return clone(FEATURE).fit_transform(columns)
+
+
+def test_future_does_not_alter_the_past(columns, features):
     # Row by row, as on the gyro: the last of all rows so far is the newest.
     for n_rows in range(1, len(columns) + 1):
         so_far = clone(FEATURE).fit_transform(columns[:n_rows])
@@ -80,22 +88,18 @@ def test_future_does_not_alter_the_past(log):
     assert_array_equal(clone(FEATURE).fit_transform(later)[:30], features[:30])
 
 
-def test_runs_do_not_know_of_each_other(log):
-    columns = log[["t", "T", "run"]]
-    features = clone(FEATURE).fit_transform(columns)
+def test_runs_do_not_know_of_each_other(columns, features):
     for name in "abc":
         rows = (columns["run"] == name).to_numpy()
         assert_array_equal(clone(FEATURE).fit_transform(columns[rows]), features[rows])
         assert features[rows][0] == 0
 
 
-def test_frames_of_any_kind_and_arrays_give_the_same(log):
-    columns = log[["t", "T", "run"]]
-    features = clone(FEATURE).fit_transform(columns)
+def test_frames_of_any_kind_and_arrays_give_the_same(columns, features):
     polars = pl.DataFrame(columns.to_dict("list"))
-    assert_array_equal(clone(FEATURE).fit_transform(polars), features)
     categorical = columns.assign(run=columns["run"].astype("category"))
-    assert_array_equal(clone(FEATURE).fit_transform(categorical), features)
+    for frame in (polars, categorical):
+        assert_array_equal(clone(FEATURE).fit_transform(frame), features)
     numbered = columns.assign(run=pd.factorize(columns["run"])[0]).to_numpy()
     by_position = clone(FEATURE).set_params(time=0, run=-1)
     assert_array_equal(by_position.fit_transform(numbered), features)

@@ -38,13 +38,9 @@ def px4_offset(found, temperature, gyro, axis):
     def coef(name):
         return F(found[f"TC_G{gyro}_{name}"])
 
-    delta_temp = np.where(
-        temperature > coef("TMAX"),
-        coef("TMAX") - coef("TREF"),
-        np.where(
-            temperature < coef("TMIN"), coef("TMIN") - coef("TREF"), temperature - coef("TREF")
-        ),
-    )
+    low, high, reference = (coef(name) for name in ("TMIN", "TMAX", "TREF"))
+    below = np.where(temperature < low, low - reference, temperature - reference)
+    delta_temp = np.where(temperature > high, high - reference, below)
     delta_temp_2 = delta_temp * delta_temp
     delta_temp_3 = delta_temp_2 * delta_temp
     x0, x1, x2, x3 = (coef(f"X{k}_{axis}") for k in range(4))
@@ -75,9 +71,8 @@ def test_px4_is_within_the_certain_difference(kind):
     cubic = Cubic(error, "px4")
     found = parameters(cubic.text(["A note."], "z", "2", "3407914"))
     assert {"TC_G_ENABLE": "1", "TC_G2_ID": "3407914"}.items() <= found.items()
-    off = error(TEMPERATURES[:, None].astype(float)) - np.rad2deg(
-        px4_offset(found, TEMPERATURES, 2, 2).astype(float)
-    )
+    subtracted = np.rad2deg(px4_offset(found, TEMPERATURES, 2, 2).astype(float))
+    off = error(TEMPERATURES[:, None].astype(float)) - subtracted
     low, high = difference(error, cubic.piecewise)
     assert low <= off.min()
     assert off.max() <= high

@@ -3,42 +3,31 @@
 import re
 
 import numpy as np
-import pandas as pd
 import pytest
-from sklearn.model_selection import GroupKFold
 
-from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._split import Split
 from skanfis.gyro.metrics import rms
 from skanfis.gyro.targets.autopilots import Cubic
 from skanfis.gyro.targets.error_model import ErrorModel
 from skanfis.gyro.targets.tables import Table
 from skanfis.gyro.targets.write import write_targets
 
+from ..planted import calibrated, log_of
+
 pytestmark = pytest.mark.usefixtures("given_weights", "few_rivals")
 
-N_RUNS, N_ROWS = 6, 80
-BOTH = ("temperature", "output")
 
-
-def smooth(temperature):
+def smooth(temperature, rate=0.0):
     return 1e-4 * temperature + 2e-6 * (temperature - 25.0) ** 2
 
 
-def a_step(temperature):
+def a_step(temperature, rate):
     return smooth(temperature) + 0.02 * np.tanh((temperature - 25.0) / 3.0)
 
 
-def calibrated(error, inputs=("temperature",), **options):
-    rng = np.random.default_rng(0)
-    log = pd.DataFrame({"run": np.repeat(np.arange(N_RUNS), N_ROWS)})
-    log["temperature"] = rng.uniform(0.0, 50.0, len(log))
-    log["rate"] = rng.uniform(-100.0, 100.0, len(log)) * ("output" in inputs)
-    noise = 1e-3 * rng.normal(size=len(log))
-    log["output"] = log["rate"] * (1 + 1e-4 * (len(inputs) > 1)) + error(log["temperature"]) + noise
-    folds = list(GroupKFold(3).split(log, groups=log["run"]))
-    split = Split("run", folds, log["run"].astype(str).to_numpy(dtype=object), "runs held out")
-    return calibrate(log, split, Recipe(tuple(inputs), **options), lambda text: None)
+def at_rest(error, **options):
+    log = log_of(error, n_runs=6, n_rows=80)
+    log["output"] += 1e-3 * np.random.default_rng(0).normal(size=len(log)) - log["rate"]
+    return calibrated(log.assign(rate=0.0), ("temperature",), n_folds=3, **options)
 
 
 def written(calibration, folder, *texts):
@@ -52,7 +41,7 @@ def numbers_of(told):
 
 
 def test_errors_on_rows_held_out_by_hand_and_files_say_so(tmp_path):
-    calibration = calibrated(smooth, terms=(3,))
+    calibration = at_rest(smooth, terms=(3,))
     told = written(calibration, tmp_path, "table", "px4:x:2:7", "ardupilot:x:2")
     assert all(done for _, done in told.values())
     code = (tmp_path / "gyro_table.c").read_text()
@@ -66,10 +55,7 @@ def test_errors_on_rows_held_out_by_hand_and_files_say_so(tmp_path):
         inside = test[calibration.in_range[test]]
         by_hand = calibration.before[inside] - error(X.iloc[inside].to_numpy())
         np.testing.assert_allclose(by_hand, after[inside], atol=1e-12)
-        for name, made in (
-            ("table", Table(error, "float", n_cells)),
-            ("px4", Cubic(error, "px4")),
-        ):
+        for name, made in (("table", Table(error, "float", n_cells)), ("px4", Cubic(error, "px4"))):
             off = calibration.before - rate - made.piecewise(X.to_numpy())
             left[name][test] = off[test]
             if name == "px4":
@@ -97,7 +83,7 @@ def test_errors_on_rows_held_out_by_hand_and_files_say_so(tmp_path):
 
 
 def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
-    calibration = calibrated(a_step, terms=(5,))
+    calibration = at_rest(a_step, terms=(5,))
     told = written(calibration, tmp_path, "px4:x", "table")
     assert not told["px4"][1]
     assert "more than 1.5 times as much is not written" in told["px4"][0]
@@ -107,17 +93,8 @@ def test_what_is_much_worse_than_the_model_is_refused_by_name(tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["gyro_table.c", "gyro_table.h"]
 
 
-def test_a_target_of_other_inputs_than_the_models_is_refused_by_name(tmp_path):
-    calibration = calibrated(smooth, BOTH, terms=(1, 1), physics=True)
-    told = written(calibration, tmp_path, "px4:x", "table", "rate-table")
-    assert [done for _, done in told.values()] == [False, False, True]
-    for name in ("px4", "table"):
-        assert "the model needs temperature and output, and" in told[name][0]
-    assert {path.stem for path in tmp_path.iterdir()} == {"gyro_rate_table"}
-
-
 def test_where_there_is_no_rate_outside_a_table_ends_with_the_range(tmp_path):
-    calibration = calibrated(smooth, terms=(2,), outside="nan")
+    calibration = at_rest(smooth, terms=(2,), outside="nan")
     for text in ("table:float", "table:q15", "px4:x"):
         [(told, done)] = written(calibration, tmp_path, text).values()
         assert done, told
