@@ -91,6 +91,8 @@ class Trials:
         if is_wide:
             self.slope_inputs = lasso_inputs(rows, plan.consequent_inputs)
         self.spacing = Spacing(rows)
+        # Which of two values is meant no reader can say by a bell: that is what a tree is for.
+        self.bell_inputs = [int(j) for j in plan.premise_inputs if self.spacing.n_values(j) > 2]
         self.one_rule = Candidate((1,) * rows.X.shape[1])
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
@@ -98,10 +100,9 @@ class Trials:
     def _asking(self, candidate):
         """Inputs for terms of scattered rules: those that ask by more than chance, at first one.
 
-        The loudest first; what it asks for, no other does. None of two values: near which of them a
-        rule stands, no reader can say by a bell.
+        The loudest first; what it asks for, no other does.
         """
-        left = [int(j) for j in self.plan.premise_inputs if self.spacing.n_values(j) > 2]
+        left = self.bell_inputs
         asked: list[int] = []
         scores = TermScores(self.tuned(candidate), self.spacing, self._crossed(candidate))
         work = len(scores.basis) * (_TERMS * scores.basis.shape[1]) ** 2
@@ -135,12 +136,11 @@ class Trials:
             splits = best_splits(self.tuned(candidate), inputs, self._crossed(candidate), _TRIED)
             grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
         else:
-            inputs = self.plan.premise_inputs
-            asking = [(j, candidate.counts[j] + _TERMS - 1) for j in inputs]
+            asking = [(j, candidate.counts[j] + _TERMS - 1) for j in self.bell_inputs]
             crossed = self._crossed(candidate)
             scores = TermScores(self.tuned(candidate), self.spacing, crossed).of(asking)
             best = np.argsort(-scores, kind="stable")[:_TRIED]
-            grown = [candidate.with_more_terms(j) for j in inputs[best]]
+            grown = [candidate.with_more_terms(self.bell_inputs[k]) for k in best]
         smaller = self.tuned(candidate)
         problems = {one: self._problem(one, smaller) for one in grown if self._is_small(one)}
         # Clusters anew have learnt nothing yet: beside rules that go on they take some turns first.
