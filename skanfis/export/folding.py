@@ -378,6 +378,19 @@ class Level(NamedTuple):
         return f"{self.column} is {self.level if value else is_not}"
 
 
+def by_column(levels):
+    """Names of indicators by the raw column, and what the levels without one are called."""
+    found: dict[str, list[str]] = {}
+    for name, level in levels.items():
+        found.setdefault(level.column, []).append(name)
+    unnamed = {}
+    for column, names in found.items():
+        named = {levels[name].level for name in names}
+        others = [other for other in levels[names[0]].others if other not in named]
+        unnamed[column] = others or ["other"]
+    return found, unnamed
+
+
 @dataclass(frozen=True)
 class Reader:
     """Takes the inputs of a model out of tables with columns of these names."""

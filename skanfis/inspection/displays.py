@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
+from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import ArrayLike
 from .._validation import check_count, position_of
 from ..antecedent import TreeAntecedent
 from ..export import fold, fold_with_rows
+from ..export.folding import by_column, fold_with_reader
 from .labels import as_label, title_of
 from .rules import has_training_data
 from .sentences import PRECISION, rounded
@@ -153,7 +155,7 @@ class ResponseSurfaceDisplay:
     input_names, output_name : tuple of two str, str
         Names of the two inputs and of the output.
     held : dict
-        Value of every other input by its name.
+        Value of every other input by its name; the level of a category by its column's.
     points : ndarray of shape (n_samples, 2), default=None
         Rows of data on these inputs.
 
@@ -198,14 +200,16 @@ class ResponseSurfaceDisplay:
         X : array-like of shape (n_samples, n_features), default=None
             Rows to show as points.
         features, held, output : pair of int or str, dict, int or str
-            Inputs across and up; values of others, by default their mean; which output.
+            Inputs across and up; values of others, by default their mean, or the commonest case of
+            one that is 0 or 1 and of a category; which output.
         grid_resolution : int, default=60
             Points on each axis, 2 or more.
         ax : matplotlib Axes, default=None
             None makes a figure.
         """
         check_count("grid_resolution", grid_resolution, 2)
-        model, points = (fold(estimator), None) if X is None else fold_with_rows(estimator, X)
+        model, reader = fold_with_reader(estimator)
+        points = None if X is None else reader(X)
         if isinstance(features, str) or len(features) != 2:
             raise ValueError(f"features={features!r} must be two inputs.")
         if model.n_inputs == 1:
@@ -222,7 +226,7 @@ class ResponseSurfaceDisplay:
                     f"{model.minimum[j]:g}. Name two inputs that vary."
                 )
         k = _position(output, model.output_names, "output")
-        (xx0, xx1), rows, others = _section(model, both, grid_resolution, held)
+        (xx0, xx1), rows, others = _section(model, both, grid_resolution, held, reader.levels)
         coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
         display = cls(
             xx0=xx0,
@@ -302,17 +306,26 @@ def _position(feature, names, what="input"):
     )
 
 
-def _section(model, both, n_points, held=None):
+def _section(model, both, n_points, held=None, levels=MappingProxyType({})):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 
-    The others take their value in ``held``, or their mean in training, in few digits; without
-    training data, the middle of their range.
+    The others take their value in ``held``, or their mean in training, in few digits, or what is
+    commonest of 0 and 1 and of a category; without training data, the middle of their range.
     """
     mean = model.reference if has_training_data(model) else 0.5 * (model.minimum + model.maximum)
     row = np.clip(rounded(mean, model.spread, PRECISION), model.minimum, model.maximum)
+    row = np.where(model.two_valued, np.round(row), row)
     held = {} if held is None else held
     if not isinstance(held, Mapping):
         raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")
+    names, (categories, unnamed) = list(model.input_names), by_column(levels)
+    taken = {*both, *(_position(feature, names) for feature in held)}
+    for indicators in categories.values():
+        own = [names.index(name) for name in indicators]
+        # One level at most, and none beside those that are drawn or held.
+        row[own], share = 0.0, model.reference[own]
+        if taken.isdisjoint(own) and share.max() >= 1.0 - share.sum():
+            row[own[int(share.argmax())]] = 1.0
     for feature, value in held.items():
         j = _position(feature, model.input_names)
         if j in both:
@@ -327,5 +340,10 @@ def _section(model, both, n_points, held=None):
     grid = np.meshgrid(*np.linspace(model.minimum[both], model.maximum[both], n_points).T)
     rows = np.tile(row, (n_points**2, 1))
     rows[:, both] = np.stack(grid, axis=-1).reshape(-1, 2)
-    others = [j for j in range(model.n_inputs) if j not in both]
-    return grid, rows, {model.input_names[j]: float(row[j]) for j in others}
+    others: dict[str, Any] = {name: float(row[j]) for j, name in enumerate(names) if j not in both}
+    for column, indicators in categories.items():
+        if others.keys() >= set(indicators):
+            of_indicators = {levels[name].level: others.pop(name) for name in indicators}
+            said = [level for level, value in of_indicators.items() if value]
+            others[column] = (said or unnamed[column])[0]
+    return grid, rows, others

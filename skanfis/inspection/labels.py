@@ -24,7 +24,8 @@ def as_label(name):
 
 def title_of(held, *notes):
     """Inputs and the values at which they are held, a few of them, and notes, over a picture."""
-    values = [f"{as_label(name)} = {value:.12g}" for name, value in held.items()]
+    told = {k: as_label(v) if isinstance(v, str) else f"{v:.12g}" for k, v in held.items()}
+    values = [f"{as_label(name)} = {value}" for name, value in told.items()]
     more = len(values) - _MOST_HELD
     others = [f"{more} more inputs held"] if more > 0 else []
     return fill("; ".join([*values[:_MOST_HELD], *others, *notes]), _LETTERS)

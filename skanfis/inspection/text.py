@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..export.folding import fold_with_reader
+from ..export.folding import by_column, fold_with_reader
 from ..policies import MOST_DIGITS, SILENT, policy_in_words
 from .rules import (
     condition,
@@ -307,6 +307,7 @@ def _legend(said, precision):
     called = [said.levels.get(name, (name,))[0] for name in model.input_names]
     with_part = set(compress(called, _has_part(said)))
     unnamed = list(dict.fromkeys(one for one in called if one not in with_part))
+    without_indicator = by_column(said.levels)[1]
     categories: dict[str, list[int]] = {}
     for j, name in enumerate(model.input_names):
         if called[j] not in with_part:
@@ -320,10 +321,9 @@ def _legend(said, precision):
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
     for name, own in categories.items():
-        known = [said.levels[model.input_names[j]] for j in own]
-        levels = [level.level for level in known]
+        levels = [said.levels[model.input_names[j]].level for j in own]
         if model.reference[own].sum() < 1.0 - _ROUNDING:
-            levels += [other for other in known[0].others if other not in levels] or ["other"]
+            levels += [other for other in without_indicator[name] if other not in levels]
         lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
     if unnamed:
         is_few = len(unnamed) <= MOST_NAMED

@@ -158,7 +158,7 @@ class TreeDisplay:
     def _draw_plane(self, ax):
         model, both = self.model, np.unique(self.model.antecedent.term_inputs)
         ax = self.ax_ = _axes(ax)
-        axes, rows, held = _section(model, both, _N_POINTS)
+        axes, rows, held = _section(model, both, _N_POINTS, levels=self.levels)
         response = model.predict(rows)[:, self.output].reshape(_N_POINTS, _N_POINTS)
         colours = ax.pcolormesh(*axes, response, shading="nearest", rasterized=True)
         name = as_label(model.output_names[self.output])

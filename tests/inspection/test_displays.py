@@ -6,11 +6,13 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.preprocessing import MinMaxScaler
+from sklearn.compose import TransformedTargetRegressor, make_column_transformer
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import MinMaxScaler, OneHotEncoder
 
 from skanfis import ANFISRegressor
 from skanfis.cluster import SubtractiveClustering
+from skanfis.export import fold
 from skanfis.inspection import EffectsDisplay, MembershipDisplay, ResponseSurfaceDisplay
 from skanfis.inspection.labels import as_label, printable, title_of
 
@@ -231,3 +233,34 @@ def test_a_title_names_a_few_of_the_inputs_that_are_held():
     held = {f"x{k}": 0.5 * k for k in range(9)}
     assert title_of(dict(list(held.items())[:2]), "pale") == "x0 = 0; x1 = 0.5; pale"
     assert title_of(held) == "x0 = 0; x1 = 0.5; x2 = 1; x3 = 1.5; 5 more inputs held"
+
+
+@pytest.mark.parametrize(
+    ("drop", "held", "told", "ones"),
+    [
+        (None, {}, {"day": "Sat", "wet": "no"}, {"day_Sat"}),
+        ("first", {}, {"day": "Sat", "wet": "no"}, {"day_Sat"}),
+        (["Sat", "no"], {}, {"day": "Sat", "wet": "no"}, set()),
+        (
+            ["Sat", "no"],
+            {"day_Sun": 1, "wet_yes": 1},
+            {"day": "Sun", "wet": "yes"},
+            {"day_Sun", "wet_yes"},
+        ),
+    ],
+)
+def test_a_category_is_held_at_one_level(drop, held, told, ones, rng):
+    X = pd.DataFrame(rng.normal(size=(200, 2)), columns=["heat", "hour"])
+    X["day"] = rng.choice(["Fri", "Sat", "Sun"], 200, p=[0.2, 0.6, 0.2])
+    X["wet"] = rng.choice(["no", "yes"], 200, p=[0.8, 0.2])
+    y = X["heat"] * (X["day"] == "Sat") + X["hour"] + (X["wet"] == "yes")
+    encoder = OneHotEncoder(drop=drop, sparse_output=False)
+    encoder = make_column_transformer((encoder, ["day", "wet"]), remainder="passthrough")
+    pipe = make_pipeline(encoder, quick(n_mfs=1)).fit(X, y)
+    ones = ones | ({"wet_no"} if drop is None else set())
+    display = ResponseSurfaceDisplay.from_estimator(pipe, features=["heat", "hour"], held=held)
+    assert display.held == told
+    model = fold(pipe)
+    values = {"heat": display.xx0.ravel(), "hour": display.xx1.ravel()}
+    rows = [values.get(name, np.full(3600, float(name in ones))) for name in model.input_names]
+    assert_allclose(display.response.ravel(), model.predict(np.transpose(rows))[:, 0], rtol=1e-12)

@@ -259,11 +259,11 @@ def test_a_category_is_listed_by_its_levels(rng):
     encoder = make_column_transformer((encoder, ["sort", "on"]), remainder="passthrough")
     pipe = make_pipeline(encoder, ANFISRegressor(n_mfs=[1, 2, 1, 1, 1])).fit(X, y)
     lines = export_text(pipe).partition("trained:\n")[2].partition("\nOut")[0].splitlines()
-    # An indicator with terms of its own stays by itself; the encoder knows the other levels.
+    # An indicator with terms of its own stays by itself; the encoder knows a level without one.
     assert lines[0] == "  sort_b: 0 to 1"
     assert [line.partition(":")[0] for line in lines[1:3]] == ["    0", "    1"]
     assert lines[3].startswith("  rate: ")
-    assert lines[4:] == ["  sort: a, c, b", "  on: y, n"]
+    assert lines[4:] == ["  sort: a, c, other", "  on: y, n"]
     # Where it takes levels that it has not seen, they are others.
     unseen = OneHotEncoder(handle_unknown="ignore", drop="if_binary", sparse_output=False)
     encoder = make_column_transformer((unseen, ["sort", "on"]), remainder="passthrough")
