@@ -302,6 +302,14 @@ def test_scalers_folded_in_and_json_keep_the_deviation(slopes):
         export_json(parse_json(export_json(estimator)), posterior=True)
 
 
+@pytest.fixture(scope="module")
+def document():
+    """A model with its posterior, as text."""
+    X, y = wave(np.random.default_rng(9), 60)
+    fitted = ANFISRegressor(n_mfs=2, max_iter=2, **quick(0.5)).fit(X, y)
+    return export_json(fitted, posterior=True)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -314,13 +322,11 @@ def test_scalers_folded_in_and_json_keep_the_deviation(slopes):
         (lambda p: p["cross"][0][0].__setitem__(0, "1"), "is not a number of size up to"),
     ],
 )
-def test_json_of_a_posterior_that_is_none_is_refused(change, message):
-    X, y = wave(np.random.default_rng(9), 60)
-    fitted = ANFISRegressor(n_mfs=2, max_iter=2, **quick(0.5)).fit(X, y)
-    document = json.loads(export_json(fitted, posterior=True))
-    change(document["posterior"])
+def test_json_of_a_posterior_that_is_none_is_refused(document, change, message):
+    spoilt = json.loads(document)
+    change(spoilt["posterior"])
     with pytest.raises(ValueError, match=message):
-        parse_json(json.dumps(document))
+        parse_json(json.dumps(spoilt))
 
 
 @pytest.mark.theory

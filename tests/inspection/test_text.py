@@ -88,12 +88,10 @@ def test_the_text_of_a_fit_errs_as_the_last_line_says(partition):
 @pytest.mark.parametrize("n_outputs", [1, 2])
 def test_slopes_in_common_are_told_once(name, n_outputs):
     model = with_common_slopes(MODELS[f"{name}, order 1, {n_outputs} outputs"])
-    text, rows = export_text(model, precision=17), rows_of(model, 1.0)
-    assert_allclose(predicted(text, rows), model.predict(rows), atol=1e-9, rtol=1e-10)
     expected = np.ones((model.n_rules, 3), dtype=bool)
     expected[:, 1], expected[0, 2] = False, False
     assert (model.common_slopes == expected).all()
-    read = read_text(text, NAMES)
+    read = read_text(export_text(model, precision=17), NAMES)
     assert all(set(slopes) == {"time", "rate"} for slopes in read.common.values())
     for label, _, said in read.rules:
         own = {"chip temperature"} | ({"rate"} if label == 0 else set())

@@ -77,18 +77,17 @@ def test_empty_cells_are_reported_and_can_be_left_out():
     assert_allclose(pruned.loss_curve_[-1], whole.loss_curve_[-1], rtol=1e-2)
 
 
-@pytest.fixture(scope="module")
-def two_rules():
-    return ANFISRegressor(n_mfs=[2, 1], max_iter=0).fit(*gap())
-
-
-def test_rules_that_are_not_there_are_refused(two_rules):
+def test_rules_that_are_not_there_are_refused():
+    two_rules = ANFISRegressor(n_mfs=[2, 1], max_iter=0).fit(*gap())
     assert two_rules.redundant_rules_ == []
     assert two_rules.without_rules() is two_rules.without_rules([]) is two_rules.model_
     with pytest.raises(ValueError, match="rules has 2, but the model has 2 rules"):
         two_rules.without_rules([2])
     with pytest.raises(ValueError, match="names all 2 rules: one at least must be left"):
         two_rules.without_rules([0, 1])
+    for no_numbers in ([True, False], [1.9], "1", [1, None]):
+        with pytest.raises(TypeError, match=r"rules=.* must be whole numbers, those of rules"):
+            two_rules.without_rules(no_numbers)
 
 
 def test_what_is_left_has_no_posterior_until_it_is_fitted():
@@ -101,9 +100,3 @@ def test_what_is_left_has_no_posterior_until_it_is_fitted():
         given.predict(X, return_std=True)
     assert given.readability_.line in str(given.readability_)
     assert ANFISRegressor(partition=left).fit(X, y).predict(X, return_std=True)[1].min() > 0.0
-
-
-@pytest.mark.parametrize("rules", [[True, False], [1.9], "1", [1, None]])
-def test_rules_that_are_no_numbers_are_refused(two_rules, rules):
-    with pytest.raises(TypeError, match=r"rules=.* must be whole numbers, those of rules"):
-        two_rules.without_rules(rules)
