@@ -31,7 +31,7 @@ pytestmark = [
 # held out and a clusterer inside. Huber's loss is not here: on so few rows it passes through half
 # of them, and through which is chance.
 ESTIMATORS = {
-    "search": ANFISRegressor(max_rules=2),
+    "default": ANFISRegressor(),
     "clusters, rows held out": ANFISRegressor(
         partition=KMeans(n_clusters=2, n_init=1, random_state=0),
         agreement=0.1,

@@ -200,7 +200,7 @@ def test_structure_that_is_chosen_by_itself(name):
     # Units, offsets, repeated rows and their order, all at once: the same choice, the same fit.
     X, y = DATA[name]()
     weight = np.random.default_rng(2).integers(1, 4, len(y))
-    model = ANFISRegressor(max_rules=3)
+    model = ANFISRegressor(max_rules=4)
     plain = clone(model).fit(X, y, weight)
     *units, unit = alternating(X.shape[1], 6)
     far = (X + 1e4 * np.ptp(X, axis=0)) * units

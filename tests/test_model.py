@@ -217,7 +217,7 @@ def test_no_row_however_far_is_answered_beyond_the_limits():
 class TestAsRuleTable:
     """A tree as rules listed one by one, with one term on an input."""
 
-    def test_it_predicts_the_same(self, rng):
+    def test_it_predicts_the_same(self):
         for n_outputs in (1, 2):
             tree = rule_bases.MODELS[f"tree, order 1, {n_outputs} outputs"]
             table, rows = tree.as_rule_table(), rule_bases.rows_of(tree, 1.3, 500)
@@ -225,13 +225,10 @@ class TestAsRuleTable:
             full_scale = np.abs(tree.predict(rows)).max()
             assert_allclose(table.predict(rows), tree.predict(rows), atol=1e-12 * full_scale)
             assert_allclose(table.gradient(rows), tree.gradient(rows), rtol=1e-7, atol=1e-7)
-
-    def test_its_terms_say_both_sides(self):
-        tree = rule_bases.MODELS["tree, order 1, 1 outputs"]
-        names = tree.as_rule_table().term_names
-        assert "> 999580 ± 400 and < 1000360 ± 530" in names
-        assert "> 0.003 ± 0.0011" in names
-        assert tree.as_rule_table().posterior is None
+            # Its terms say both sides.
+            assert "> 999580 ± 400 and < 1000360 ± 530" in table.term_names
+            assert "> 0.003 ± 0.0011" in table.term_names
+            assert table.posterior is None
 
     def test_what_has_one_term_each_is_left_as_it_is(self):
         for name in ("grid", "scattered", "rule table", "one rule"):

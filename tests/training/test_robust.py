@@ -61,7 +61,7 @@ def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "settings", [{"max_rules": 5}, {"partition": FuzzyCMeans(6, random_state=0)}]
+    "settings", [{"max_rules": 6}, {"partition": FuzzyCMeans(6, random_state=0)}]
 )
 def test_outliers_do_little(settings):
     X, y, truth, is_outlier = with_outliers()
