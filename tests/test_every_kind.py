@@ -21,20 +21,11 @@ from skanfis.export import export_json, fold, read_json
 from skanfis.export.json_reader import parse_json
 from skanfis.learning import VariableProjection
 
-from .quick import with_few_candidates
-
 N_ROWS = 160
 KINDS = {"grid": GridAntecedent, "tree": TreeAntecedent, "scattered": ScatteredAntecedent}
 pytestmark = [pytest.mark.parametrize("kind", KINDS)]
 # Weights that are given are not sought: a fit takes a tenth of the time.
 GIVEN = {"agreement": 0.01, "alpha": 1e-4, "solver": VariableProjection(stiffness=1e-3)}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _few_candidates():
-    with pytest.MonkeyPatch.context() as patch:
-        with_few_candidates(patch)
-        yield
 
 
 def data():

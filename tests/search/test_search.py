@@ -72,7 +72,7 @@ def test_expected_error_is_that_on_new_rows(rng):
 def test_more_noise_never_gives_more_rules(rng, partition):
     X = inputs(rng, 100, 2)
     truth, noise = np.sin(3.0 * X[:, 0]) + X[:, 1] ** 2, rng.standard_normal(100)
-    model = ANFISRegressor(partition=partition, max_rules=6)
+    model = ANFISRegressor(partition=partition, max_rules=4)
     assert model.fit(X, truth + 0.02 * noise).n_rules_ > model.fit(X, truth + 30 * noise).n_rules_
 
 
@@ -334,7 +334,7 @@ def test_a_parabola_is_not_told_by_rules_of_one_slope(seed):
 @cache
 def plain_fit(partition):
     X, y = bumps(np.random.default_rng(0))
-    return X, y, ANFISRegressor(partition=partition, max_rules=6).fit(X, y)
+    return X, y, ANFISRegressor(partition=partition, max_rules=4).fit(X, y)
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
