@@ -67,9 +67,8 @@ def test_what_floats_hold_is_learnt(x_scale, y_scale):
     ],
 )
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning")
-def test_deviations_beside_a_value_that_is_a_mistake(value, settings):
+def test_deviations_beside_a_value_that_is_a_mistake(value, settings, rng):
     # A rule is that row's own: what its terms may do is a difference of squares of 1e25 and more.
-    rng = np.random.default_rng(0)
     X = np.column_stack([rng.normal(size=200), rng.integers(0, 5, 200)])
     y = np.sin(2.0 * X[:, 0]) + 0.3 * X[:, 1] + 0.05 * rng.normal(size=200)
     X[3, 0] = value

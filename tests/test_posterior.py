@@ -137,9 +137,8 @@ def wave(rng, n_rows, noise=0.1):
     return X, np.sin(2 * u) + u * v + noise * rng.normal(size=n_rows)
 
 
-def test_bayesian_line_in_and_out_of_range():
+def test_bayesian_line_in_and_out_of_range(rng):
     """One rule is ridge regression: its posterior in closed form, along the tangent and held."""
-    rng = np.random.default_rng(0)
     X, y = rng.normal(size=(60, 2)), rng.normal(size=60)
     model = ANFISRegressor(n_mfs=1, alpha=0.3, out_of_bounds=LinearExtrapolation(np.inf)).fit(X, y)
     Z, t = (X - X.mean(axis=0)) / X.std(axis=0), (y - y.mean()) / y.std()

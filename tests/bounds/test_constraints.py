@@ -348,9 +348,8 @@ def test_a_constant_keeps_a_limit_that_the_data_contradict(rng):
     assert_allclose(held.predict(X), 5.0, atol=2e-3 * y.std())
 
 
-def test_a_kind_goes_on_while_its_free_rules_gain():
+def test_a_kind_goes_on_while_its_free_rules_gain(rng):
     # A bias of temperature and a wave of the rate: terms on both, before either pays in order.
-    rng = np.random.default_rng(0)
     X, fresh = rng.uniform(size=(200, 2)), rng.uniform(0.02, 0.98, (2000, 2))
 
     def truth(X):

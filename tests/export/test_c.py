@@ -263,9 +263,8 @@ def test_tree_takes_an_exponential_per_node_and_two_out_of_range():
     assert code.cost.stack_bytes == 8 * (3 + 1 + 6 + 5)
 
 
-def test_grid_takes_an_exponential_per_term():
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (800, 2))
+def test_grid_takes_an_exponential_per_term(rng):
+    X = rng.uniform(-1.0, 1.0, (800, 2))
     model = quick(n_mfs=6, solver="lse").fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1]).model_
     # 2 per term and 1 to normalise it; per rule two shares, two slopes, a value; a sum per input.
     inside = np.array([12, 0, 0, 12 * 3 + 36 * (2 + 3), 2])
@@ -352,9 +351,8 @@ HOSTILE = [
 
 @needs_compiler
 @pytest.mark.parametrize("std", ["c89", "c99"])
-def test_names_of_columns_cannot_leave_their_comment(std, tmp_path):
-    g = np.random.default_rng(0)
-    X = pd.DataFrame(g.uniform(size=(60, len(HOSTILE))), columns=HOSTILE)
+def test_names_of_columns_cannot_leave_their_comment(std, tmp_path, rng):
+    X = pd.DataFrame(rng.uniform(size=(60, len(HOSTILE))), columns=HOSTILE)
     estimator = quick(n_mfs=[2] + [1] * (len(HOSTILE) - 1)).fit(X, X.sum(axis=1))
     code = export_c(estimator, tmp_path / "m", std=std)
     assert (code.header + code.source).isascii()

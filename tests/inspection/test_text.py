@@ -37,8 +37,7 @@ def with_common_slopes(model):
     return replace(model, coefficients=coefficients)
 
 
-def test_noise_is_told_in_the_units_of_the_target():
-    rng = np.random.default_rng(0)
+def test_noise_is_told_in_the_units_of_the_target(rng):
     X = rng.uniform(-1, 1, size=(2000, 1))
     y = 3e3 * (np.sin(3 * X[:, 0]) + 0.1 * rng.standard_normal(2000))
     model = ANFISRegressor(n_mfs=3)
@@ -204,8 +203,7 @@ def test_a_rule_by_hand():
     assert model.predict(row)[0, 0] == pytest.approx(by_hand, rel=1e-12)
 
 
-def test_a_level_of_a_category_is_called_by_its_column():
-    rng = np.random.default_rng(0)
+def test_a_level_of_a_category_is_called_by_its_column(rng):
     X = pd.DataFrame({"rate": rng.normal(size=400), "fibre": rng.choice(["PM", "SM", "HB"], 400)})
     y = 2 * X["rate"] * (X["fibre"] == "PM") + (X["fibre"] == "SM") + 0.1 * rng.normal(size=400)
     encoder = make_column_transformer((OneHotEncoder(), ["fibre"]), remainder="passthrough")

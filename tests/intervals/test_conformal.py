@@ -40,12 +40,11 @@ def covered(bounds, y):
     return np.mean((bounds[0] <= y) & (y <= bounds[1]))
 
 
-def test_split_is_that_of_crepes():
+def test_split_is_that_of_crepes(rng):
     with warnings.catch_warnings():
         # When imported it has every UserWarning shown, whosever it is, and none raised.
         from crepes import ConformalRegressor as Crepes
 
-    rng = np.random.default_rng(0)
     X, y = bent(rng, 200)
     new = bent(rng, 50)[0]
     fitted = quick(**SHORT).fit(*bent(rng, 100))

@@ -286,9 +286,8 @@ def test_candidates_are_listed_from_the_best(rng):
             assert one["reading_cost"] == most
 
 
-def test_slopes_are_left_out_in_two_steps():
+def test_slopes_are_left_out_in_two_steps(rng):
     """Where the fewest cost too much, those are left that the evidence would rather not have."""
-    rng = np.random.default_rng(0)
     X = rng.normal(size=(100, 12))
     y = X @ np.linspace(0.0, 1.0, 12) + 2.0 * rng.normal(size=100)
     model = ANFISRegressor(max_rules=1).fit(X, y)

@@ -86,10 +86,9 @@ def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeyp
 
 
 @pytest.mark.parametrize("agreement", [0.0, 0.3])
-def test_gradient_is_that_of_all_rows(agreement):
-    g = np.random.default_rng(0)
-    rows = with_sample(oracles.bumpy_rows(g, 600, 2, 2, weighted=True), 150)
-    antecedent = oracles.random_grid(g, [Gaussian, Gaussian], [2, 3])
+def test_gradient_is_that_of_all_rows(agreement, rng):
+    rows = with_sample(oracles.bumpy_rows(rng, 600, 2, 2, weighted=True), 150)
+    antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 3])
     penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-3)
     problem = SeparableProblem(rows.sample, antecedent, 1, penalty).on_all(rows)
     found = problem.linearise(problem.evaluate(antecedent.parameters))

@@ -25,10 +25,9 @@ def statistics(rows, antecedent):
 
 
 @pytest.mark.parametrize("weighted", [False, True])
-def test_statistics_are_those_of_the_dense_strengths(weighted):
-    g = np.random.default_rng(0)
-    rows = oracles.bumpy_rows(g, 300, 2, 1, weighted)
-    antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])
+def test_statistics_are_those_of_the_dense_strengths(weighted, rng):
+    rows = oracles.bumpy_rows(rng, 300, 2, 1, weighted)
+    antecedent = oracles.random_grid(rng, [Gaussian, Bell], [3, 2])
     dense = oracles.DenseProblem(rows, antecedent, 1, 1.0)
     w = oracles.strengths(antecedent, antecedent.parameters, dense.Z)
     overlap, peak = statistics(rows, antecedent)

@@ -233,10 +233,9 @@ def test_whole_groups_are_held_out():
     assert grouped.validation_loss_curve_.min() > 1.5 * alone.validation_loss_curve_.min()
 
 
-def test_equal_rows_are_on_one_side():
-    g = np.random.default_rng(0)
-    X = g.normal(size=(50, 2))[np.arange(200) % 50]
-    training, held = hold_out(StandardisedData.of(X, g.normal(size=(200, 1))), 0.2, 0)
+def test_equal_rows_are_on_one_side(rng):
+    X = rng.normal(size=(50, 2))[np.arange(200) % 50]
+    training, held = hold_out(StandardisedData.of(X, rng.normal(size=(200, 1))), 0.2, 0)
     assert held.size == 40
     assert set(training % 50).isdisjoint(held % 50)
 
