@@ -237,8 +237,7 @@ class TestAsRuleTable:
 
 
 @pytest.mark.parametrize("counts", [(2, 2), (3, 2)])
-def test_apply_gives_the_strongest_rule_and_of_equals_the_first(counts):
-    rng = np.random.default_rng(6)
+def test_apply_gives_the_strongest_rule_and_of_equals_the_first(counts, rng):
     frozen = ANFISRegressor(list(counts), max_iter=0, alpha=0.1, agreement=0.1)
     X = rng.uniform(-1.0, 1.0, (50, 2))
     X[:2] = [[-1.0, -1.0], [1.0, 1.0]]

@@ -73,8 +73,7 @@ def planted(data):
     return (strengths * (consequents[:, 0] + data @ consequents[:, 1:].T)).sum(axis=1)
 
 
-def test_planted_model_is_found():
-    rng = np.random.default_rng(1)
+def test_planted_model_is_found(rng):
     train, check = rng.uniform(-2, 2, (400, 2)), rng.uniform(-2, 2, (400, 2))
     model = ANFISRegressor(n_mfs=2).fit(train, planted(train))
     check = check[model.in_bounds(check)]

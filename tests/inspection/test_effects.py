@@ -88,8 +88,7 @@ def test_what_fit_keeps_is_what_its_rows_give(rng):
     )
 
 
-def test_inputs_that_go_together_are_told():
-    rng = np.random.default_rng(1)
+def test_inputs_that_go_together_are_told(rng):
     X = rng.normal(size=(300, 2))
     X[:, 1] = X[:, 0] + 0.2 * X[:, 1]
     model = quick(n_mfs=1).fit(X, X[:, 0] + X[:, 1])

@@ -137,24 +137,22 @@ class TestAtGivenPremises:
     @pytest.mark.parametrize("kind", KINDS)
     @pytest.mark.parametrize("order", [0, 1])
     @pytest.mark.parametrize("n_outputs", [1, 2])
-    def test_it_is_the_marginal_likelihood_of_normal_data(self, order, kind, n_outputs):
+    def test_it_is_the_marginal_likelihood_of_normal_data(self, order, kind, n_outputs, rng):
         """To the last constant, so that rule bases of any size and order can be compared."""
-        g = np.random.default_rng(6)
         n_inputs, build = KINDS[kind]
-        rows, antecedent = oracles.bumpy_rows(g, 20, n_inputs, n_outputs), build(g)
+        rows, antecedent = oracles.bumpy_rows(rng, 20, n_inputs, n_outputs), build(rng)
         line = SeparableProblem(rows, antecedent, order, FIRST).common_line
         for plain in PENALTIES:
             # And with a pull for every component.
-            for penalty in (plain, with_pulls(plain, line, g)):
+            for penalty in (plain, with_pulls(plain, line, rng)):
                 found = posterior(rows, antecedent, order, penalty)
                 dense = Dense(rows, antecedent, order, penalty)
                 expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
                 assert_allclose(in_full(found), expected + prior_of_pulls(penalty), atol=1e-7)
                 assert_allclose(found.noise_variance, variance, rtol=1e-5)
 
-    def test_effective_parameters_are_the_trace_of_the_hat_matrix(self):
-        g = np.random.default_rng(4)
-        rows, antecedent = oracles.bumpy_rows(g, 40, 2, 1, True), rules(g, 3)
+    def test_effective_parameters_are_the_trace_of_the_hat_matrix(self, rng):
+        rows, antecedent = oracles.bumpy_rows(rng, 40, 2, 1, True), rules(rng, 3)
         for penalty in PENALTIES:
             dense = Dense(rows, antecedent, 1, penalty)
             weighted = dense.phi.T * (dense.weight / dense.n)
