@@ -53,10 +53,12 @@ def gap(seed=0, n_rows=400):
     return X, np.where(clump, X[:, 0], -X[:, 1]) + 0.05 * g.normal(size=n_rows)
 
 
+X, Y = gap()
+
+
 def test_empty_cells_are_reported_and_can_be_left_out():
-    X, y = gap()
     settings = {"solver": "lse", "alpha": 1e-8}
-    whole = ANFISRegressor(n_mfs=4, **settings).fit(X, y)
+    whole = ANFISRegressor(n_mfs=4, **settings).fit(X, Y)
     # Terms 0 and 1 of one input never meet terms 2 and 3 of the other.
     empty = [4 * i + j for i in range(4) for j in range(4) if (i < 2) != (j < 2)]
     assert [r["rule"] for r in whole.redundant_rules_] == empty
@@ -71,7 +73,7 @@ def test_empty_cells_are_reported_and_can_be_left_out():
     # Rules that never fire have no say, and those that are left speak for the same rows.
     assert_allclose(left.predict(X)[:, 0], whole.predict(X), atol=0.05)
     assert_allclose(left.coverage(X), whole.coverage(X), atol=0.01)
-    pruned = ANFISRegressor(partition=left, **settings).fit(X, y)
+    pruned = ANFISRegressor(partition=left, **settings).fit(X, Y)
     assert pruned.n_rules_ == 8
     assert_allclose(pruned.loss_curve_[-1], whole.loss_curve_[-1], rtol=1e-2)
 
@@ -90,12 +92,11 @@ def test_rules_that_are_not_there_are_refused():
 
 
 def test_what_is_left_has_no_posterior_until_it_is_fitted():
-    X, y = gap()
-    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, y)
+    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, Y)
     left = model.without_rules([1])
-    given = ANFISRegressor(partition=left, max_iter=0).fit(X, y)
+    given = ANFISRegressor(partition=left, max_iter=0).fit(X, Y)
     assert_array_equal(given.predict(X), left.predict(X)[:, 0])
     with pytest.raises(ValueError, match=r"has no posterior, as one .* that lost rules"):
         given.predict(X, return_std=True)
     assert given.readability_.line in str(given.readability_)
-    assert ANFISRegressor(partition=left).fit(X, y).predict(X, return_std=True)[1].min() > 0.0
+    assert ANFISRegressor(partition=left).fit(X, Y).predict(X, return_std=True)[1].min() > 0.0
