@@ -26,13 +26,9 @@ KMEANS = KMeans(n_clusters=2, n_init=1, random_state=0)
 QUICK = {"n_mfs": 1}
 
 
-def table(n_rows=N_ROWS):
-    rng = np.random.default_rng(0)
-    X = rng.uniform(-1.0, 1.0, (n_rows, 3)) * [10.0, 1.0, 0.1] + [100.0, 0.0, 5.0]
-    return X, np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
-
-
-X, Y = table()
+UNIT = np.random.default_rng(0).uniform(-1.0, 1.0, (N_ROWS, 3))
+X = UNIT * [10.0, 1.0, 0.1] + [100.0, 0.0, 5.0]
+Y = np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
 FRAME = pd.DataFrame(X, columns=NAMES)
 METHODS = ["predict", "coverage", "strengths", "in_bounds"]
 

@@ -9,16 +9,8 @@ from numpy.testing import assert_allclose
 from skanfis import ANFISRegressor
 from skanfis.learning import VariableProjection
 
-
-def table(n_rows=60):
-    rng = np.random.default_rng(0)
-    X = rng.uniform(-1.0, 1.0, (n_rows, 2)) * [10.0, 1.0] + [100.0, 0.0]
-    return X, np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
-
-
-X, Y = table()
-
-
+X = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 2)) * [10.0, 1.0] + [100.0, 0.0]
+Y = np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
 SHORT = {"n_mfs": 2, "solver": VariableProjection(tol=0.1)}
 
 

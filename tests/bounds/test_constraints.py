@@ -29,15 +29,10 @@ QUICK = {
 pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 
 
-def planted():
-    """Rising with the first input, anything with the second; noise that the fit follows."""
-    rng = np.random.default_rng(0)
-    X = rng.uniform(-1.0, 1.0, (120, 2))
-    truth = np.tanh(3.0 * X[:, 0]) + 0.3 * X[:, 1] ** 2
-    return X, truth + 0.3 * rng.normal(size=120)
-
-
-X, Y = planted()
+# Rising with the first input, anything with the second; noise that the fit follows.
+G = np.random.default_rng(0)
+X = G.uniform(-1.0, 1.0, (120, 2))
+Y = np.tanh(3.0 * X[:, 0]) + 0.3 * X[:, 1] ** 2 + 0.3 * G.normal(size=120)
 
 
 def points_on_a_line(*places):

@@ -95,10 +95,6 @@ def around(X, dtype="double", n_rows=2000):
     return (low + (high - low) * unit).astype(NUMPY[dtype])
 
 
-def answers_of(code, X, folder):
-    return evaluate_all([code], X, folder, "c99", [1])[0]
-
-
 @pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
@@ -138,7 +134,7 @@ def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, 
     X = (offset + X * scale).astype(np.float32).astype(float)
     estimator = quick(n_mfs=3).fit(X, y / scale)
     code = export_c(estimator, name="m", dtype="float", min_coverage=None)
-    found, status = answers_of(code, X.astype(np.float32), tmp_path)
+    ((found, status),) = evaluate_all([code], X.astype(np.float32), tmp_path, "c99", [1])
     assert np.abs(found[:, 0] - estimator.predict(X)).max() < 1e-6 * np.abs(y / scale).max()
     assert (status == STATUS["IN_RANGE"]).all()
 

@@ -19,13 +19,9 @@ from ..quick import quick
 N_ROWS, N_SAMPLE = 12_000, 3000
 
 
-def noisy_surface(n_rows=N_ROWS):
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (n_rows, 2))
-    return X, np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * g.standard_normal(n_rows)
-
-
-X, Y = noisy_surface()
+G = np.random.default_rng(0)
+X = G.uniform(-1.0, 1.0, (N_ROWS, 2))
+Y = np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * G.standard_normal(N_ROWS)
 
 
 @pytest.fixture
