@@ -45,15 +45,11 @@ def test_rules_far_away_and_rules_alike_are_found():
     assert found[0]["weight"] > 0.1
 
 
-def gap(seed=0, n_rows=400):
-    """Two clumps of rows on the diagonal: half of a grid's cells are empty."""
-    g = np.random.default_rng(seed)
-    clump = g.integers(0, 2, n_rows)
-    X = np.column_stack([clump, clump]) * 40.0 + 0.3 * g.normal(size=(n_rows, 2))
-    return X, np.where(clump, X[:, 0], -X[:, 1]) + 0.05 * g.normal(size=n_rows)
-
-
-X, Y = gap()
+# Two clumps of rows on the diagonal: half of a grid's cells are empty.
+G = np.random.default_rng(0)
+CLUMP = G.integers(0, 2, 400)
+X = np.column_stack([CLUMP, CLUMP]) * 40.0 + 0.3 * G.normal(size=(400, 2))
+Y = np.where(CLUMP, X[:, 0], -X[:, 1]) + 0.05 * G.normal(size=400)
 
 
 def test_empty_cells_are_reported_and_can_be_left_out():
@@ -79,7 +75,7 @@ def test_empty_cells_are_reported_and_can_be_left_out():
 
 
 def test_rules_that_are_not_there_are_refused():
-    two_rules = ANFISRegressor(n_mfs=[2, 1], max_iter=0).fit(*gap())
+    two_rules = ANFISRegressor(n_mfs=[2, 1], max_iter=0).fit(X, Y)
     assert two_rules.redundant_rules_ == []
     assert two_rules.without_rules() is two_rules.without_rules([]) is two_rules.model_
     with pytest.raises(ValueError, match="rules has 2, but the model has 2 rules"):
