@@ -274,11 +274,11 @@ def test_what_has_no_posterior_says_why(monkeypatch):
         ANFISRegressor(**settings).fit(X, y).predict(X, return_std=True)
 
 
-@pytest.mark.parametrize("slopes", [None, [0, 2]])
-def test_scalers_folded_in_and_json_keep_the_deviation(slopes, rng):
+@pytest.mark.parametrize("settings", [{}, {"consequent_features": [0, 2]}, {"solver": "lse"}])
+def test_scalers_folded_in_and_json_keep_the_deviation(settings, rng):
     X, y = wave(rng, 120)
     X = np.column_stack([X[:, 1], rng.normal(size=120), X[:, 0]])
-    rules = ANFISRegressor(n_mfs=[3, 1, 2], consequent_features=slopes, **quick())
+    rules = ANFISRegressor(n_mfs=[3, 1, 2], **quick() | settings)
     columns = make_column_transformer((StandardScaler(), [2, 0]), (RobustScaler(), [1]))
     columns.fit(X)
     scaled = make_pipeline(columns, rules)
