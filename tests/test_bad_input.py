@@ -26,13 +26,9 @@ KMEANS = KMeans(n_clusters=2, n_init=1, random_state=0)
 QUICK = {"n_mfs": 1}
 
 
-def table(n_rows=N_ROWS):
-    rng = np.random.default_rng(0)
-    X = rng.uniform(-1.0, 1.0, (n_rows, 3)) * [10.0, 1.0, 0.1] + [100.0, 0.0, 5.0]
-    return X, np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
-
-
-X, Y = table()
+UNIT = np.random.default_rng(0).uniform(-1.0, 1.0, (N_ROWS, 3))
+X = UNIT * [10.0, 1.0, 0.1] + [100.0, 0.0, 5.0]
+Y = np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
 FRAME = pd.DataFrame(X, columns=NAMES)
 METHODS = ["predict", "coverage", "strengths", "in_bounds"]
 
@@ -274,9 +270,8 @@ def flat(column, value=4.25):
 
 @pytest.mark.parametrize("settings", [{"n_mfs": [3, 2]}, {"max_rules": 3}, {"partition": KMEANS}])
 @pytest.mark.parametrize("n_constant", [1, 40])
-def test_constant_columns_cost_nothing_however_many_they_are(settings, n_constant):
+def test_constant_columns_cost_nothing_however_many_they_are(settings, n_constant, rng):
     """They get no terms and are no slopes that a row has to pay for, in no count of parameters."""
-    rng = np.random.default_rng(0)
     inputs = rng.uniform(-1.0, 1.0, (60, 2))
     target = np.sin(4.0 * inputs[:, 0]) + 0.5 * inputs[:, 1] ** 2 + 0.05 * rng.normal(size=60)
     without = ANFISRegressor(**settings).fit(inputs, target)
@@ -377,8 +372,7 @@ LIMIT = "limit is 1,024 MiB (sklearn.set_config(working_memory"
         (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "10^15 MiB"]),
     ],
 )
-def test_more_rules_than_memory(n_inputs, settings, said):
-    rng = np.random.default_rng(0)
+def test_more_rules_than_memory(n_inputs, settings, said, rng):
     wide = rng.normal(size=(50, n_inputs))
     with traced() as peak, refused(ValueError, *said, "KMeans"):
         ANFISRegressor(**settings).fit(wide, wide[:, 0])

@@ -26,18 +26,12 @@ KINDS = {"grid": GridAntecedent, "tree": TreeAntecedent, "scattered": ScatteredA
 pytestmark = [pytest.mark.parametrize("kind", KINDS)]
 # Weights that are given are not sought: a fit takes a tenth of the time.
 GIVEN = {"agreement": 0.01, "alpha": 1e-4, "solver": VariableProjection(stiffness=1e-3)}
-
-
-def data():
-    """A step, a slope, and a column of two values."""
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (N_ROWS, 3)) * [1.0, 10.0, 1.0] + [0.0, 5.0, 0.0]
-    X[:, 2] = g.integers(0, 2, N_ROWS)
-    y = np.where(X[:, 0] > 0.2, 0.3 * X[:, 1], 1.0 - 0.1 * X[:, 1]) + X[:, 2] * (X[:, 1] > 5.0)
-    return X, y + 0.05 * g.normal(size=N_ROWS)
-
-
-X, Y = data()
+# A step, a slope, and a column of two values.
+G = np.random.default_rng(0)
+X = G.uniform(-1.0, 1.0, (N_ROWS, 3)) * [1.0, 10.0, 1.0] + [0.0, 5.0, 0.0]
+X[:, 2] = G.integers(0, 2, N_ROWS)
+Y = np.where(X[:, 0] > 0.2, 0.3 * X[:, 1], 1.0 - 0.1 * X[:, 1]) + X[:, 2] * (X[:, 1] > 5.0)
+Y += 0.05 * G.normal(size=N_ROWS)
 WEIGHT = np.random.default_rng(1).integers(0, 3, N_ROWS)
 
 

@@ -9,26 +9,19 @@ from numpy.testing import assert_allclose
 from skanfis import ANFISRegressor
 from skanfis.learning import VariableProjection
 
-
-def table(n_rows=60):
-    rng = np.random.default_rng(0)
-    X = rng.uniform(-1.0, 1.0, (n_rows, 2)) * [10.0, 1.0] + [100.0, 0.0]
-    return X, np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
-
-
+X = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 2)) * [10.0, 1.0] + [100.0, 0.0]
+Y = np.sin(3.0 * X[:, 1]) + 0.1 * X[:, 0]
 SHORT = {"n_mfs": 2, "solver": VariableProjection(tol=0.1)}
 
 
 @cache
 def plain_predictions():
-    X, y = table()
-    return ANFISRegressor(**SHORT).fit(X, y).predict(X)
+    return ANFISRegressor(**SHORT).fit(X, Y).predict(X)
 
 
 @pytest.mark.parametrize("weight", [5e-324, 1e-310, 1e-300, 1e300, 1e308])
 def test_weights_that_are_all_alike_are_none(weight):
-    X, y = table()
-    weighted = ANFISRegressor(**SHORT).fit(X, y, np.full(len(y), weight))
+    weighted = ANFISRegressor(**SHORT).fit(X, Y, np.full(len(Y), weight))
     assert_allclose(weighted.predict(X), plain_predictions(), rtol=0, atol=1e-9)
 
 
@@ -44,17 +37,15 @@ def test_weights_that_are_all_alike_are_none(weight):
 )
 @pytest.mark.parametrize("settings", [{}, {"n_mfs": 2}, {"n_mfs": 2, "solver": "hybrid"}])
 def test_what_floats_do_not_hold_is_refused(x_scale, y_scale, message, settings):
-    X, y = table()
     with pytest.raises(ValueError, match=message):
-        ANFISRegressor(**settings).fit(X * x_scale, y * y_scale)
+        ANFISRegressor(**settings).fit(X * x_scale, Y * y_scale)
 
 
 @pytest.mark.parametrize("x_scale", [1e-97, 1e97])
 @pytest.mark.parametrize("y_scale", [1e-97, 1e97])
 def test_what_floats_hold_is_learnt(x_scale, y_scale):
-    X, y = table()
-    found = ANFISRegressor(**SHORT).fit(X * x_scale, y * y_scale).predict(X * x_scale)
-    assert_allclose(found / y_scale, plain_predictions(), rtol=0, atol=1e-6 * np.ptp(y))
+    found = ANFISRegressor(**SHORT).fit(X * x_scale, Y * y_scale).predict(X * x_scale)
+    assert_allclose(found / y_scale, plain_predictions(), rtol=0, atol=1e-6 * np.ptp(Y))
 
 
 @pytest.mark.parametrize(
@@ -62,14 +53,13 @@ def test_what_floats_hold_is_learnt(x_scale, y_scale):
     [
         (1e8, {"n_mfs": 2}),
         (1e12, {"n_mfs": 3, "order": 0}),
-        (1e17, {}),
+        (1e17, {"max_rules": 3}),
         (1e7, {"n_mfs": 2, "solver": VariableProjection(stiffness=0.0)}),
     ],
 )
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.UnderdeterminedWarning")
-def test_deviations_beside_a_value_that_is_a_mistake(value, settings):
+def test_deviations_beside_a_value_that_is_a_mistake(value, settings, rng):
     # A rule is that row's own: what its terms may do is a difference of squares of 1e25 and more.
-    rng = np.random.default_rng(0)
     X = np.column_stack([rng.normal(size=200), rng.integers(0, 5, 200)])
     y = np.sin(2.0 * X[:, 0]) + 0.3 * X[:, 1] + 0.05 * rng.normal(size=200)
     X[3, 0] = value

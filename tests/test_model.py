@@ -202,15 +202,14 @@ def test_outputs_are_held_beside_the_range_of_the_target(policy, limit):
     assert_array_equal(answer, np.clip(said, low, high))
 
 
-def test_no_row_however_far_is_answered_beyond_the_limits():
-    g = np.random.default_rng(0)
-    X, weight = g.standard_t(1.5, (200, 3)), g.integers(0, 3, 200)
-    y = np.sin(X[:, 0]) + 0.1 * g.standard_normal(200)
+def test_no_row_however_far_is_answered_beyond_the_limits(rng):
+    X, weight = rng.standard_t(1.5, (200, 3)), rng.integers(0, 3, 200)
+    y = np.sin(X[:, 0]) + 0.1 * rng.standard_normal(200)
     estimator = ANFISRegressor(3).fit(X, y, sample_weight=weight)
     own = y[weight > 0]
     limits = [own.min() - 0.25 * np.ptp(own), own.max() + 0.25 * np.ptp(own)]
     assert_allclose(estimator.model_.output_limits[:, 0], limits, rtol=1e-12)
-    anywhere = estimator.model_.predict(g.standard_t(0.5, (2000, 3)))
+    anywhere = estimator.model_.predict(rng.standard_t(0.5, (2000, 3)))
     assert anywhere.min() >= limits[0]
     assert anywhere.max() <= limits[1]
 
@@ -218,7 +217,7 @@ def test_no_row_however_far_is_answered_beyond_the_limits():
 class TestAsRuleTable:
     """A tree as rules listed one by one, with one term on an input."""
 
-    def test_it_predicts_the_same(self, rng):
+    def test_it_predicts_the_same(self):
         for n_outputs in (1, 2):
             tree = rule_bases.MODELS[f"tree, order 1, {n_outputs} outputs"]
             table, rows = tree.as_rule_table(), rule_bases.rows_of(tree, 1.3, 500)
@@ -226,13 +225,11 @@ class TestAsRuleTable:
             full_scale = np.abs(tree.predict(rows)).max()
             assert_allclose(table.predict(rows), tree.predict(rows), atol=1e-12 * full_scale)
             assert_allclose(table.gradient(rows), tree.gradient(rows), rtol=1e-7, atol=1e-7)
-
-    def test_its_terms_say_both_sides(self):
-        tree = rule_bases.MODELS["tree, order 1, 1 outputs"]
-        names = tree.as_rule_table().term_names
-        assert "> 999580 ± 400 and < 1000360 ± 530" in names
-        assert "> 0.003 ± 0.0011" in names
-        assert tree.as_rule_table().posterior is None
+            # Its terms say both sides.
+            assert "> 999580 ± 400 and < 1000360 ± 530" in table.term_names
+            assert "> 0.003 ± 0.0011" in table.term_names
+            # What is known of a tree's parameters is not known of these.
+            assert replace(tree, posterior=object()).as_rule_table().posterior is None
 
     def test_what_has_one_term_each_is_left_as_it_is(self):
         for name in ("grid", "scattered", "rule table", "one rule"):
@@ -241,8 +238,7 @@ class TestAsRuleTable:
 
 
 @pytest.mark.parametrize("counts", [(2, 2), (3, 2)])
-def test_apply_gives_the_strongest_rule_and_of_equals_the_first(counts):
-    rng = np.random.default_rng(6)
+def test_apply_gives_the_strongest_rule_and_of_equals_the_first(counts, rng):
     frozen = ANFISRegressor(list(counts), max_iter=0, alpha=0.1, agreement=0.1)
     X = rng.uniform(-1.0, 1.0, (50, 2))
     X[:2] = [[-1.0, -1.0], [1.0, 1.0]]

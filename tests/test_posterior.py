@@ -84,9 +84,8 @@ def dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=0):
 @pytest.mark.theory
 @pytest.mark.parametrize("is_learnt", [False, True], ids=["fixed premises", "with the premises"])
 @pytest.mark.parametrize("kind", ["grid", "scattered", "table, one slope", "order 0"])
-def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch):
+def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, rng):
     monkeypatch.setattr("skanfis.model.BLOCK_BYTES", 1)  # 64 rows
-    rng = np.random.default_rng(3)
     rows = oracles.bumpy_rows(rng, 200, 2, 1, weighted=False)
     inputs, order = None, int(kind != "order 0")
     if kind == "scattered":
@@ -137,9 +136,8 @@ def wave(rng, n_rows, noise=0.1):
     return X, np.sin(2 * u) + u * v + noise * rng.normal(size=n_rows)
 
 
-def test_bayesian_line_in_and_out_of_range():
+def test_bayesian_line_in_and_out_of_range(rng):
     """One rule is ridge regression: its posterior in closed form, along the tangent and held."""
-    rng = np.random.default_rng(0)
     X, y = rng.normal(size=(60, 2)), rng.normal(size=60)
     model = ANFISRegressor(n_mfs=1, alpha=0.3, out_of_bounds=LinearExtrapolation(np.inf)).fit(X, y)
     Z, t = (X - X.mean(axis=0)) / X.std(axis=0), (y - y.mean()) / y.std()
@@ -161,8 +159,7 @@ def test_bayesian_line_in_and_out_of_range():
 
 
 @pytest.mark.parametrize("settings", [{"mf": "triangular"}, {"partition": KMEANS}, {"mf": "bell"}])
-def test_deviation_grows_on_the_way_out_under_every_policy(settings):
-    rng = np.random.default_rng(1)
+def test_deviation_grows_on_the_way_out_under_every_policy(settings, rng):
     X, y = wave(rng, 300)
     if "mf" in settings:
         settings = settings | {"n_mfs": [3, 2]}
@@ -195,9 +192,8 @@ SOLVERS = {
 
 @pytest.mark.theory
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_planted_truth_lies_within_the_deviations(solver):
+def test_planted_truth_lies_within_the_deviations(solver, rng):
     """Data of a known model: errors of new rows over their deviations have variance one."""
-    rng = np.random.default_rng(4)
     X, y = wave(rng, 400)
     truth = ANFISRegressor(n_mfs=[3, 2], max_iter=20, **quick()).fit(X, y)
     squares, model_squares = [], []
@@ -219,8 +215,7 @@ def truth_box(truth, X):
     return np.clip(X, truth.model_.minimum, truth.model_.maximum)
 
 
-def test_units_repeats_weights_outputs_and_files():
-    rng = np.random.default_rng(5)
+def test_units_repeats_weights_outputs_and_files(rng):
     X, y = wave(rng, 150)
     settings = {"n_mfs": [2, 2], **quick()}
     fit = ANFISRegressor(**settings).fit
@@ -279,12 +274,11 @@ def test_what_has_no_posterior_says_why(monkeypatch):
         ANFISRegressor(**settings).fit(X, y).predict(X, return_std=True)
 
 
-@pytest.mark.parametrize("slopes", [None, [0, 2]])
-def test_scalers_folded_in_and_json_keep_the_deviation(slopes):
-    rng = np.random.default_rng(8)
+@pytest.mark.parametrize("settings", [{}, {"consequent_features": [0, 2]}, {"solver": "lse"}])
+def test_scalers_folded_in_and_json_keep_the_deviation(settings, rng):
     X, y = wave(rng, 120)
     X = np.column_stack([X[:, 1], rng.normal(size=120), X[:, 0]])
-    rules = ANFISRegressor(n_mfs=[3, 1, 2], consequent_features=slopes, **quick())
+    rules = ANFISRegressor(n_mfs=[3, 1, 2], **quick() | settings)
     columns = make_column_transformer((StandardScaler(), [2, 0]), (RobustScaler(), [1]))
     columns.fit(X)
     scaled = make_pipeline(columns, rules)
@@ -302,6 +296,14 @@ def test_scalers_folded_in_and_json_keep_the_deviation(slopes):
         export_json(parse_json(export_json(estimator)), posterior=True)
 
 
+@pytest.fixture(scope="module")
+def document():
+    """A model with its posterior, as text."""
+    X, y = wave(np.random.default_rng(9), 60)
+    fitted = ANFISRegressor(n_mfs=2, max_iter=2, **quick(0.5)).fit(X, y)
+    return export_json(fitted, posterior=True)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -314,20 +316,17 @@ def test_scalers_folded_in_and_json_keep_the_deviation(slopes):
         (lambda p: p["cross"][0][0].__setitem__(0, "1"), "is not a number of size up to"),
     ],
 )
-def test_json_of_a_posterior_that_is_none_is_refused(change, message):
-    X, y = wave(np.random.default_rng(9), 60)
-    fitted = ANFISRegressor(n_mfs=2, max_iter=2, **quick(0.5)).fit(X, y)
-    document = json.loads(export_json(fitted, posterior=True))
-    change(document["posterior"])
+def test_json_of_a_posterior_that_is_none_is_refused(document, change, message):
+    spoilt = json.loads(document)
+    change(spoilt["posterior"])
     with pytest.raises(ValueError, match=message):
-        parse_json(json.dumps(document))
+        parse_json(json.dumps(spoilt))
 
 
 @pytest.mark.theory
 @pytest.mark.parametrize("kind", ["gaussian", "order 0", "one slope", "bell", "clusters", "known"])
-def test_out_of_range_it_is_the_deviation_of_the_tangent(kind):
+def test_out_of_range_it_is_the_deviation_of_the_tangent(kind, rng):
     """The row of the tangent by derivatives along its way, in the covariance of the posterior."""
-    rng = np.random.default_rng(11)
     X, y = wave(rng, 150)
     X = np.column_stack([X, rng.normal(size=150)])
     settings = {"n_mfs": [3, 2, 1], "max_iter": 5, **quick(0.1)}
@@ -400,8 +399,7 @@ def test_rows_at_the_end_of_the_numbers_saturate():
 
 
 @pytest.mark.parametrize("solver", [VariableProjection(stiffness=1e-2), LeastSquares()])
-def test_deviation_of_a_mean_is_that_of_the_mean_design(solver):
-    rng = np.random.default_rng(8)
+def test_deviation_of_a_mean_is_that_of_the_mean_design(solver, rng):
     X = rng.uniform(-1.0, 1.0, (80, 2))
     fitted = ANFISRegressor([3, 2], agreement=0.01, alpha=1e-3, solver=solver)
     frozen = fitted.fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * rng.normal(size=80)).model_

@@ -59,13 +59,6 @@ def with_policy(estimator, policy):
     return clone(estimator).set_params(out_of_bounds=policy).fit(FRAME, Y)
 
 
-def test_raise_names_the_columns(trained):
-    model = with_policy(trained, "raise")
-    with pytest.raises(ValueError, match=r"'temperature' in 2 of 4 rows .*'rate' in 1 of 4 rows"):
-        model.predict(OUTSIDE)
-    assert_array_equal(model.predict(OUTSIDE[:1]), trained.predict(OUTSIDE[:1]))
-
-
 def accounts(rng, noise, n_rows=200):
     """Four long-tailed items, and a total of them."""
     X = rng.lognormal(sigma=1.0, size=(n_rows, 4))
@@ -126,6 +119,10 @@ def test_policy_may_be_changed_after_training(trained):
     for policy in ("linear", "nan", "clip"):
         found = model.set_params(out_of_bounds=policy).predict(OUTSIDE)
         assert_array_equal(found, with_policy(trained, policy).predict(OUTSIDE))
+    for refusing in (model.set_params(out_of_bounds="raise"), with_policy(trained, "raise")):
+        with pytest.raises(ValueError, match=r"'temperature' in 2 of 4 .*'rate' in 1 of 4 rows"):
+            refusing.predict(OUTSIDE)
+        assert_array_equal(refusing.predict(OUTSIDE[:1]), trained.predict(OUTSIDE[:1]))
     model.set_params(out_of_bounds=LinearExtrapolation())
     for limit in (0.0, 0.2, math.inf):
         found = model.set_params(out_of_bounds__max_extrapolation=limit).predict(OUTSIDE)

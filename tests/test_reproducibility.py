@@ -13,9 +13,9 @@ from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 
 SETTINGS = {
     # Grids, and clusters by k-means.
-    "default": {},
+    "searched": {"max_rules": 3},
     "grid of a given size": {"n_mfs": [2, 3, 1]},
-    "scattered": {"partition": "scattered"},
+    "scattered": {"partition": "scattered", "max_rules": 3},
     "fuzzy clusters": {"partition": FuzzyCMeans(3, random_state=0)},
     "clusterer": {"partition": KMeans(4, random_state=0)},
     "hybrid": {"n_mfs": 2, "solver": Hybrid(tol=1e-2), "max_iter": 5},

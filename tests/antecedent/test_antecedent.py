@@ -52,6 +52,10 @@ def test_strengths_are_products_over_the_sum_of_products(antecedent, Z, rng):
         expected = oracles.strengths(antecedent, parameters, Z)
         assert_allclose(moved.strengths(Z), expected, rtol=1e-11, atol=1e-300)
     assert_array_equal(moved.with_parameters(own).strengths(Z), antecedent.strengths(Z))
+    told = [[t for t in rule if t >= 0] for rule in antecedent.rule_terms]
+    assert told == [list(rule) for rule in oracles.rules_by_hand(antecedent)]
+    assert antecedent.n_rules == len(antecedent.rule_terms)
+    assert antecedent.n_terms == antecedent.rule_terms.max() + 1
 
 
 @ALL
@@ -61,14 +65,6 @@ def test_strengths_sum_to_one_wherever_a_row_lies(antecedent, rng, distance):
     strengths = antecedent.strengths(Z)
     assert (strengths >= 0.0).all()
     assert_allclose(strengths.sum(axis=0), 1.0, rtol=1e-13)
-
-
-@ALL
-def test_rule_terms_are_those_by_hand(antecedent):
-    found = [[t for t in rule if t >= 0] for rule in antecedent.rule_terms]
-    assert found == [list(r) for r in oracles.rules_by_hand(antecedent)]
-    assert antecedent.n_rules == len(antecedent.rule_terms)
-    assert antecedent.n_terms == antecedent.rule_terms.max() + 1
 
 
 def test_without_terms_one_rule_always_fires(Z):

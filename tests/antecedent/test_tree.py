@@ -59,16 +59,15 @@ def test_a_split_leaves_the_other_leaves_as_they_are(rng):
 @pytest.mark.theory
 @pytest.mark.parametrize("agreement", [0.0, 0.05])
 @pytest.mark.parametrize(("order", "n_outputs"), [(1, 1), (0, 2)])
-def test_gradient_and_gauss_newton_by_cuts_and_widths(agreement, order, n_outputs):
-    g = np.random.default_rng(3)
-    rows = oracles.bumpy_rows(g, 250, 2, n_outputs, weighted=True)
+def test_gradient_and_gauss_newton_by_cuts_and_widths(agreement, order, n_outputs, rng):
+    rows = oracles.bumpy_rows(rng, 250, 2, n_outputs, weighted=True)
     start = tree(5, inputs=(0, 1))
     penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-2)
     problem = SeparableProblem(rows, start, order, penalty)
     dense = oracles.DenseProblem(rows, start, order, penalty)
     premise = Premise.of(start, *oracles.box(rows))
     assert premise.size == 8
-    x = 0.2 * g.normal(size=premise.size)
+    x = 0.2 * rng.normal(size=premise.size)
     evaluation = problem.evaluate(premise.parameters(x))
     raw = problem.linearise(evaluation)
     gradient, gauss_newton = premise.pull_back(x, raw.gradient, raw.gauss_newton)

@@ -85,28 +85,29 @@ def test_the_box_is_held_where_the_policy_holds(rng):
 
 
 @pytest.mark.parametrize(
-    ("box", "message"),
+    ("asked", "message"),
     [
-        ([(0.0, 1.0)], r"one \(low, high\) for each of the 3 inputs .*shape \(1, 2\)"),
-        ("all", r"one \(low, high\) for each of the 3 inputs .*got 'all'"),
-        ({"speed": (0.0, 1.0)}, r"box names 'speed', which is no column .*'rate', at positions 0"),
-        ({"rate": (1.0, 0.0)}, r"box has \(1, 0\) for 'rate': low must not be above high"),
-        ({"rate": (np.nan, 0.0)}, "above high, or NaN"),
-        ({"rate": 1.0}, "must be two numbers"),
+        ({"box": [(0.0, 1.0)]}, r"one \(low, high\) for each of the 3 inputs .*shape \(1, 2\)"),
+        ({"box": "all"}, r"one \(low, high\) for each of the 3 inputs .*got 'all'"),
+        (
+            {"box": {"speed": (0.0, 1.0)}},
+            r"box names 'speed', which is no column .*'rate', at positions 0",
+        ),
+        ({"box": {"rate": (1.0, 0.0)}}, r"box has \(1, 0\) for 'rate': low must not be above high"),
+        ({"box": {"rate": (np.nan, 0.0)}}, "above high, or NaN"),
+        ({"box": {"rate": 1.0}}, "must be two numbers"),
+        ({"tol": -1}, "tol=-1 must be zero or positive"),
+        ({"max_boxes": 0}, "max_boxes=0 must be a whole number of 1 or more"),
     ],
 )
-def test_what_is_no_box_is_refused(box, message):
+def test_parameters_are_checked(asked, message):
     with pytest.raises(ValueError, match=message):
-        bounds(ONE_RULE, box)
+        bounds(ONE_RULE, **asked)
 
 
 def test_what_cannot_be_bounded_is_refused():
     with pytest.raises(ValueError, match=r"'rate', outside the range .* predicts nothing there"):
         bounds(ONE_RULE.with_out_of_bounds("nan"), {"rate": (5.0, 6.0)})
-    with pytest.raises(ValueError, match="tol=-1 must be zero or positive"):
-        bounds(ONE_RULE, tol=-1)
-    with pytest.raises(ValueError, match="max_boxes=0 must be a whole number of 1 or more"):
-        bounds(ONE_RULE, max_boxes=0)
 
     class Own(Gaussian):
         name = "own"

@@ -61,9 +61,8 @@ def test_nothing_is_beyond_the_bounds(number):
         assert (mean - slack <= steepest[far]).all()
 
 
-def test_slopes_hold_where_one_rule_speaks_alone():
+def test_slopes_hold_where_one_rule_speaks_alone(rng):
     """They are zero there, but for the rounding of that rule's own slope."""
-    rng = np.random.default_rng(0)
     X = rng.uniform(size=(200, 2))
     y = np.sin(6.0 * X[:, 0]) + X[:, 1] ** 2
     model = ANFISRegressor(n_mfs=3, mf="triangular", order=0, max_iter=5).fit(X, y).model_

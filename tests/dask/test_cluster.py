@@ -38,12 +38,11 @@ def noting(flag):
 @pytest.mark.filterwarnings(
     "ignore::DeprecationWarning", "ignore::pytest.PytestUnraisableExceptionWarning"
 )
-def test_a_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeypatch):
+def test_a_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkeypatch, rng):
     monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS - 1)
     monkeypatch.setattr(sampling, "SAMPLE_ROWS", 1000)
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (N_ROWS, 2))
-    y = np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * g.standard_normal(N_ROWS)
+    X = rng.uniform(-1.0, 1.0, (N_ROWS, 2))
+    y = np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * rng.standard_normal(N_ROWS)
     expected = ANFISRegressor(n_mfs=2).fit(X, y).model_.coefficients
     flag = tmp_path / "calls"
     passes, whole = [], rows.reduce_partitions

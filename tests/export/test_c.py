@@ -31,6 +31,9 @@ TOLERANCE = {"double": 1e-12, "float": 1e-5}
 NUMPY = {"double": np.float64, "float": np.float32}
 
 
+X, Y = surface()
+
+
 def expected_status(model, X):
     """From the definitions in the header; and where rounding decides."""
     outside = ~model.in_bounds(X)
@@ -92,10 +95,6 @@ def around(X, dtype="double", n_rows=2000):
     return (low + (high - low) * unit).astype(NUMPY[dtype])
 
 
-def answers_of(code, X, folder):
-    return evaluate_all([code], X, folder, "c99", [1])[0]
-
-
 @pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
@@ -135,7 +134,7 @@ def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, 
     X = (offset + X * scale).astype(np.float32).astype(float)
     estimator = quick(n_mfs=3).fit(X, y / scale)
     code = export_c(estimator, name="m", dtype="float", min_coverage=None)
-    found, status = answers_of(code, X.astype(np.float32), tmp_path)
+    ((found, status),) = evaluate_all([code], X.astype(np.float32), tmp_path, "c99", [1])
     assert np.abs(found[:, 0] - estimator.predict(X)).max() < 1e-6 * np.abs(y / scale).max()
     assert (status == STATUS["IN_RANGE"]).all()
 
@@ -143,8 +142,7 @@ def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, 
 @pytest.mark.theory
 @needs_compiler
 def test_row_that_is_not_finite_gets_no_answer(tmp_path):
-    X, y = surface()
-    model = quick(n_mfs=2, solver="lse").fit(X, y).model_
+    model = quick(n_mfs=2, solver="lse").fit(X, Y).model_
     # Each of the three in each of the columns, between rows that have an answer.
     Z = X[:9].repeat(2, axis=0)
     Z[np.arange(0, 18, 2), np.arange(9) % 3] = np.repeat([np.nan, np.inf, -np.inf], 3)
@@ -162,13 +160,12 @@ def test_row_that_is_not_finite_gets_no_answer(tmp_path):
 @needs_compiler
 @pytest.mark.parametrize("dtype", TOLERANCE)
 def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
-    X, y = surface()
     largest = np.finfo(NUMPY[dtype]).max
     signs = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3)).reshape(3, -1).T
     Z = np.vstack([signs * size for size in (1e30, 1e-3 * largest, largest)]).astype(NUMPY[dtype])
     endless = {"out_of_bounds": LinearExtrapolation(np.inf), "solver": "lse"}
-    plane = quick(n_mfs=1, **endless).fit(X, y)
-    models = [plane, *(quick(n_mfs=3, mf=mf, **endless).fit(X, y) for mf in MEMBERSHIPS)]
+    plane = quick(n_mfs=1, **endless).fit(X, Y)
+    models = [plane, *(quick(n_mfs=3, mf=mf, **endless).fit(X, Y) for mf in MEMBERSHIPS)]
     codes = [export_c(m, name=f"m{k}", dtype=dtype) for k, m in enumerate(models)]
     answers = evaluate_all(codes, Z, tmp_path, "c99", [1] * len(codes), flags=[])
     beyond = (Z != 0.0).any(axis=1)
@@ -187,8 +184,7 @@ def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
     ("scale_x", "scale_y", "what"), [(1e45, 1.0, "an input"), (1.0, 1e42, "output")]
 )
 def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
-    X, y = surface()
-    model = quick(n_mfs=2).fit(X * scale_x, y * scale_y)
+    model = quick(n_mfs=2).fit(X * scale_x, Y * scale_y)
     with pytest.raises(ValueError, match=rf"Single precision cannot hold .*{what}"):
         export_c(model, name="m", dtype="float")
     export_c(model, name="m", dtype="double")
@@ -263,9 +259,8 @@ def test_tree_takes_an_exponential_per_node_and_two_out_of_range():
     assert code.cost.stack_bytes == 8 * (3 + 1 + 6 + 5)
 
 
-def test_grid_takes_an_exponential_per_term():
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (800, 2))
+def test_grid_takes_an_exponential_per_term(rng):
+    X = rng.uniform(-1.0, 1.0, (800, 2))
     model = quick(n_mfs=6, solver="lse").fit(X, np.sin(3.0 * X[:, 0]) * X[:, 1]).model_
     # 2 per term and 1 to normalise it; per rule two shares, two slopes, a value; a sum per input.
     inside = np.array([12, 0, 0, 12 * 3 + 36 * (2 + 3), 2])
@@ -308,10 +303,9 @@ def test_ranges_have_digits_that_mean_something():
 
 
 def test_units_and_notes_stand_in_the_header():
-    X, y = surface()
     notes = ["A star * multiplies; */ and /* and \\ end nothing.", "ms? Ask; ??/ and ??? do not."]
     units = {"x1": "degC?", "y": "deg/s */"}
-    header = export_c(quick(n_mfs=1).fit(X, y), name="m", units=units, notes=notes).header
+    header = export_c(quick(n_mfs=1).fit(X, Y), name="m", units=units, notes=notes).header
     comment = header.partition("#ifndef")[0]
     assert comment.count("*/") == 1
     assert "A star * multiplies; <U+002A>/ and /<U+002A> and <U+005C> end nothing." in comment
@@ -324,8 +318,7 @@ def test_units_and_notes_stand_in_the_header():
 @pytest.mark.theory
 @needs_compiler
 def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
-    X, y = surface()
-    code = export_c(quick(n_mfs=2).fit(X, y), tmp_path / "m")
+    code = export_c(quick(n_mfs=2).fit(X, Y), tmp_path / "m")
     flags = ["-std=c89", *STRICT, *SANITIZE, "-DM_SELF_TEST", "-DM_SELF_TEST_MAIN"]
     gcc([*flags, "m.c", "-o", "test", "-lm"], tmp_path)
     assert run(["./test"], tmp_path).returncode == 0
@@ -352,9 +345,8 @@ HOSTILE = [
 
 @needs_compiler
 @pytest.mark.parametrize("std", ["c89", "c99"])
-def test_names_of_columns_cannot_leave_their_comment(std, tmp_path):
-    g = np.random.default_rng(0)
-    X = pd.DataFrame(g.uniform(size=(60, len(HOSTILE))), columns=HOSTILE)
+def test_names_of_columns_cannot_leave_their_comment(std, tmp_path, rng):
+    X = pd.DataFrame(rng.uniform(size=(60, len(HOSTILE))), columns=HOSTILE)
     estimator = quick(n_mfs=[2] + [1] * (len(HOSTILE) - 1)).fit(X, X.sum(axis=1))
     code = export_c(estimator, tmp_path / "m", std=std)
     assert (code.header + code.source).isascii()
@@ -366,12 +358,11 @@ def test_names_of_columns_cannot_leave_their_comment(std, tmp_path):
 
 
 def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
-    X, y = surface()
-    code = export_c(quick(n_mfs=2).fit(X, y), str(tmp_path / "gyro"))
+    code = export_c(quick(n_mfs=2).fit(X, Y), str(tmp_path / "gyro"))
     assert code.name == "gyro"
     assert (tmp_path / "gyro.h").read_text(encoding="ascii") == code.header
     assert (tmp_path / "gyro.c").read_text(encoding="ascii") == code.source
-    other = export_c(quick(n_mfs=2).fit(X, y), tmp_path / "a.b-c", name="gyro")
+    other = export_c(quick(n_mfs=2).fit(X, Y), tmp_path / "a.b-c", name="gyro")
     assert '#include "a.b-c.h"' in other.source
     assert (tmp_path / "a.b-c.c").is_file()
 

@@ -69,6 +69,9 @@ def data(n_outputs=1, n_rows=120):
     return X, (y[:, 0] if n_outputs == 1 else y)
 
 
+X, Y = data()
+
+
 def around(X, n_rows=400):
     """Rows in and out of the box."""
     middle, half = (X.max(axis=0) + X.min(axis=0)) / 2, np.ptp(X, axis=0) / 2
@@ -112,7 +115,6 @@ def test_scale_of_the_target_is_folded(kind):
 
 
 def test_moved_and_dropped_columns_go_back_to_their_place():
-    X, y = data()
     frame = pd.DataFrame(np.column_stack([X[:, 2], X[:, 0], X[:, 1], X[:, 0]]))
     frame.columns = ["rate", "dropped", "kelvin", "hours"]
     chosen = ColumnTransformer(
@@ -125,7 +127,7 @@ def test_moved_and_dropped_columns_go_back_to_their_place():
         remainder=RobustScaler(),
     )
     pipe = make_pipeline(chosen, regressor(n_mfs=[2, 3, 1], out_of_bounds="linear"))
-    pipe.fit(frame, y)
+    pipe.fit(frame, Y)
     model, rows = fold_with_rows(pipe, frame)
     assert model.input_names == ("rate", "kelvin", "hours")
     assert [term["input"] for term in model.memberships()] == ["hours"] * 2 + ["kelvin"] * 3
@@ -147,11 +149,10 @@ def test_moved_and_dropped_columns_go_back_to_their_place():
     ],
 )
 def test_columns_are_chosen_as_scikit_learn_does(columns):
-    X, y = data()
     frame = pd.DataFrame(X, columns=NAMES)
     one = isinstance(columns, str | int)
     chosen = ColumnTransformer([("some", StandardScaler(), [columns] if one else columns)])
-    pipe = make_pipeline(chosen, regressor(n_mfs=2)).fit(frame, y)
+    pipe = make_pipeline(chosen, regressor(n_mfs=2)).fit(frame, Y)
     assert_same_predictions(pipe, frame, 10.0)
 
 
@@ -211,8 +212,7 @@ def test_one_hot_encoded_columns_are_inputs(options, fibres):
     ],
 )
 def test_what_does_not_fold_is_named(step, message):
-    X, y = data()
-    pipe = make_pipeline(step, regressor(n_mfs=2)).fit(X, y)
+    pipe = make_pipeline(step, regressor(n_mfs=2)).fit(X, Y)
     with pytest.raises(ValueError, match=message):
         fold(pipe)
 
@@ -221,10 +221,9 @@ def test_what_does_not_fold_is_named(step, message):
     "settings", [{"func": np.log, "inverse_func": np.exp}, {"transformer": PowerTransformer()}]
 )
 def test_a_bent_target_is_refused(settings):
-    X, y = data()
     target = TransformedTargetRegressor(regressor(n_mfs=2), **settings, check_inverse=False)
     with pytest.raises(ValueError, match=r"of the target' .*cannot be folded.* or regressor_ of a"):
-        fold(target.fit(X, y + 10.0))
+        fold(target.fit(X, Y + 10.0))
     # What the message advises is the model of the transformed target.
     said = fold(target.regressor_).predict(X)
     back = target.transformer_.inverse_transform(said)[:, 0]
@@ -232,15 +231,13 @@ def test_a_bent_target_is_refused(settings):
 
 
 def test_what_is_behind_a_step_that_does_not_fold_does():
-    X, y = data()
-    pipe = make_pipeline(PCA(2), StandardScaler(), regressor(n_mfs=2)).fit(X, y)
+    pipe = make_pipeline(PCA(2), StandardScaler(), regressor(n_mfs=2)).fit(X, Y)
     with pytest.raises(ValueError, match=r"give what is behind it: pipeline\[-1\]"):
         fold(pipe)
     assert_allclose(fold(pipe[1:]).predict(pipe[0].transform(X))[:, 0], pipe.predict(X), rtol=1e-9)
 
 
 def test_what_stands_for_missing_values_stands_for_them_in_tables(rng):
-    X, y = data()
     table = pd.DataFrame(X, columns=NAMES).assign(fibre=rng.choice(["PM", "SM"], len(X)))
     for name in ("kelvin", "fibre"):
         table.loc[rng.choice(len(X), 30), name] = np.nan
@@ -252,25 +249,23 @@ def test_what_stands_for_missing_values_stands_for_them_in_tables(rng):
     every = ColumnTransformer(
         [("n", numbers, NAMES[:2]), ("s", scaled_first, NAMES[2:]), ("w", words, ["fibre"])]
     )
-    pipe = make_pipeline(every, regressor(n_mfs=[2, 2, 1, 1])).fit(table, y)
+    pipe = make_pipeline(every, regressor(n_mfs=[2, 2, 1, 1])).fit(table, Y)
     assert list(fold(pipe).input_names) == [*NAMES, "fibre_SM"]
     model, rows = fold_with_rows(pipe, table)
     assert_allclose(model.predict(rows)[:, 0], pipe.predict(table), rtol=1e-9)
 
 
 def test_an_imputer_that_drops_a_column_is_refused():
-    X, y = data()
-    X[:, 1] = np.nan
+    empty = X * [1.0, np.nan, 1.0]
     with pytest.warns(UserWarning, match="without any observed values"):
-        pipe = make_pipeline(SimpleImputer(), regressor(n_mfs=2)).fit(X, y)
+        pipe = make_pipeline(SimpleImputer(), regressor(n_mfs=2)).fit(empty, Y)
     with pytest.raises(ValueError, match=r"SimpleImputer.* drops a column that has no values"):
         fold(pipe)
 
 
 def test_what_has_no_rules_is_refused():
-    X, y = data()
     with pytest.raises(TypeError, match=r"LinearRegression.* has no rules"):
-        fold(make_pipeline(StandardScaler(), LinearRegression()).fit(X, y))
+        fold(make_pipeline(StandardScaler(), LinearRegression()).fit(X, Y))
     with pytest.raises(TypeError, match="got 3"):
         fold(3)
     with pytest.raises(TypeError, match="fitted ANFIS estimator"):
@@ -282,9 +277,8 @@ def test_what_has_no_rules_is_refused():
 
 
 def test_rows_are_checked():
-    X, y = data()
-    frame = pd.DataFrame(X, columns=NAMES)
-    pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2)).fit(frame, y)
+    frame = pd.DataFrame(X.copy(), columns=NAMES)
+    pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2)).fit(frame, Y)
     with pytest.raises(ValueError, match="X must have the columns 'hours', 'kelvin', 'rate', in"):
         fold_with_rows(pipe, frame[["kelvin", "hours", "rate"]])
     with pytest.raises(ValueError, match="X has 2 columns, the estimator takes 3: 'hours'"):

@@ -27,6 +27,9 @@ PRECISIONS = pytest.mark.parametrize(
 )
 
 
+X, Y = surface()
+
+
 @pytest.fixture(scope="module", autouse=True)
 def _converter():
     register_onnx_converter()
@@ -105,8 +108,7 @@ def test_pipeline_answers_as_predict(kind, dtype, tolerance):
 
 @pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
 def test_row_that_is_not_finite_gives_nan(policy):
-    X, y = surface()
-    estimator = quick(n_mfs=2, out_of_bounds=policy).fit(X, y)
+    estimator = quick(n_mfs=2, out_of_bounds=policy).fit(X, Y)
     Z = X[:6].copy()
     Z[[0, 1, 2], [0, 1, 2]] = [np.nan, np.inf, -np.inf]
     found = answers(estimator, Z)
@@ -114,8 +116,7 @@ def test_row_that_is_not_finite_gives_nan(policy):
 
 
 def test_policy_is_that_of_the_estimator_at_conversion():
-    X, y = surface()
-    estimator = quick(n_mfs=2).fit(X, y)
+    estimator = quick(n_mfs=2).fit(X, Y)
     Z = X.max(axis=0, keepdims=True) * 1.5
     estimator.set_params(out_of_bounds="clip")
     held = answers(estimator, Z)
@@ -127,8 +128,7 @@ def test_policy_is_that_of_the_estimator_at_conversion():
 
 
 def test_what_a_graph_cannot_be_is_refused():
-    X, y = surface()
-    estimator = quick(n_mfs=2).fit(X, y)
+    estimator = quick(n_mfs=2).fit(X, Y)
     with pytest.raises(ValueError, match="target_opset=12 is too old"):
         skl2onnx.to_onnx(estimator, X[:1], target_opset=12)
     expected = estimator.predict(X)

@@ -78,8 +78,7 @@ def test_variances_are_those_of_the_full_product(model):
 
 
 @pytest.mark.parametrize("n_rows", [25, 3000])
-def test_a_fit_keeps_the_moments_of_every_input_and_its_quantiles(n_rows):
-    rng = np.random.default_rng(3)
+def test_a_fit_keeps_the_moments_of_every_input_and_its_quantiles(n_rows, rng):
     X, weight = rng.normal([50.0, -3.0], [4.0, 1.0], (n_rows, 2)), rng.integers(1, 4, n_rows)
     y = np.column_stack([np.sin(X[:, 0]) * X[:, 1], X[:, 1]])
     fitted = ANFISRegressor(n_mfs=[3, 2], max_iter=0, alpha=0.1, agreement=0.1)

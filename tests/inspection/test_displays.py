@@ -136,16 +136,13 @@ class TestSurface:
             ResponseSurfaceDisplay.from_estimator(A_GRID, **settings)
 
     @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
-    def test_an_input_of_one_value_is_named(self):
+    def test_a_model_of_one_input_that_changes_has_none(self):
         x = np.linspace(0.0, 1.0, 20)
         model = quick([2, 1]).fit(np.column_stack([x, 0.0 * x + 3.0]), x)
         with pytest.raises(ValueError, match=r"'x1' has one value, 3\. Name two"):
             ResponseSurfaceDisplay.from_estimator(model)
-
-    def test_a_model_of_one_input_has_none(self):
-        x = np.linspace(0.0, 1.0, 20).reshape(-1, 1)
         with pytest.raises(ValueError, match="one input, and a surface takes two: plot what"):
-            ResponseSurfaceDisplay.from_estimator(ANFISRegressor(n_mfs=2).fit(x, x[:, 0]))
+            ResponseSurfaceDisplay.from_estimator(quick(2).fit(x[:, None], x))
 
 
 @pytest.mark.parametrize(("display", "count"), [(MembershipDisplay, 3), (EffectsDisplay, 5)])

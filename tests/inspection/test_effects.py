@@ -65,8 +65,7 @@ def test_an_input_called_as_the_rest_keeps_its_share():
     assert_allclose(found, expected, rtol=0, atol=1e-15)
 
 
-def test_what_fit_keeps_is_what_its_rows_give():
-    rng = np.random.default_rng(0)
+def test_what_fit_keeps_is_what_its_rows_give(rng):
     X = rng.uniform([250.0, -1e-3, 0.0], [330.0, 1e-3, 5.0], (60, 3))
     y = np.column_stack([np.sin(X[:, 0] / 20.0) + 1e6 * X[:, 1] ** 2 + X[:, 2], X[:, 2]])
     model = quick(n_mfs=[3, 2, 1]).fit(X, y)
@@ -90,8 +89,7 @@ def test_what_fit_keeps_is_what_its_rows_give():
     )
 
 
-def test_inputs_that_go_together_are_told():
-    rng = np.random.default_rng(1)
+def test_inputs_that_go_together_are_told(rng):
     X = rng.normal(size=(300, 2))
     X[:, 1] = X[:, 0] + 0.2 * X[:, 1]
     model = quick(n_mfs=1).fit(X, X[:, 0] + X[:, 1])

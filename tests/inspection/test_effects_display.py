@@ -88,8 +88,7 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
         EffectsDisplay.from_estimator(model, X, groups={"all": range(3)})
 
 
-def test_the_band_is_the_deviation_of_the_mean_over_other_inputs():
-    rng = np.random.default_rng(0)
+def test_the_band_is_the_deviation_of_the_mean_over_other_inputs(rng):
     X = rng.normal([10.0, -2.0], [3.0, 0.5], (60, 2))
     fitted = quick(n_mfs=1).fit(X, X @ [1.0, 2.0] + rng.normal(size=60))
     display = drawn(EffectsDisplay.from_estimator(fitted))

@@ -88,8 +88,7 @@ def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
     ]
 
 
-def test_rows_are_counted_whatever_the_unit_of_the_weights():
-    rng = np.random.default_rng(0)
+def test_rows_are_counted_whatever_the_unit_of_the_weights(rng):
     X = rng.normal(size=(300, 2))
     y, weight = np.abs(X[:, 0]) + 0.1 * rng.standard_normal(300), rng.uniform(0.5, 1.5, 300)
     model = ANFISRegressor(partition="tree", max_rules=2)
@@ -99,8 +98,7 @@ def test_rows_are_counted_whatever_the_unit_of_the_weights():
     assert "rule 1 (rows: 2, numbers:" in str(replace(model.readability_, model=few))
 
 
-def test_rules_that_go_different_ways_beyond_chance():
-    rng = np.random.default_rng(0)
+def test_rules_that_go_different_ways_beyond_chance(rng):
     X = pd.DataFrame(rng.normal(size=(500, 2)), columns=["rate", "time"])
     y = np.abs(X["rate"]) + X["time"] + 0.1 * rng.standard_normal(500)
     found = ANFISRegressor(partition="tree", max_rules=2).fit(X, y).readability_

@@ -96,10 +96,9 @@ def test_a_structure_that_was_given_stands_alone(line, error):
     assert display.tolerance == pytest.approx(1.05 * error)
 
 
-def test_of_a_search_behind_a_scaler_and_on_given_axes():
-    g = np.random.default_rng(0)
-    X = g.uniform(-2.0, 2.0, (120, 2))
-    y = np.abs(X[:, 0]) + 0.1 * g.normal(size=120)
+def test_of_a_search_behind_a_scaler_and_on_given_axes(rng):
+    X = rng.uniform(-2.0, 2.0, (120, 2))
+    y = np.abs(X[:, 0]) + 0.1 * rng.normal(size=120)
     pipe = make_pipeline(StandardScaler(), ANFISRegressor(max_rules=4, agreement=0.1, alpha=1e-3))
     _, ax = plt.subplots()
     display = StructureDisplay.from_estimator(pipe.fit(X, y), ax=ax)

@@ -67,9 +67,10 @@ def test_an_input_called_value_has_a_column_of_its_own():
     assert_array_equal(table["at"], other["at"])
 
 
-def test_a_pipeline_is_told_in_raw_units():
-    g = np.random.default_rng(0)
-    X = pd.DataFrame(g.uniform([250.0, -1e-3], [330.0, 1e-3], (80, 2)), columns=["kelvin", "rate"])
+def test_a_pipeline_is_told_in_raw_units(rng):
+    X = pd.DataFrame(
+        rng.uniform([250.0, -1e-3], [330.0, 1e-3], (80, 2)), columns=["kelvin", "rate"]
+    )
     y = 1e3 + np.sin(X["kelvin"] / 20) + 100 * X["rate"]
     pipe = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[2, 1], agreement=1.0)).fit(X, y)
     table = rules_table(pipe)

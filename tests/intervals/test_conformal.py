@@ -40,12 +40,11 @@ def covered(bounds, y):
     return np.mean((bounds[0] <= y) & (y <= bounds[1]))
 
 
-def test_split_is_that_of_crepes():
+def test_split_is_that_of_crepes(rng):
     with warnings.catch_warnings():
         # When imported it has every UserWarning shown, whosever it is, and none raised.
         from crepes import ConformalRegressor as Crepes
 
-    rng = np.random.default_rng(0)
     X, y = bent(rng, 200)
     new = bent(rng, 50)[0]
     fitted = quick(**SHORT).fit(*bent(rng, 100))
@@ -59,10 +58,9 @@ def test_split_is_that_of_crepes():
         assert_allclose(np.column_stack(ours.predict_interval(new, coverage)), expected, rtol=1e-12)
 
 
-def test_folds_are_those_of_mapie():
+def test_folds_are_those_of_mapie(rng):
     from mapie.regression import CrossConformalRegressor
 
-    rng = np.random.default_rng(1)
     X, y = bent(rng, 40)
     new = rng.uniform(-3, 3, size=(30, 1))
     cv = KFold(5, shuffle=True, random_state=3)
@@ -73,8 +71,7 @@ def test_folds_are_those_of_mapie():
     assert_allclose(np.column_stack(ours.predict_interval(new, 0.8)), expected, rtol=1e-9)
 
 
-def test_units_count_and_not_the_size_of_weights():
-    rng = np.random.default_rng(3)
+def test_units_count_and_not_the_size_of_weights(rng):
     weight, groups = rng.uniform(1, 3, size=30), rng.permutation(np.arange(30) % 4)
     masses, n_units = row_masses(30, weight)
     assert_allclose(n_units, weight.sum() ** 2 / (weight**2).sum())
@@ -95,8 +92,7 @@ def hierarchical(rng, n_groups, within):
     return scores, row_masses(groups.size, groups=groups)[0], groups
 
 
-def test_quantile_of_groups_is_the_median_of_draws_of_one_row_from_each():
-    rng = np.random.default_rng(11)
+def test_quantile_of_groups_is_the_median_of_draws_of_one_row_from_each(rng):
     scores, masses, groups = hierarchical(rng, 12, 0.6)
     scores[3] = np.nan
     draws = np.stack(
@@ -114,9 +110,8 @@ def test_quantile_of_groups_is_the_median_of_draws_of_one_row_from_each():
 
 @pytest.mark.theory
 @pytest.mark.parametrize("within", [0.1, 0.7, 1.0])
-def test_rows_and_groups_are_covered_as_often_as_theory_says(within):
+def test_rows_and_groups_are_covered_as_often_as_theory_says(within, rng):
     """29 groups known, whatever they have in common; new groups of many rows."""
-    rng = np.random.default_rng(12)
     rows, whole = [], []
     for _ in range(150):
         known = hierarchical(rng, 29, within)
@@ -132,12 +127,11 @@ def test_rows_and_groups_are_covered_as_often_as_theory_says(within):
 
 
 @pytest.mark.parametrize("weighting", ["none", "whole", "parts"])
-def test_leave_one_out_is_that_of_refits(weighting):
+def test_leave_one_out_is_that_of_refits(weighting, rng):
     """One rule and no ridge are a line: its residual and deviation without each row, by refits.
 
     A row is left out with all of its weight.
     """
-    rng = np.random.default_rng(4)
     X, y = rng.normal(size=(25, 2)), rng.normal(size=25)
     given = {"whole": rng.integers(1, 6, 25).astype(float), "parts": rng.uniform(0.1, 1.0, 25)}
     weight = given.get(weighting)
@@ -164,9 +158,8 @@ def test_leave_one_out_is_that_of_refits(weighting):
     assert_allclose(plain.scores_, np.sort(residuals), rtol=1e-6)
 
 
-def test_by_group_covers_new_groups_where_by_row_does_not():
+def test_by_group_covers_new_groups_where_by_row_does_not(rng):
     """Every run has an offset of its own: rows of a known run say nothing of a new one."""
-    rng = np.random.default_rng(6)
     by_row, by_group, by_run = [], [], []
     for _ in range(8):
         run = np.repeat(np.arange(60), rng.integers(3, 12, size=60))
@@ -206,8 +199,7 @@ class NearestRun(DummyRegressor):
 
 
 @pytest.mark.parametrize("method", ["folds", "split", "loo"])
-def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(method):
-    rng = np.random.default_rng(7)
+def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(method, rng):
     X, y = bent(rng, 300)
     y = np.column_stack([y, 100.0 * X[:, 0] + 3.0 * rng.normal(size=300)])
     regressor = make_pipeline(StandardScaler(), quick(**SHORT))
@@ -220,8 +212,7 @@ def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(me
     assert (np.diff(upper - lower, axis=0) > 0.0).all()
 
 
-def test_groups_and_weights_reach_a_regressor_in_a_pipeline():
-    rng = np.random.default_rng(9)
+def test_groups_and_weights_reach_a_regressor_in_a_pipeline(rng):
     X, y = bent(rng, 60)
     run, weight = np.arange(60) // 6, rng.integers(0, 3, size=60).astype(float)
     with config_context(enable_metadata_routing=True):
@@ -288,9 +279,8 @@ def test_levels_and_missing_numbers_are_refused_by_name():
         model.predict_interval(X, 0.9, confidence=2)
 
 
-def test_fit_that_is_interrupted_leaves_what_was_there(monkeypatch):
+def test_fit_that_is_interrupted_leaves_what_was_there(monkeypatch, rng):
     """And a cv of splits that can be read once is refused the second time."""
-    rng = np.random.default_rng(14)
     X, y = bent(rng, 40)
     model = ConformalRegressor(RULES, cv=iter(list(KFold(4).split(X)))).fit(X, y)
     before = vars(model).copy()

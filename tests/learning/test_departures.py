@@ -26,23 +26,22 @@ CASES = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_cost_and_solution_with_a_pull_for_every_part_are_those_of_the_dense_problem(case):
-    g = np.random.default_rng(7)
+def test_cost_and_solution_with_a_pull_for_every_part_are_those_of_the_dense_problem(case, rng):
     build, order, inputs = CASES[case]
-    antecedent, used = build(g), np.array(inputs, dtype=int)
-    rows = oracles.bumpy_rows(g, 80, 3, 2, True)
+    antecedent, used = build(rng), np.array(inputs, dtype=int)
+    rows = oracles.bumpy_rows(rng, 80, 3, 2, True)
     plain = Penalty(agreement=0.01, alpha=0.02, slope=0.1)
     problem = SeparableProblem(rows, antecedent, order, plain, consequent_inputs=used)
     components = problem.common_line.components
-    pulls = {one: 10.0 ** g.uniform(-2.0, 2.0) for one in components}
-    slope_pulls = {j: 10.0 ** g.uniform(-2.0, 2.0) for j in inputs}
+    pulls = {one: 10.0 ** rng.uniform(-2.0, 2.0) for one in components}
+    slope_pulls = {j: 10.0 ** rng.uniform(-2.0, 2.0) for j in inputs}
     penalty = replace(plain, pulls=pulls, slope_pulls=slope_pulls)
     problem = problem.with_penalty(penalty)
     dense = oracles.DenseProblem(rows, antecedent, order, penalty, used)
     parameters = antecedent.parameters
     assert_allclose(problem.evaluate(parameters).cost, dense.cost(parameters), rtol=1e-9)
     # At any consequents, as the solvers by gradients have it.
-    beta = g.normal(size=(problem.n_columns, 2))
+    beta = rng.normal(size=(problem.n_columns, 2))
     evaluation, _, slope = problem.joint(parameters, beta)
     assert_allclose(evaluation.cost, dense.cost_at(parameters, beta), rtol=1e-10)
     residuals = dense.residual_matrix(parameters)

@@ -123,29 +123,36 @@ class Dense:
         return total
 
 
-def assert_is_the_marginal_likelihood(rows, antecedent, order, penalty):
-    """To the last constant, so that rule bases of any size and order can be compared."""
-    found = posterior(rows, antecedent, order, penalty)
-    dense = Dense(rows, antecedent, order, penalty)
-    expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
-    assert_allclose(in_full(found), expected + prior_of_pulls(penalty), atol=1e-7)
-    assert_allclose(found.noise_variance, variance, rtol=1e-5)
+# The number of inputs, and the rules.
+KINDS = {
+    "one rule": (1, lambda g: rules(g, 1)),
+    "two rules": (1, lambda g: rules(g, 2)),
+    "three rules": (1, lambda g: rules(g, 3)),
+    "grid": (2, lambda g: oracles.random_grid(g, [Gaussian] * 2, [3, 2])),
+    "scattered": (2, lambda g: oracles.random_scattered(g, Gaussian, 4, [0, 1])),
+}
 
 
 class TestAtGivenPremises:
-    @pytest.mark.theory
-    @pytest.mark.parametrize("n_rules", [1, 2, 3])
+    @pytest.mark.parametrize("kind", KINDS)
     @pytest.mark.parametrize("order", [0, 1])
     @pytest.mark.parametrize("n_outputs", [1, 2])
-    def test_it_is_the_marginal_likelihood_of_normal_data(self, order, n_rules, n_outputs):
-        g = np.random.default_rng(n_rules)
-        rows, antecedent = oracles.bumpy_rows(g, 14, 1, n_outputs), rules(g, n_rules)
-        for penalty in PENALTIES:
-            assert_is_the_marginal_likelihood(rows, antecedent, order, penalty)
+    def test_it_is_the_marginal_likelihood_of_normal_data(self, order, kind, n_outputs, rng):
+        """To the last constant, so that rule bases of any size and order can be compared."""
+        n_inputs, build = KINDS[kind]
+        rows, antecedent = oracles.bumpy_rows(rng, 20, n_inputs, n_outputs), build(rng)
+        line = SeparableProblem(rows, antecedent, order, FIRST).common_line
+        for plain in PENALTIES:
+            # And with a pull for every component.
+            for penalty in (plain, with_pulls(plain, line, rng)):
+                found = posterior(rows, antecedent, order, penalty)
+                dense = Dense(rows, antecedent, order, penalty)
+                expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
+                assert_allclose(in_full(found), expected + prior_of_pulls(penalty), atol=1e-7)
+                assert_allclose(found.noise_variance, variance, rtol=1e-5)
 
-    def test_effective_parameters_are_the_trace_of_the_hat_matrix(self):
-        g = np.random.default_rng(4)
-        rows, antecedent = oracles.bumpy_rows(g, 40, 2, 1, True), rules(g, 3)
+    def test_effective_parameters_are_the_trace_of_the_hat_matrix(self, rng):
+        rows, antecedent = oracles.bumpy_rows(rng, 40, 2, 1, True), rules(rng, 3)
         for penalty in PENALTIES:
             dense = Dense(rows, antecedent, 1, penalty)
             weighted = dense.phi.T * (dense.weight / dense.n)
@@ -153,19 +160,6 @@ class TestAtGivenPremises:
             hat = dense.phi @ np.linalg.solve(matrix, weighted)
             found = posterior(rows, antecedent, 1, penalty)
             assert_allclose(n_effective(found), np.trace(hat), rtol=1e-7)
-
-    @pytest.mark.parametrize("order", [0, 1])
-    @pytest.mark.parametrize("is_grid", [True, False])
-    def test_so_it_is_with_a_pull_for_every_component(self, order, is_grid):
-        g = np.random.default_rng(6)
-        rows = oracles.bumpy_rows(g, 25, 2, 2)
-        antecedent = oracles.random_grid(g, [Gaussian] * 2, [3, 2])
-        if not is_grid:
-            antecedent = oracles.random_scattered(g, Gaussian, 4, [0, 1])
-        problem = SeparableProblem(rows, antecedent, order, FIRST)
-        for plain in PENALTIES:
-            penalty = with_pulls(plain, problem.common_line, g)
-            assert_is_the_marginal_likelihood(rows, antecedent, order, penalty)
 
 
 def at_fixed_premises(seed):

@@ -150,11 +150,10 @@ def test_joint_gradient_is_that_at_any_consequents(case):
 
 
 @pytest.mark.parametrize("alpha", [1e-6, 1e-8, 1e-10])
-def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha):
+def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha, rng):
     # Solving with one factorisation and projecting with another is 4 % wrong here (anchors.md).
-    g = np.random.default_rng(3)
     penalty = Penalty(alpha=alpha, slope=alpha)
-    case = Case(duplicated_rule(g), 1, oracles.bumpy_rows(g, 250), penalty)
+    case = Case(duplicated_rule(rng), 1, oracles.bumpy_rows(rng, 250), penalty)
     point = case.problem.antecedent.parameters  # the two rules are the same still
     linearisation = case.problem.linearise(case.problem.evaluate(point))
     # Rounding grows by 1 / alpha along what the two rules leave open, in the dense problem too.
@@ -225,11 +224,10 @@ def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
 
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("n_outputs", [1, 2])
-def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs):
-    g = np.random.default_rng(1)
-    rows = oracles.bumpy_rows(g, 40, 2, n_outputs, weighted)
+def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs, rng):
+    rows = oracles.bumpy_rows(rng, 40, 2, n_outputs, weighted)
     penalty = Penalty(agreement=0.3, alpha=1e-2, slope=0.1)
-    antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
+    antecedent = oracles.random_grid(rng, [Gaussian] * 2, [2, 2])
     problem = SeparableProblem(rows, antecedent, 1, penalty)
     evaluation = problem.evaluate(antecedent.parameters)
     dense = oracles.DenseProblem(rows, antecedent, 1, penalty)

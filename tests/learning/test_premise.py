@@ -53,17 +53,12 @@ def test_term_beyond_the_data_may_stay_there():
 
 
 @ALL
-def test_displacement_undoes_parameters(antecedent, rng):
+def test_displacement_undoes_parameters_and_edges_come_back_to_the_last_bit(antecedent, rng):
     premise = Premise.of(antecedent, LOW, HIGH)
     for displacement in in_the_box(premise, rng, 10):
         found = premise.displacement(premise.parameters(displacement))
         assert_allclose(found, displacement, rtol=1e-9, atol=1e-9)
-
-
-@ALL
-def test_edge_comes_back_to_the_last_bit(antecedent, rng):
     # One bit off, and what is held by its edge would count as free to move.
-    premise = Premise.of(antecedent, LOW, HIGH)
     is_gap = np.zeros(premise.size, dtype=bool)
     if antecedent in ORDERED.values():
         is_gap = kind_of(antecedent) == "location"

@@ -42,10 +42,11 @@ def test_order_and_units_of_the_rows_do_not_matter(rows):
 
 
 @pytest.mark.parametrize("n_distinct", [300, 2000])
-def test_repeats_are_one_row_of_their_weight(rows, n_distinct):
-    g = np.random.default_rng(2)
-    which = np.concatenate([np.arange(n_distinct), g.integers(0, n_distinct, N_ROWS - n_distinct)])
-    weight = g.uniform(0.5, 1.5, N_ROWS)
+def test_repeats_are_one_row_of_their_weight(rows, n_distinct, rng):
+    which = np.concatenate(
+        [np.arange(n_distinct), rng.integers(0, n_distinct, N_ROWS - n_distinct)]
+    )
+    weight = rng.uniform(0.5, 1.5, N_ROWS)
     repeated = StandardisedData.of(rows.X[which], rows.y[which], weight)
     sample = with_sample(repeated, N_WANTED).sample
     assert sample.n_rows == min(N_WANTED, n_distinct)

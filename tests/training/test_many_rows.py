@@ -19,10 +19,9 @@ from ..quick import quick
 N_ROWS, N_SAMPLE = 12_000, 3000
 
 
-def noisy_surface(n_rows=N_ROWS):
-    g = np.random.default_rng(0)
-    X = g.uniform(-1.0, 1.0, (n_rows, 2))
-    return X, np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * g.standard_normal(n_rows)
+G = np.random.default_rng(0)
+X = G.uniform(-1.0, 1.0, (N_ROWS, 2))
+Y = np.sin(3.0 * X[:, 0]) * X[:, 1] + 0.1 * G.standard_normal(N_ROWS)
 
 
 @pytest.fixture
@@ -51,17 +50,15 @@ def test_threshold_is_where_the_docs_say():
 
 
 def test_repeated_rows_are_no_weights_that_a_clusterer_must_take(few_are_many):
-    X, y = noisy_surface()
     mixture = GaussianMixture(3, random_state=0)
-    assert quick(partition=mixture).fit(X.round(1), y.round(1)).n_rules_ == 3
+    assert quick(partition=mixture).fit(X.round(1), Y.round(1)).n_rules_ == 3
 
 
 @pytest.mark.parametrize("settings", [{"n_mfs": 3}, {}])
 def test_weights_that_are_all_alike_are_of_no_account_below_one(few_are_many, settings):
     """However small: as many rows as there are, and not what the weights add up to."""
-    X, y = noisy_surface()
-    plain = ANFISRegressor(**settings).fit(X, y)
-    light = ANFISRegressor(**settings).fit(X, y, sample_weight=np.full(N_ROWS, 1e-4))
+    plain = ANFISRegressor(**settings).fit(X, Y)
+    light = ANFISRegressor(**settings).fit(X, Y, sample_weight=np.full(N_ROWS, 1e-4))
     assert light.n_rules_ == plain.n_rules_
     told, deviation = light.predict(X[:200], return_std=True)
     expected, expected_deviation = plain.predict(X[:200], return_std=True)
@@ -71,12 +68,11 @@ def test_weights_that_are_all_alike_are_of_no_account_below_one(few_are_many, se
 
 @pytest.mark.theory
 def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeypatch):
-    X, y = noisy_surface()
-    quick = ANFISRegressor(n_mfs=3, simplicity=0.0).fit(X, y)
+    quick = ANFISRegressor(n_mfs=3, simplicity=0.0).fit(X, Y)
     assert full_passes[:3] == ["FirstPass", "JointPass", "FirstPass"]
     assert len(full_passes) <= 5
     monkeypatch.setattr(sampling, "MANY_ROWS", N_ROWS)
-    full = ANFISRegressor(n_mfs=3, simplicity=0.0).fit(X, y)
+    full = ANFISRegressor(n_mfs=3, simplicity=0.0).fit(X, Y)
     # Agreement may have been raised on the sample and not on all rows.
     assert quick.loss_curve_[-1] < 1.01 * full.loss_curve_[-1]
     new = np.random.default_rng(1).uniform(-0.99, 0.99, (2000, 2))
@@ -86,10 +82,9 @@ def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeyp
 
 
 @pytest.mark.parametrize("agreement", [0.0, 0.3])
-def test_gradient_is_that_of_all_rows(agreement):
-    g = np.random.default_rng(0)
-    rows = with_sample(oracles.bumpy_rows(g, 600, 2, 2, weighted=True), 150)
-    antecedent = oracles.random_grid(g, [Gaussian, Gaussian], [2, 3])
+def test_gradient_is_that_of_all_rows(agreement, rng):
+    rows = with_sample(oracles.bumpy_rows(rng, 600, 2, 2, weighted=True), 150)
+    antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 3])
     penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-3)
     problem = SeparableProblem(rows.sample, antecedent, 1, penalty).on_all(rows)
     found = problem.linearise(problem.evaluate(antecedent.parameters))
@@ -103,10 +98,9 @@ def test_gradient_is_that_of_all_rows(agreement):
     "settings", [{"solver": "hybrid", "max_iter": 3}, {"solver": "lse"}], ids=str
 )
 def test_every_way_of_training_ends_on_all_rows(few_are_many, full_passes, settings):
-    X, y = noisy_surface()
     settings = {"solver": VariableProjection(tol=1e-2)} | settings
-    model = ANFISRegressor(n_mfs=2, **settings).fit(X, y)
+    model = ANFISRegressor(n_mfs=2, **settings).fit(X, Y)
     assert full_passes[-1] in ("FirstPass", "JointPass", "_Moments")
-    residual = (y - model.predict(X)) / y.std()
+    residual = (Y - model.predict(X)) / Y.std()
     assert_allclose(np.mean(residual**2), model.loss_curve_[-1], rtol=1e-9)
     assert model.model_.rule_rows.sum() == pytest.approx(N_ROWS)

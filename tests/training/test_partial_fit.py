@@ -47,6 +47,9 @@ def surface(n_rows=300, n_outputs=1, seed=0):
     return 1e6 + Z * [300.0, 1e-2] + [0.0, -1e6], y if n_outputs > 1 else y[:, 0]
 
 
+X, Y = surface()
+
+
 @pytest.fixture(scope="module")
 def premises():
     """A model that has seen other rows."""
@@ -93,10 +96,9 @@ def whole_and_settings(request, premises):
 @pytest.mark.parametrize("chunking", CHUNKINGS)
 def test_any_chunks_equal_one_fit(premises, whole_and_settings, chunking):
     """But for the penalty's extents, which are about the rules' centres in the first model."""
-    X, y = surface()
     whole, settings = whole_and_settings
-    model = in_chunks(chunk(premises, **settings), X, y, CHUNKINGS[chunking])
-    once = chunk(premises, **settings).partial_fit(X, y)
+    model = in_chunks(chunk(premises, **settings), X, Y, CHUNKINGS[chunking])
+    once = chunk(premises, **settings).partial_fit(X, Y)
     assert weights_of(model) == pytest.approx(weights_of(once), rel=0.01)
     assert "alpha" not in settings or weights_of(model) == weights_of(once)
     assert difference(model, once, X) < tolerance(model, once)
@@ -131,23 +133,21 @@ def test_weights_zeros_and_several_outputs(premises):
 
 
 def test_forgetting_is_a_fit_with_fading_weights(premises):
-    X, y = surface()
     new = partial(chunk, premises, agreement=0.01, alpha=0.0)
-    whole = new().fit(X, y, 0.98 ** np.arange(299.0, -1.0, -1.0))
+    whole = new().fit(X, Y, 0.98 ** np.arange(299.0, -1.0, -1.0))
     for sizes in ([300], [1] * 20 + [280], [100, 200]):
-        model = in_chunks(new(), X, y, sizes, forgetting=0.98)
+        model = in_chunks(new(), X, Y, sizes, forgetting=0.98)
         assert difference(model, whole, X) < EXACT
     assert model.noise_std_ > 0.0
 
 
 def test_drift_of_inputs_costs_no_digits(premises):
     """The first chunk lies a million of its own deviations from the rest."""
-    X, y = surface()
     near = X.copy()
     near[:150, 0] = 0.0 + 1e-4 * np.arange(150)
     new = partial(chunk, premises, agreement=0.01, alpha=0.01)
-    whole = new().partial_fit(near, y)
-    model = in_chunks(new(), near, y, [150, 150])
+    whole = new().partial_fit(near, Y)
+    model = in_chunks(new(), near, Y, [150, 150])
     assert difference(model, whole, near) < EXACT
 
 
@@ -167,11 +167,10 @@ def test_first_call_is_a_fit_and_premises_stay():
 
 
 def test_after_fit_premises_stay_and_rows_are_new(premises):
-    X, y = surface()
     model = deepcopy(premises)
     with pytest.warns(ForgottenRowsWarning, match="no sums over its 300 rows"):
-        model.partial_fit(X, y)
-    held = chunk(premises, **GIVEN).partial_fit(X, y)
+        model.partial_fit(X, Y)
+    held = chunk(premises, **GIVEN).partial_fit(X, Y)
     assert difference(model, held, X) < EXACT
     assert model.n_samples_seen_ == 300
 
@@ -187,19 +186,17 @@ def test_nearly_exact_data_stay_so():
 
 def test_noise_of_one_rule_is_that_of_a_line():
     """n / (n - k) times the mean square, as in the textbook."""
-    X, y = surface()
     model = ANFISRegressor(n_mfs=1, agreement=0.0, alpha=0.0, solver="lse")
-    model = in_chunks(model, X, y, [200, 100])
+    model = in_chunks(model, X, Y, [200, 100])
     design = np.column_stack([np.ones(300), X - X.mean(axis=0)])
-    residual = y - design @ np.linalg.lstsq(design, y, rcond=None)[0]
+    residual = Y - design @ np.linalg.lstsq(design, Y, rcond=None)[0]
     assert model.noise_std_**2 == pytest.approx(residual @ residual / 297.0, rel=1e-6)
 
 
 def test_merged_equals_all_rows(premises):
-    X, y = surface()
-    whole = chunk(premises).partial_fit(X, y)
+    whole = chunk(premises).partial_fit(X, Y)
     parts = [slice(0, 90), slice(90, 91), slice(91, 300)]
-    models = [chunk(premises).partial_fit(X[part], y[part]) for part in parts]
+    models = [chunk(premises).partial_fit(X[part], Y[part]) for part in parts]
     before = models[0].predict(X[:90])
     for order in ([0, 1, 2], [2, 0, 1]):
         first, *others = (models[i] for i in order)
@@ -224,17 +221,16 @@ def test_chunks_forget_what_the_premises_were_known_to_rise_with():
 
 
 def test_merge_says_how_premises_differ(premises):
-    X, y = surface()
-    model = chunk(premises).partial_fit(X, y)
-    other = ANFISRegressor(n_mfs=[3, 2], solver="lse").partial_fit(X[:100], y[:100])
+    model = chunk(premises).partial_fit(X, Y)
+    other = ANFISRegressor(n_mfs=[3, 2], solver="lse").partial_fit(X[:100], Y[:100])
     with pytest.raises(ValueError, match=r"term 0, 'low' of 'x0', has center .* in one and"):
         model.merge(other)
     with pytest.raises(ValueError, match="6 and 4 rules"):
-        model.merge(ANFISRegressor(n_mfs=2, solver="lse").partial_fit(X, y))
+        model.merge(ANFISRegressor(n_mfs=2, solver="lse").partial_fit(X, Y))
     with pytest.raises(ValueError, match="linear in x0, x1 and in none"):
-        model.merge(chunk(premises, order=0).partial_fit(X, y))
+        model.merge(chunk(premises, order=0).partial_fit(X, Y))
     frame = pd.DataFrame(X, columns=["a", "b"])
-    named = chunk(premises).partial_fit(frame, y)
+    named = chunk(premises).partial_fit(frame, Y)
     with pytest.raises(ValueError, match="inputs are x0, x1 and a, b"):
         model.merge(named)
     with pytest.raises(ValueError, match="Model 1 of merge has not been trained by partial_fit"):
@@ -242,14 +238,13 @@ def test_merge_says_how_premises_differ(premises):
 
 
 def test_state_survives_a_file_and_not_a_clone(premises):
-    X, y = surface()
-    model = chunk(premises).partial_fit(X[:200], y[:200])
+    model = chunk(premises).partial_fit(X[:200], Y[:200])
     loaded = pickle.loads(pickle.dumps(model))
     for one in (model, loaded):
-        one.partial_fit(X[200:], y[200:])
+        one.partial_fit(X[200:], Y[200:])
     assert np.array_equal(loaded.predict(X), model.predict(X))
     assert not hasattr(clone(model), "n_samples_seen_")
-    deep = deepcopy(model).partial_fit(X[:1], y[:1] + 1e3)
+    deep = deepcopy(model).partial_fit(X[:1], Y[:1] + 1e3)
     assert deep.n_samples_seen_ == 301
     assert model.n_samples_seen_ == 300
 
@@ -271,13 +266,12 @@ def test_rows_far_beyond_the_premises_are_refused_by_name(premises):
 
 
 def test_unseen_ranges_are_flagged_until_they_are_seen(premises):
-    X, y = surface()
-    model = chunk(premises).partial_fit(X, y)
+    model = chunk(premises).partial_fit(X, Y)
     beyond = np.add(X[:1], [900.0, 0.0])
     assert not model.in_bounds(beyond)[0]
     assert model.coverage(beyond)[0] < 0.1
     rows = beyond + [[0.1 * i, 1e-3 * (i % 7 - 3)] for i in range(-20, 20)]
-    model.partial_fit(rows, np.full(40, y[0]))
+    model.partial_fit(rows, np.full(40, Y[0]))
     assert model.in_bounds(beyond)[0]
     assert model.coverage(beyond)[0] > 0.9
 
@@ -341,25 +335,23 @@ def test_what_chunks_cannot_be_asked(premises):
 
 
 def test_names_that_were_given_stay(premises):
-    X, y = surface()
-    model = chunk(premises).partial_fit(X[:200], y[:200])
+    model = chunk(premises).partial_fit(X[:200], Y[:200])
     model.rename_terms({"x1": ["cold", "hot"]})
     assert "x1 is cold" in model.readability_.rules["if"].iloc[0]
     names = (*premises.model_.term_names[:3], "cold", "hot")
-    other = chunk(premises).partial_fit(X[200:], y[200:])
-    for later in (model.merge(other), model.partial_fit(X[200:], y[200:])):
+    other = chunk(premises).partial_fit(X[200:], Y[200:])
+    for later in (model.merge(other), model.partial_fit(X[200:], Y[200:])):
         assert later.model_.term_names == names
-        assert difference(later, chunk(premises).partial_fit(X, y), X) < LAST_DIGIT
+        assert difference(later, chunk(premises).partial_fit(X, Y), X) < LAST_DIGIT
 
 
 def test_one_row_says_nothing_of_noise(premises):
-    X, y = surface()
-    model = chunk(premises, **GIVEN).partial_fit(X[:1], y[:1])
+    model = chunk(premises, **GIVEN).partial_fit(X[:1], Y[:1])
     assert model.noise_std_ is None
     with pytest.raises(ValueError, match=r"has no posterior, as one .* seen a single row"):
         model.predict(X, return_std=True)
-    model.partial_fit(X[1:], y[1:])
-    whole = chunk(premises, **GIVEN).partial_fit(X, y)
+    model.partial_fit(X[1:], Y[1:])
+    whole = chunk(premises, **GIVEN).partial_fit(X, Y)
     assert model.noise_std_ == pytest.approx(whole.noise_std_, rel=1e-6)
 
 
@@ -375,19 +367,17 @@ def test_a_constant_target_at_first_settles_nothing():
 
 def test_auto_is_the_limit_of_the_rules_that_were_given(premises):
     """And not the limit that was asked for at an earlier call."""
-    X, y = surface()
     unknown = replace(premises.model_, rows_extrapolation=None, posterior=None)
     beyond = np.add(X[:5], [3e3, 0.0])
-    model = chunk(unknown, out_of_bounds=LinearExtrapolation(np.inf)).partial_fit(X, y)
+    model = chunk(unknown, out_of_bounds=LinearExtrapolation(np.inf)).partial_fit(X, Y)
     model.set_params(out_of_bounds="linear")
     with pytest.warns(OutOfBoundsWarning, match=f"={unknown.max_extrapolation}"):
         found = model.predict(beyond)
-    assert np.array_equal(found, chunk(unknown).partial_fit(X, y).model_.predict(beyond)[:, 0])
+    assert np.array_equal(found, chunk(unknown).partial_fit(X, Y).model_.predict(beyond)[:, 0])
 
 
 def test_a_chunk_without_weight_in_any_form_changes_nothing(premises):
-    X, y = surface()
-    model = chunk(premises).partial_fit(X, y)
+    model = chunk(premises).partial_fit(X, Y)
     before = model.predict(X)
     for nothing in (0.0, np.zeros(300), [0] * 300):
-        assert np.array_equal(model.partial_fit(X, 1e9 * y, nothing).predict(X), before)
+        assert np.array_equal(model.partial_fit(X, 1e9 * Y, nothing).predict(X), before)

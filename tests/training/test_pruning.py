@@ -25,10 +25,9 @@ def statistics(rows, antecedent):
 
 
 @pytest.mark.parametrize("weighted", [False, True])
-def test_statistics_are_those_of_the_dense_strengths(weighted):
-    g = np.random.default_rng(0)
-    rows = oracles.bumpy_rows(g, 300, 2, 1, weighted)
-    antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])
+def test_statistics_are_those_of_the_dense_strengths(weighted, rng):
+    rows = oracles.bumpy_rows(rng, 300, 2, 1, weighted)
+    antecedent = oracles.random_grid(rng, [Gaussian, Bell], [3, 2])
     dense = oracles.DenseProblem(rows, antecedent, 1, 1.0)
     w = oracles.strengths(antecedent, antecedent.parameters, dense.Z)
     overlap, peak = statistics(rows, antecedent)
@@ -46,18 +45,16 @@ def test_rules_far_away_and_rules_alike_are_found():
     assert found[0]["weight"] > 0.1
 
 
-def gap(seed=0, n_rows=400):
-    """Two clumps of rows on the diagonal: half of a grid's cells are empty."""
-    g = np.random.default_rng(seed)
-    clump = g.integers(0, 2, n_rows)
-    X = np.column_stack([clump, clump]) * 40.0 + 0.3 * g.normal(size=(n_rows, 2))
-    return X, np.where(clump, X[:, 0], -X[:, 1]) + 0.05 * g.normal(size=n_rows)
+# Two clumps of rows on the diagonal: half of a grid's cells are empty.
+G = np.random.default_rng(0)
+CLUMP = G.integers(0, 2, 400)
+X = np.column_stack([CLUMP, CLUMP]) * 40.0 + 0.3 * G.normal(size=(400, 2))
+Y = np.where(CLUMP, X[:, 0], -X[:, 1]) + 0.05 * G.normal(size=400)
 
 
 def test_empty_cells_are_reported_and_can_be_left_out():
-    X, y = gap()
     settings = {"solver": "lse", "alpha": 1e-8}
-    whole = ANFISRegressor(n_mfs=4, **settings).fit(X, y)
+    whole = ANFISRegressor(n_mfs=4, **settings).fit(X, Y)
     # Terms 0 and 1 of one input never meet terms 2 and 3 of the other.
     empty = [4 * i + j for i in range(4) for j in range(4) if (i < 2) != (j < 2)]
     assert [r["rule"] for r in whole.redundant_rules_] == empty
@@ -72,38 +69,30 @@ def test_empty_cells_are_reported_and_can_be_left_out():
     # Rules that never fire have no say, and those that are left speak for the same rows.
     assert_allclose(left.predict(X)[:, 0], whole.predict(X), atol=0.05)
     assert_allclose(left.coverage(X), whole.coverage(X), atol=0.01)
-    pruned = ANFISRegressor(partition=left, **settings).fit(X, y)
+    pruned = ANFISRegressor(partition=left, **settings).fit(X, Y)
     assert pruned.n_rules_ == 8
     assert_allclose(pruned.loss_curve_[-1], whole.loss_curve_[-1], rtol=1e-2)
 
 
-@pytest.fixture(scope="module")
-def two_rules():
-    return ANFISRegressor(n_mfs=[2, 1], max_iter=0).fit(*gap())
-
-
-def test_rules_that_are_not_there_are_refused(two_rules):
+def test_rules_that_are_not_there_are_refused():
+    two_rules = ANFISRegressor(n_mfs=[2, 1], max_iter=0).fit(X, Y)
     assert two_rules.redundant_rules_ == []
     assert two_rules.without_rules() is two_rules.without_rules([]) is two_rules.model_
     with pytest.raises(ValueError, match="rules has 2, but the model has 2 rules"):
         two_rules.without_rules([2])
     with pytest.raises(ValueError, match="names all 2 rules: one at least must be left"):
         two_rules.without_rules([0, 1])
+    for no_numbers in ([True, False], [1.9], "1", [1, None]):
+        with pytest.raises(TypeError, match=r"rules=.* must be whole numbers, those of rules"):
+            two_rules.without_rules(no_numbers)
 
 
 def test_what_is_left_has_no_posterior_until_it_is_fitted():
-    X, y = gap()
-    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, y)
+    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, Y)
     left = model.without_rules([1])
-    given = ANFISRegressor(partition=left, max_iter=0).fit(X, y)
+    given = ANFISRegressor(partition=left, max_iter=0).fit(X, Y)
     assert_array_equal(given.predict(X), left.predict(X)[:, 0])
     with pytest.raises(ValueError, match=r"has no posterior, as one .* that lost rules"):
         given.predict(X, return_std=True)
     assert given.readability_.line in str(given.readability_)
-    assert ANFISRegressor(partition=left).fit(X, y).predict(X, return_std=True)[1].min() > 0.0
-
-
-@pytest.mark.parametrize("rules", [[True, False], [1.9], "1", [1, None]])
-def test_rules_that_are_no_numbers_are_refused(two_rules, rules):
-    with pytest.raises(TypeError, match=r"rules=.* must be whole numbers, those of rules"):
-        two_rules.without_rules(rules)
+    assert ANFISRegressor(partition=left).fit(X, Y).predict(X, return_std=True)[1].min() > 0.0

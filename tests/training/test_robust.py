@@ -104,12 +104,11 @@ def test_rows_that_were_not_trained_on_have_no_weight():
 # The weights may still move in the third digit.
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
 @pytest.mark.parametrize(("settings", "size"), [({"partition": "grid"}, 1e6), ({"n_mfs": 4}, 1e3)])
-def test_outliers_do_not_decide_on_the_start(settings, size):
-    g = np.random.default_rng(0)
-    X = g.uniform(-1, 1, (300, 2))
+def test_outliers_do_not_decide_on_the_start(settings, size, rng):
+    X = rng.uniform(-1, 1, (300, 2))
     truth = np.sin(3 * X[:, 0]) * X[:, 1]
-    y = truth + 0.02 * g.normal(size=300)
-    is_outlier = np.isin(np.arange(300), g.choice(300, 5, replace=False))
+    y = truth + 0.02 * rng.normal(size=300)
+    is_outlier = np.isin(np.arange(300), rng.choice(300, 5, replace=False))
     model = ANFISRegressor(loss="huber", **settings).fit(X, y + size * is_outlier)
     errors = model.predict(X) - truth
     # Half of the noise; without a robust_start start 18 and 0.9.

@@ -59,19 +59,18 @@ class Recorder:
 
 @pytest.mark.parametrize("weighted", [False, True])
 @pytest.mark.parametrize("consequent_inputs", [[0, 1], [1]])
-def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, consequent_inputs):
+def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, consequent_inputs, rng):
     monkeypatch.setattr(watching, "BLOCK_ROWS", 7)
-    g = np.random.default_rng(4)
-    rows, used = oracles.bumpy_rows(g, 200, 2, 2, weighted), np.array(consequent_inputs)
-    antecedent = oracles.random_grid(g, [Gaussian, Bell], [3, 2])
+    rows, used = oracles.bumpy_rows(rng, 200, 2, 2, weighted), np.array(consequent_inputs)
+    antecedent = oracles.random_grid(rng, [Gaussian, Bell], [3, 2])
     penalty = Penalty(alpha=1e-3, slope=1e-3)
     problem = SeparableProblem(rows, antecedent, 1, penalty, consequent_inputs=used)
     evaluation = problem.evaluate(antecedent.parameters)
     # On either side of the box of every input, and in it.
     low, high = rows.inputs.minimum, rows.inputs.maximum
-    X_rest = low + (high - low) * g.uniform(-0.5, 1.5, (100, 2))
-    weight = g.uniform(0.5, 2.0, 100) if weighted else None
-    rest = StandardisedData(X_rest, g.normal(size=(100, 2)), weight, rows.inputs, rows.targets)
+    X_rest = low + (high - low) * rng.uniform(-0.5, 1.5, (100, 2))
+    weight = rng.uniform(0.5, 2.0, 100) if weighted else None
+    rest = StandardisedData(X_rest, rng.normal(size=(100, 2)), weight, rows.inputs, rows.targets)
     at_edge = rest.inputs.apply(np.clip(X_rest, low, high).T)
     design = oracles.dense_design(antecedent, antecedent.parameters, at_edge, 1, used)
     target = (rest.y - rows.targets.offset) / rows.targets.scale
@@ -218,25 +217,23 @@ def test_it_ends_after_so_many_iterations_without_change(patience):
     assert model.loss_curve_.shape == (model.n_iter_ + 1,)
 
 
-def test_whole_groups_are_held_out():
-    g = np.random.default_rng(2)
+def test_whole_groups_are_held_out(rng):
     groups = np.repeat(np.arange(10), 20)
-    rows = StandardisedData.of(g.normal(size=(200, 2)), g.normal(size=(200, 1)))
+    rows = StandardisedData.of(rng.normal(size=(200, 2)), rng.normal(size=(200, 1)))
     training, validation = hold_out(replace(rows, groups=groups), 0.3, 0)
     assert set(groups[training]).isdisjoint(groups[validation])
     assert np.unique(groups[validation]).size == 3
     # Every group has a level of its own: what is held out cannot have been learnt.
-    X = (groups + 0.1 * g.normal(size=200)).reshape(-1, 1)
-    level = g.normal(size=10)[groups]
+    X = (groups + 0.1 * rng.normal(size=200)).reshape(-1, 1)
+    level = rng.normal(size=10)[groups]
     model = ANFISRegressor(n_mfs=10, **LOOSE)
     alone, grouped = (clone(model).fit(X, level, groups=given) for given in (None, groups))
     assert grouped.validation_loss_curve_.min() > 1.5 * alone.validation_loss_curve_.min()
 
 
-def test_equal_rows_are_on_one_side():
-    g = np.random.default_rng(0)
-    X = g.normal(size=(50, 2))[np.arange(200) % 50]
-    training, held = hold_out(StandardisedData.of(X, g.normal(size=(200, 1))), 0.2, 0)
+def test_equal_rows_are_on_one_side(rng):
+    X = rng.normal(size=(50, 2))[np.arange(200) % 50]
+    training, held = hold_out(StandardisedData.of(X, rng.normal(size=(200, 1))), 0.2, 0)
     assert held.size == 40
     assert set(training % 50).isdisjoint(held % 50)
 
