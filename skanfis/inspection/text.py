@@ -36,6 +36,7 @@ _HOW = (
     "AND multiplies. {terms}A rule says its value{line}, plus its own slopes. What a rule errs "
     "by is its RMSE, used alone, on the rows on which it is the strongest."
 )
+_HOW_OF_ONE = "A prediction is what the rule says: its value, plus its slopes."
 # How true a condition is that is written out, by what stands before its place.
 _WRITTEN = {
     ">": "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; x < c ± h is "
@@ -342,6 +343,8 @@ def _legend(said, precision):
     formulas = {family.name: family.formula for family in families}
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
     how = _HOW.format(terms="".join(terms), line=_LINE if said.common.any() else "")
+    if model.n_rules == 1 and not model.antecedent.n_terms:
+        how = _HOW_OF_ONE
     return "\n".join([*lines, "", _wrapped(how)])
 
 

@@ -6,9 +6,9 @@ tolerance of ``simplicity`` s where (docs/mathematics.rst says why)
     e^2 - e_best^2  <=  ((1 + s)^2 - 1) min(e_best^2, v - e_best^2) .
 
 Of all within it that have no more rules than the best, the one that costs least to read is taken;
-of equal cost, that with the smaller error. Slopes in common are a claim about each rule: what the
-rules err one by one, e^2 and their disagreement, must stay below v, or rise by s at most.
-Half of what is left of the tolerance goes into agreement (``start``).
+of equal cost, one whose terms are not each rule's own, then that with the smaller error. Slopes in
+common are a claim about each rule: what the rules err one by one, e^2 and their disagreement, must
+stay below v, or rise by s at most. Half of what is left of the tolerance goes into agreement (``start``).
 """
 
 from dataclasses import dataclass
@@ -85,5 +85,9 @@ def within(judged, best: Judged, most):
 
 
 def chosen(found):
-    """What costs least to read."""
-    return min(found, key=lambda one: (one.cost, one.squared_error))
+    """What costs least to read; of equal cost cuts, or terms that rules share, if there are any."""
+
+    def key(one):
+        return one.cost, one.candidate.kind == "scattered", one.squared_error
+
+    return min(found, key=key)
