@@ -8,7 +8,8 @@ tolerance of ``simplicity`` s where (docs/mathematics.rst says why)
 Of all within it that have no more rules than the best, the one that costs least to read is taken;
 of equal cost, one whose terms are not each rule's own, then that with the smaller error. Slopes in
 common are a claim about each rule: what the rules err one by one, e^2 and their disagreement, must
-stay below v, or rise by s at most. Half of what is left of the tolerance goes into agreement (``start``).
+stay below v, or rise by s at most. Half of what is left of the tolerance goes into agreement
+(``start``).
 """
 
 from dataclasses import dataclass
