@@ -5,10 +5,11 @@ tolerance of ``simplicity`` s where (docs/mathematics.rst says why)
 
     e^2 - e_best^2  <=  ((1 + s)^2 - 1) min(e_best^2, v - e_best^2) .
 
-Of all within it that have no more rules than the best, the one that costs least to read is taken;
-of equal cost, one whose terms are not each rule's own, then that with the smaller error. Slopes in
-common are a claim about each rule: what the rules err one by one, e^2 and their disagreement, must
-stay below v, or rise by s at most. Half of what is left of the tolerance goes into agreement
+Of all within it that have no more rules than the best, the one that costs least to read is taken:
+of those, if there are any, whose rules err less than the mean one by one, e^2 and their
+disagreement being below v. Of equal cost it is one whose terms are not each rule's own, then that
+with the smaller error. Slopes in common are a claim about each rule: what the rules err one by one
+must stay below v, or rise by s at most. Half of what is left of the tolerance goes into agreement
 (``start``).
 """
 
@@ -85,10 +86,11 @@ def within(judged, best: Judged, most):
     return [one for one in judged if one.squared_error <= most and one.candidate.n_rules <= n_rules]
 
 
-def chosen(found):
-    """What costs least to read; of equal cost cuts, or terms that rules share, if there are any."""
+def chosen(found, variance):
+    """What is read soonest, ``variance`` being the mean's squared error; see the module."""
 
     def key(one):
-        return one.cost, one.candidate.kind == "scattered", one.squared_error
+        is_poor, has_own = one.squared_error_of_rules > variance, one.candidate.kind == "scattered"
+        return is_poor, one.cost, has_own, one.squared_error
 
     return min(found, key=key)

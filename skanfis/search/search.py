@@ -58,7 +58,7 @@ class StructureSearch:
         # Only there: with two looks at every size, chance would have two.
         for one in within(self.judged, best, most):
             self._judge_sparse_slopes(one, variance)
-        found = chosen(within(self.judged, best, most))
+        found = chosen(within(self.judged, best, most), variance)
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
         left = most / error if error > 0.0 else 1.0
@@ -94,7 +94,7 @@ class StructureSearch:
             in_folds = [replace(like, slope_worth=worth) for like in one.in_folds]
             simpler = self._judge(replace(one.candidate, slope_worth=worth), in_folds)
             holds = simpler.cost < one.cost and simpler.squared_error_of_rules <= most
-            if holds and simpler is chosen([simpler, soonest]):
+            if holds and simpler is chosen([simpler, soonest], variance):
                 soonest = simpler
             else:
                 self.judged.remove(simpler)

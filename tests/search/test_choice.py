@@ -10,9 +10,10 @@ from skanfis.search.candidates import Candidate
 from skanfis.search.choice import Judged, Judges, best_of, chosen, tolerated, within
 
 
-def judged(squares, cost=1, n_rules=1):
+def judged(squares, cost=1, n_rules=1, of_rules=0.0, n_clusters=0):
     squares = np.asarray(squares, dtype=float)
-    return Judged(Candidate((n_rules,)), [], squares, squares, squares.mean(), cost, 0.0)
+    candidate = Candidate((n_rules,), n_clusters)
+    return Judged(candidate, [], squares, squares, squares.mean(), cost, of_rules)
 
 
 def alike(n_rows, group=None):
@@ -91,10 +92,20 @@ def test_of_what_is_tolerated_the_one_read_soonest_is_chosen():
     for simplicity, expected in ((0.0, 4), (0.03, 3), (0.05, 2), (0.2, 2), (0.3, 0)):
         most = tolerated(0.40, 1.0, simplicity)
         assert most == pytest.approx(0.40 * (1.0 + simplicity) ** 2)
-        assert chosen(within(candidates, candidates[0], most)) is candidates[expected]
+        assert chosen(within(candidates, candidates[0], most), 1.0) is candidates[expected]
 
 
 def test_what_has_more_rules_than_the_best_is_not_simpler():
     best, simpler, more = judged([0.40], 9, 3), judged([0.41], 8, 3), judged([0.40], 4, 4)
     assert within([best, simpler, more], best, 0.42) == [best, simpler]
     assert within([best, simpler, more], best, 0.40) == [best]
+
+
+def test_rules_that_hold_one_by_one_are_read_sooner_and_cuts_sooner_than_bells():
+    bells, cuts = judged([0.40], 9, n_clusters=3), judged([0.41], 9, 3)
+    assert chosen([bells, cuts], 1.0) is cuts
+    assert chosen([judged([0.40], 8, n_clusters=3), cuts], 1.0).cost == 8
+    poor, poorer = judged([0.40], 5, of_rules=1.01), judged([0.40], 7, of_rules=3.0)
+    assert chosen([poor, cuts], 1.0) is cuts
+    # Where none hold, it is the numerals again.
+    assert chosen([poorer, poor], 1.0) is poor
