@@ -27,7 +27,6 @@ from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names
 from .policies import (
-    DIGITS_OF_CASE,
     FARTHEST,
     FARTHEST_ROW,
     MAX_EXTRAPOLATION,
@@ -39,6 +38,9 @@ from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
 
 __all__ = ["TSKModel"]
+
+# Of a variance, what rounding may leave.
+_ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -165,12 +167,13 @@ class TSKModel:
 
     @property
     def two_valued(self) -> np.ndarray:
-        """Inputs that are 0 or 1 on all training rows, (n_inputs,); none if these are not known."""
-        found = np.zeros(self.n_inputs, dtype=bool)
-        for j, (quantiles, _) in enumerate(self.seen_values):
-            if (self.minimum[j], self.maximum[j]) == (0.0, 1.0):
-                found[j] = np.isin(np.round(quantiles, DIGITS_OF_CASE), (0.0, 1.0)).all()
-        return found
+        """Inputs that are 0 or 1 on all training rows, (n_inputs,).
+
+        Nothing else from 0 to 1 spreads as far about its mean m, sqrt(m (1 - m)).
+        """
+        from_0_to_1 = (self.minimum == 0.0) & (self.maximum == 1.0)
+        most = self.reference * (1.0 - self.reference)
+        return from_0_to_1 & (np.abs(self.spread**2 - most) <= _ROUNDING * most)
 
     @property
     def output_limits(self) -> np.ndarray:

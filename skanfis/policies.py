@@ -7,7 +7,6 @@ from numbers import Real
 import numpy as np
 
 __all__ = [
-    "DIGITS_OF_CASE",
     "FARTHEST",
     "FARTHEST_ROW",
     "MAX_EXTRAPOLATION",
@@ -32,8 +31,6 @@ MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 FARTHEST_ROW = 1e100
 # More than these tell no two doubles apart, and give back no other double.
 MOST_DIGITS = 17
-# As rounding leaves a 0 or a 1.
-DIGITS_OF_CASE = 6
 # What a prediction may have beyond the range of the target: of a line so many standard deviations
 # at least, whatever the limit of inputs; of rules that bend, for peaks between rows, this part of
 # the range.

@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
+from skanfis.export import export_json, read_json
 from skanfis.membership import Bell, Gaussian
 from skanfis.policies import TargetRange
 
@@ -271,3 +272,17 @@ def test_a_table_is_read_by_its_names_and_other_shapes_are_refused(rng):
         ValueError, match=r"X has the shape \(200, 2\); the model takes \(n_rows, 3\)"
     ):
         frozen.strengths(X[:, :2])
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+def test_inputs_that_are_0_or_1_are_known_whatever_is_done_with_the_model(weighted, rng, tmp_path):
+    n_rows = 20_000
+    X = np.column_stack([rng.random(n_rows) < 0.01, rng.random(n_rows) < 0.7, rng.random(n_rows)])
+    X = np.column_stack([X, X[:, 1], X[:, 0] + 1.0]).astype(float)
+    # One row of twenty thousand is neither.
+    X[7, 3], X[:2, 2] = 0.5, (0.0, 1.0)
+    weight = rng.integers(0, 5, n_rows) if weighted else None
+    trained = ANFISRegressor(n_mfs=1).fit(X, X @ np.arange(5.0), weight).model_
+    export_json(trained, tmp_path / "model.json")
+    for known in (trained, read_json(tmp_path / "model.json")):
+        assert known.two_valued.tolist() == [True, True, False, False, False]

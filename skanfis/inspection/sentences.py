@@ -22,13 +22,15 @@ from ..antecedent.tree import CRISP
 from ..export.folding import Level
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
-from ..policies import DIGITS_OF_CASE, MOST_DIGITS
+from ..policies import MOST_DIGITS
 from ..reading_cost import NEXT_TO_NOTHING
 
 # Digits of the noise's deviation to which numbers are written.
 PRECISION = 2
 # Digits of a deviation of an input to which the places are written that slopes count from.
 _DIGITS_OF_PLACE = 2
+# As rounding leaves a 0 or a 1.
+_DIGITS_OF_CASE = 6
 # Of an output's deviation: numbers are written no finer, and so fine where the noise is not known.
 _FINEST = 1e-4
 
@@ -70,7 +72,7 @@ class Sentences:
         part = np.where(is_common[:, :, None], common, 0.0)
         if precision < MOST_DIGITS:
             # A case that all rows of a rule are, or none is, changes nothing there.
-            is_fixed = two_valued & np.isin(np.round(centers, DIGITS_OF_CASE), (0.0, 1.0))
+            is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
             slopes[is_fixed[:, :, None] & (common == 0.0)] = 0.0
         of_common = np.einsum("rj,rjo->ro", places - common_place, part)
         # Beside a common slope that of nothing is to be said as well.
