@@ -35,9 +35,11 @@ def settle_units(values, units, *, is_all=True):
     """
     values = {part: column for part, column in values.items() if np.isfinite(column).any()}
     readings: list[dict] = [{}]
-    for find in (_of_temperature, _of_time, _of_rates):
-        found = find(values, units)
-        readings = [known | more for known in readings for more in found]
+    for part, find in (("temperature", _of_temperature), ("time", _of_time)):
+        if part in values and part not in units:
+            ways = find(values, units)
+            readings = [known | {part: unit} for known in readings for unit in ways]
+    readings = [known | more for known in readings for more in _of_rates(values, units)]
     # The clock is told by the first run.
     if len(readings) > 1 and (is_all or len({each.get("time") for each in readings}) > 1):
         raise UsageError(_question(values, readings))
@@ -90,32 +92,26 @@ def _question(values, readings):
 
 
 def _of_temperature(values, units):
-    if "temperature" in units or "temperature" not in values:
-        return [{}]
     low, high = np.nanquantile(values["temperature"], [0.001, 0.999])  # without glitches
     if low > _COLDEST_IN_KELVIN:
-        ways = ["K"]
-    elif high > _HOTTEST:
-        ways = ["degF"]
-    else:
-        ways = ["degC"] if low <= _WARM and high < _HOT else ["degC", "degF"]
-    return [{"temperature": unit} for unit in ways]
+        return ["K"]
+    if high > _HOTTEST:
+        return ["degF"]
+    return ["degC"] if low <= _WARM and high < _HOT else ["degC", "degF"]
 
 
 def _of_time(values, units):
-    if "time" in units or "time" not in values:
-        return [{}]
     known = np.isfinite(values["time"])
     time = values["time"][known]
     heat = values.get("temperature", np.zeros(known.size))[known]
     for unit in ("s", "ms", "us", "ns"):
         if _SINCE_1970[0] < convert(time.min(), "time", unit) < _SINCE_1970[1]:
-            return [{"time": unit}]
+            return [unit]
     if time.size > 1 and np.median(np.diff(time)) < 0.0:  # the last row comes first
         time, heat = time[::-1], heat[::-1]
     steps = np.diff(time)
     if not (steps > 0.0).any() or not np.isfinite(heat).any():
-        return [{"time": "s"}]
+        return ["s"]
     # Of the first run, if the clock tells one from another.
     ends = np.flatnonzero(steps < 0.0)
     end = ends[0] + 1 if ends.size and ends[0] > 10 else time.size
@@ -135,7 +131,7 @@ def _of_time(values, units):
         is_fast = 60.0 * heating > _FAST * duration
         others = ["ms", "us", "ns"] + ["min", "h"] * int(is_fast)
         ways += [unit for unit in others if is_plausible(unit, _CHAMBER)]
-    return [{"time": unit} for unit in ways or ["s"]]
+    return ways or ["s"]
 
 
 def _of_rates(values, units):
