@@ -88,11 +88,8 @@ class Picture(NamedTuple):
         files = {}
         for name, table in tables.items():
             # What a spreadsheet would take for a formula has an apostrophe in front.
-            texts = {
-                column: [_FORMULA.sub(r"'\g<0>", str(value)) for value in table[column]]
-                for column in table.select_dtypes(exclude="number")
-            }
-            table = table.assign(**texts)
+            texts = table.select_dtypes(exclude="number").map(str)
+            table = table.assign(**texts.replace(_FORMULA, r"'\g<0>", regex=True))
             text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
             ending = f"-{name}" if len(tables) > 1 else ""
             files[f"{subject}{ending}.csv"] = _base64(text.encode("utf-8"))

@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -24,10 +24,6 @@ from .thermal_rate import ThermalRate
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
-_KEYS = (
-    "inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage", "units",
-    "assumed",
-)  # fmt: skip
 # Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
 _NUMBERS = ("thermometer_lag", "reference_temperature")
@@ -119,15 +115,9 @@ class GyroCompensator:
         refused = ~np.isfinite(compensated)
         compensated[refused] = np.nan
         status = status_word(~inside, refused, ~(coverage >= self.min_coverage))
-        return pd.DataFrame(
-            {
-                "rate_indicated": indicated,
-                "rate_compensated": compensated,
-                "coverage": coverage,
-                "status": status.astype(np.uint8),
-            },
-            index=X.index,
-        )
+        columns = {"rate_indicated": indicated, "rate_compensated": compensated}
+        columns |= {"coverage": coverage, "status": status.astype(np.uint8)}
+        return pd.DataFrame(columns, index=X.index)
 
     def write_json(self, path: str | PathLike[str]) -> None:
         """Write it as text that runs nothing when it is read.
@@ -165,6 +155,9 @@ class GyroCompensator:
             if isinstance(error, UnicodeDecodeError | json.JSONDecodeError):
                 reason = "it is not the JSON that a compensator.json holds"
             raise ValueError(f"{path} is no gyro compensator: {reason}.") from error
+
+
+_KEYS = [each.name for each in fields(GyroCompensator) if each.name != "estimator"]
 
 
 def as_written(compensator):

@@ -149,17 +149,19 @@ def specification(checks):
 
 def _summary(results):
     """For whoever reads one page: the figures that count, and where they hold."""
-    table, calibration = results.merit.set_index("figure"), results.calibration
-    pictures, lines = results.pictures, []
-    for name in (name for name in _FIRST if name in table.index):
-        unit, before, after = table.loc[name, ["unit", "before", "after"]]
-        if pd.notna(after):
-            lines.append((_words(name), three_digits(before), three_digits(after), signs(unit)))
+    calibration, figures = results.calibration, results.merit.set_index("figure")
+    known = figures.reindex(_FIRST)[["before", "after", "unit"]].dropna(subset="after")
+    lines = [
+        (_words(name), three_digits(before), three_digits(after), signs(unit))
+        for name, before, after, unit in known.itertuples()
+    ]
     blocks = [
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
         _box(calibration, "It may be used from"),
-        Block("pictures", [each for name, each in pictures.items() if name == _ON_FIRST_PAGE]),
+        Block(
+            "pictures", [each for name, each in results.pictures.items() if name == _ON_FIRST_PAGE]
+        ),
     ]
     return "Summary", blocks
 
