@@ -80,7 +80,7 @@ def report_page(results, title):
     cautions = [f"Warning: {sentence}" for sentence in cautions]
     if recipe.assumed:
         cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
-    sections = [_check, _merit, _pictures, _sure, _written, _use, _log]
+    sections = (_check, _merit, _pictures, _sure, _written, _use, _log)
     kept = calibration.verdict.recommended != NOTHING
     kept = kept and all(check.result == "pass" for check in results.checks)
     verdict, *reasons = headline(calibration, results.unit)
