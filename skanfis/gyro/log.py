@@ -359,7 +359,7 @@ class LogFile:
             kind = "no time like those before" if clock else "not a number"
             raise LogError(f"{shortened(column.iloc[row])} is {kind}.", part, row)
         is_in_seconds = clock or column.dtype.kind in "mM"
-        return numbers if is_in_seconds else convert(numbers, part, self.layout.units[part])
+        return numbers if is_in_seconds else convert(numbers, self.layout.units[part])
 
     def located(self, error, rows=None, where=None):
         """An error of one part and row, in terms of this file; ``rows`` are positions in it."""
