@@ -203,7 +203,8 @@ class Polynomial:
         scaler, line = StandardScaler(), LinearRegression()
         make_pipeline(scaler, PolynomialFeatures(3, include_bias=False), line).fit(X, y)
         coefficients, names = [line.intercept_, *line.coef_], np.array(X.columns, dtype=object)
-        return cls(*box, scaler.mean_, scaler.scale_, np.array(coefficients), names)
+        low, high = box
+        return cls(low, high, scaler.mean_, scaler.scale_, np.array(coefficients), names)
 
     powers = property(lambda self: cubic_powers(self.center.size))  # (n_terms, n_inputs)
     columns_ = property(lambda self: np.arange(self.center.size))
