@@ -233,7 +233,8 @@ def _settings(document):
         raise ValueError(f"inputs is {inputs!r}; it must be of {', '.join(INPUTS)}")
     if document["predicts"] not in ("error", "rate"):
         raise ValueError(f"predicts is {document['predicts']!r}")
-    numbers = {
+    checked = {
+        "inputs": tuple(inputs),
         "scale_factor": _divisor(document["scale_factor"], "scale_factor"),
         "time_constant": number(document["time_constant"], "time_constant", SMALLEST_NUMBER),
         "min_coverage": number(document["min_coverage"], "min_coverage", 0.0, 1.0),
@@ -258,8 +259,7 @@ def _settings(document):
         estimator = joined(_read_law(document["law"], inputs), estimator)
     if document["polynomial"] is not None:
         estimator = joined(_read_polynomial(document["polynomial"], estimator, inputs), estimator)
-    settings = {key: document[key] for key in _KEYS} | numbers
-    return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
+    return {key: document[key] for key in _KEYS} | checked | {"estimator": estimator}
 
 
 def _read_law(document, inputs):
@@ -327,8 +327,4 @@ def _list_of_numbers(values, key, fewest, most, where="law"):
 
 def _are_of(names, known):
     """Whether it is a list of some of the known names, each of them once."""
-    return (
-        isinstance(names, list)
-        and bool(names)
-        and all(name in known and names.count(name) == 1 for name in names)
-    )
+    return isinstance(names, list) and 0 < len(names) == sum(names.count(k) == 1 for k in known)

@@ -178,10 +178,10 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
                 OutOfBoundsWarning,
                 stacklevel=2,
             )
-        phase = np.arcsin(np.clip(sine, -limit, limit))
+        held = np.clip(sine, -limit, limit)
+        phase = np.arcsin(held)
         if goes_on:
-            further = np.where(beyond, np.abs(sine) - limit, 0.0) / np.cos(self.max_phase)
-            phase += np.sign(sine) * further
+            phase += (sine - held) / np.cos(self.max_phase)
         elif self.out_of_bounds == "nan":
             phase[beyond] = np.nan
         difference = self._difference(used)
