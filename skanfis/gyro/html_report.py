@@ -325,8 +325,8 @@ def _log(results):
     counts |= {f"{name}s": rows[name].nunique() for name in ("run", "device") if name in rows}
     lines = [(name, f"{count:,}", "") for name, count in counts.items()]
     for name in ("temperature", "rate", "output"):
-        unit = "°/s" if name == "rate" else _unit_of(calibration, name)
-        lines.append((name, f"{rows[name].min():.5g} to {rows[name].max():.5g}", unit))
+        ends = f"{rows[name].min():.5g} to {rows[name].max():.5g}"
+        lines.append((name, ends, _unit_of(calibration, name)))
     if calibration.recipe.output_unit in SIGNALS:
         unit = f"{calibration.recipe.output_unit} per °/s"
         lines.append(("scale factor", f"{calibration.compensator.scale_factor:.8g}", unit))
@@ -356,4 +356,4 @@ def _words(name):
 
 
 def _unit_of(calibration, name):
-    return signs(input_units(calibration.compensator).get(name, "deg/s"))
+    return signs(input_units(calibration.compensator)[name])
