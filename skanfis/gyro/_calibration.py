@@ -276,12 +276,11 @@ def _shared_rows(X, groups):
 
 def _make_rules(recipe, terms):
     """A scaler and rules, of a grid of given numbers of terms or such as the recipe looks for."""
-    structure: dict[str, Any] = {"partition": "grid", "max_rules": _MOST_RULES, "simplicity": 0.0}
+    structure: dict[str, Any] = {"partition": "grid", "max_rules": _MOST_RULES}
     if isinstance(terms, tuple):
-        structure = {"n_mfs": list(terms), "simplicity": 0.0}
-    return make_pipeline(
-        StandardScaler(), ANFISRegressor(**structure, out_of_bounds=recipe.outside)
-    )
+        structure = {"n_mfs": list(terms)}
+    rules = ANFISRegressor(**structure, simplicity=0.0, out_of_bounds=recipe.outside)
+    return make_pipeline(StandardScaler(), rules)
 
 
 def some_rows(rows, n_rows, X, rng):

@@ -241,9 +241,9 @@ def _check_plausible(values, part, unit):
     # More than half: the unit; few: glitches of the measurement.
     advice, others = "", []
     if bad.mean() > 0.5:
-        ends = convert_back(np.array([values.min(), values.max()]), part, unit)
+        ends = convert_back(np.array([values.min(), values.max()]), unit)
         for other in units_of(part):
-            least, most = convert(ends, part, other)
+            least, most = convert(ends, other)
             if other not in (unit, *SIGNALS) and low <= least and most <= high:
                 others.append(other)
     if others:
@@ -287,7 +287,7 @@ def _check_output_follows_rate(log, units):
     told = "its sign is reversed." if -2.0 < slope < -0.5 else "are the units right?"
     for part, power in (("rate", -1), ("output", 1)):
         for unit in units_of("rate"):
-            ratio = convert(1.0, part, unit) / convert(1.0, part, units[part])
+            ratio = convert(1.0, unit) / convert(1.0, units[part])
             if 0.7 < slope * ratio**power < 1.4:
                 told = f"is the {part} in {unit}?"
     raise LogError(

@@ -50,12 +50,8 @@ _MEANT = {
     for unit, (_, spellings) in units.items()
     for spelling in (unit.casefold(), *spellings.split())
 }
-_FACTORS = {
-    quantity: {unit: factor for unit, (factor, _) in units.items()}
-    for quantity, units in _TABLE.items()
-}
-SIGNALS = tuple(_FACTORS.pop("signal"))
-_FACTORS["output"] = {**_FACTORS["rate"], **dict.fromkeys(SIGNALS, 1.0)}
+_FACTORS = {unit: factor for units in _TABLE.values() for unit, (factor, _) in units.items()}
+SIGNALS = tuple(_TABLE["signal"])
 _ZERO = {"K": -273.15, "degF": -160.0 / 9.0}  # of each scale, in degC
 CANONICAL = {"time": "s", "temperature": "degC", "rate": "deg/s", "output": "deg/s"}
 PER_HOUR = 3600.0  # 1 deg/s in deg/h
@@ -68,16 +64,16 @@ def unit_in(text):
 
 
 def units_of(quantity):
-    return tuple(_FACTORS[quantity])
+    return (*_TABLE["rate"], *SIGNALS) if quantity == "output" else tuple(_TABLE[quantity])
 
 
-def convert(values, quantity, unit):
+def convert(values, unit):
     """Values in the canonical unit; those of a raw signal as they are."""
-    return values * _FACTORS[quantity][unit] + _ZERO.get(unit, 0.0)
+    return values * _FACTORS[unit] + _ZERO.get(unit, 0.0)
 
 
-def convert_back(values, quantity, unit):
-    return (values - _ZERO.get(unit, 0.0)) / _FACTORS[quantity][unit]
+def convert_back(values, unit):
+    return (values - _ZERO.get(unit, 0.0)) / _FACTORS[unit]
 
 
 def declared_units(units):

@@ -88,11 +88,8 @@ class Picture(NamedTuple):
         files = {}
         for name, table in tables.items():
             # What a spreadsheet would take for a formula has an apostrophe in front.
-            texts = {
-                column: [_FORMULA.sub(r"'\g<0>", str(value)) for value in table[column]]
-                for column in table.select_dtypes(exclude="number")
-            }
-            table = table.assign(**texts)
+            texts = table.select_dtypes(exclude="number").map(str)
+            table = table.assign(**texts.replace(_FORMULA, r"'\g<0>", regex=True))
             text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
             ending = f"-{name}" if len(tables) > 1 else ""
             files[f"{subject}{ending}.csv"] = _base64(text.encode("utf-8"))
@@ -118,9 +115,8 @@ class Results:
         self.temperature = self.log["temperature"].to_numpy()
         self.time = self.log["time"].to_numpy() if "time" in self.log else None
         self.run = label_texts(self.log["run"]) if "run" in self.log else None
-        self.temperature_rate = None
-        if "temperature_rate" in calibration.X:
-            self.temperature_rate = _PER_MINUTE * calibration.X["temperature_rate"].to_numpy()
+        change = calibration.X.get("temperature_rate")
+        self.temperature_rate = None if change is None else _PER_MINUTE * change.to_numpy()
         # That in which errors are no long row of zeros.
         is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
         self.unit = "deg/s" if is_large else "deg/h"

@@ -97,7 +97,6 @@ class _TextSource:
         return ","
 
     def _place_header(self, head):
-        """Find the header, and where the rows begin."""
         try:
             place, first, self.header = header_place([values for _, values in head])
         except LogError as error:
@@ -174,12 +173,10 @@ class _TextSource:
 
         The index is the position in the file. LogError where the file is no such table.
         """
-        if self._n_lines is None:
-            return
         try:
             with open(self.path, encoding=self._encoding, newline="") as file:
-                for _ in range(self._n_lines):
-                    file.readline()
+                for _ in islice(file, self._n_lines):
+                    pass
                 yield from pd.read_csv(
                     file,
                     sep=r"\s+" if self._separator == " " else self._separator,

@@ -196,12 +196,9 @@ def choose_split(log, kind="auto", *, uses_output=True):
 
 def _choose(groups, counts, has_time):
     """The kind of split that a log calls for, and why."""
+    # The best comes first: devices, runs, levels, legs, pieces.
     enough = [name for name, count in counts.items() if count >= _FEWEST[name]]
-    whole = next((name for name in ("device", "run") if name in enough), None)
-    if whole is None:
-        for kind in ("level", "leg", "piece"):
-            if kind in enough:
-                return kind, "too few runs to hold out"
+    if not enough:
         found = [f"{counts[name]} {name}(s)" for name in ("device", "run") if name in counts]
         found.append(f"{counts.get('level', 0)} rate levels")
         clock = "" if has_time else _NO_CLOCK
@@ -210,6 +207,9 @@ def _choose(groups, counts, has_time):
             f"{', '.join(found)}. At least 3 runs (a column run, or one file each), 5 rate levels, "
             f"or a temperature that rises and falls are needed, to be held out in turn.{clock}"
         )
+    whole = enough[0]
+    if whole not in ("device", "run"):
+        return whole, "too few runs to hold out"
     if "level" in enough and counts["level"] <= _MOST_LEVELS:
         pairs = np.unique(np.column_stack([groups["level"], groups[whole]]), axis=0)
         # Levels, on average, that are met by two groups or more.

@@ -35,9 +35,11 @@ def settle_units(values, units, *, is_all=True):
     """
     values = {part: column for part, column in values.items() if np.isfinite(column).any()}
     readings: list[dict] = [{}]
-    for find in (_of_temperature, _of_time, _of_rates):
-        found = find(values, units)
-        readings = [known | more for known in readings for more in found]
+    for part, find in (("temperature", _of_temperature), ("time", _of_time)):
+        if part in values and part not in units:
+            ways = find(values, units)
+            readings = [known | {part: unit} for known in readings for unit in ways]
+    readings = [known | more for known in readings for more in _of_rates(values, units)]
     # The clock is told by the first run.
     if len(readings) > 1 and (is_all or len({each.get("time") for each in readings}) > 1):
         raise UsageError(_question(values, readings))
@@ -48,7 +50,7 @@ def settle_by_all(log, layout):
     """What :func:`settle_units` finds by all rows of a log that was read in this layout."""
     units = layout.units
     parts = [part for part in ("temperature", "output", "rate") if part in log]
-    values = {part: convert_back(log[part].to_numpy(), part, units[part]) for part in parts}
+    values = {part: convert_back(log[part].to_numpy(), units[part]) for part in parts}
     told = {part: units[part] for part in units if part == "time" or part not in layout.assumed}
     return settle_units(values, told)
 
@@ -56,7 +58,7 @@ def settle_by_all(log, layout):
 def assumed_text(values, part, layout):
     """What was assumed of a part, with its range and another reading; of values as in a log."""
     name, unit = layout.name(part), layout.units[part]
-    values = convert_back(np.array([values.min(), values.max()]), part, unit)
+    values = convert_back(np.array([values.min(), values.max()]), unit)
     if unit in SIGNALS:
         return f"{name!r} has no unit, taken as a raw signal ({_range(values)})"
     other = {"temperature": "degF", "time": "ms"}.get(part, "rad/s")
@@ -78,7 +80,7 @@ def _question(values, readings):
         ways = dict.fromkeys(each[part] for each in readings)
         shown = " or ".join(
             unit if unit in SIGNALS else
-            f"{unit} ({_range(convert(values[part], part, unit))} {CANONICAL[part]})"
+            f"{unit} ({_range(convert(values[part], unit))} {CANONICAL[part]})"
             for unit in ways
         )  # fmt: skip
         told.append(f"{part}, {_range(values[part])}, may be in {shown}")
@@ -90,42 +92,36 @@ def _question(values, readings):
 
 
 def _of_temperature(values, units):
-    if "temperature" in units or "temperature" not in values:
-        return [{}]
     low, high = np.nanquantile(values["temperature"], [0.001, 0.999])  # without glitches
     if low > _COLDEST_IN_KELVIN:
-        ways = ["K"]
-    elif high > _HOTTEST:
-        ways = ["degF"]
-    else:
-        ways = ["degC"] if low <= _WARM and high < _HOT else ["degC", "degF"]
-    return [{"temperature": unit} for unit in ways]
+        return ["K"]
+    if high > _HOTTEST:
+        return ["degF"]
+    return ["degC"] if low <= _WARM and high < _HOT else ["degC", "degF"]
 
 
 def _of_time(values, units):
-    if "time" in units or "time" not in values:
-        return [{}]
     known = np.isfinite(values["time"])
     time = values["time"][known]
     heat = values.get("temperature", np.zeros(known.size))[known]
     for unit in ("s", "ms", "us", "ns"):
-        if _SINCE_1970[0] < convert(time.min(), "time", unit) < _SINCE_1970[1]:
-            return [{"time": unit}]
+        if _SINCE_1970[0] < convert(time.min(), unit) < _SINCE_1970[1]:
+            return [unit]
     if time.size > 1 and np.median(np.diff(time)) < 0.0:  # the last row comes first
         time, heat = time[::-1], heat[::-1]
     steps = np.diff(time)
     if not (steps > 0.0).any() or not np.isfinite(heat).any():
-        return [{"time": "s"}]
+        return ["s"]
     # Of the first run, if the clock tells one from another.
     ends = np.flatnonzero(steps < 0.0)
     end = ends[0] + 1 if ends.size and ends[0] > 10 else time.size
     unit = units.get("temperature", "degC")
     heating = np.nanmax(heat[:end]) - np.nanmin(heat[:end])
-    heating = convert(heating, "temperature", unit) - convert(0.0, "temperature", unit)
+    heating = convert(heating, unit) - convert(0.0, unit)
     step, duration = np.median(steps[steps > 0.0]), max(np.ptp(time[:end]), 1e-300)
 
     def is_plausible(unit, heat_limits):
-        second = convert(1.0, "time", unit)
+        second = convert(1.0, unit)
         per_minute = 60.0 * heating / (second * duration)
         fits = heating < _LEAST_HEATING or heat_limits[0] <= per_minute <= heat_limits[1]
         return fits and _STEPS[0] <= step * second <= _STEPS[1]
@@ -135,7 +131,7 @@ def _of_time(values, units):
         is_fast = 60.0 * heating > _FAST * duration
         others = ["ms", "us", "ns"] + ["min", "h"] * int(is_fast)
         ways += [unit for unit in others if is_plausible(unit, _CHAMBER)]
-    return [{"time": unit} for unit in ways or ["s"]]
+    return ways or ["s"]
 
 
 def _of_rates(values, units):
@@ -159,9 +155,7 @@ def _of_rates(values, units):
             (each, other)
             for each in outputs
             for other in ways
-            if _AS_THE_RATE[0]
-            < slope * convert(1.0, "rate", each) / convert(1.0, "rate", other)
-            < _AS_THE_RATE[1]
+            if _AS_THE_RATE[0] < slope * convert(1.0, each) / convert(1.0, other) < _AS_THE_RATE[1]
         ]
         pairs = pairs or [(own or "counts", other) for other in rates]
     readings = [{"output": each, "rate": other} for each, other in pairs]
@@ -173,12 +167,12 @@ def _of_rate(rate):
     size = np.nanmax(np.abs(rate)) if rate.size else 0.0
     if size == 0.0:
         return ["deg/s"]
-    sizes = {unit: convert(size, "rate", unit) for unit in _RATES}
+    sizes = {unit: convert(size, unit) for unit in _RATES}
     earth = [unit for unit in _RATES if abs(sizes[unit] / _EARTH_RATE - 1.0) < 0.02]
     ways = [unit for unit in _RATES if _SMALLEST_SCALE <= sizes[unit] <= _LARGEST_SCALE]
     levels = np.unique(np.abs(rate[np.isfinite(rate)]).round(9))
     if len(ways) > 1 and 3 <= levels.size <= _MOST_LEVELS and 3 * levels.size <= rate.size:
-        ways = [unit for unit in ways if _are_round(convert(levels, "rate", unit))] or ways
+        ways = [unit for unit in ways if _are_round(convert(levels, unit))] or ways
     return earth or ways or ["deg/s"]
 
 
@@ -195,6 +189,6 @@ def _of_rest(output):
     if is_whole and size > _LARGEST_RATE:
         return ["counts"]
     ways = ["deg/s"] if size <= _LARGEST_BIAS else []
-    ways += ["rad/s"] if convert(size, "rate", "rad/s") <= _LARGEST_BIAS else []
+    ways += ["rad/s"] if convert(size, "rad/s") <= _LARGEST_BIAS else []
     ways += ["deg/h"] if size >= 1.0 else []
     return ways + (["counts"] if is_whole else [])

@@ -24,6 +24,7 @@ from ..export.c.dialect import (
     kept_lines,
     remark,
     status_word,
+    table_bytes,
     write_files,
 )
 from ..export.c.header import cost_lines, header_of, input_lines, policy_line
@@ -196,15 +197,9 @@ def export_c_physics(
     dialect = Dialect(name, dtype, std)
     part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage)
     whole = _Composition(law, rules, part, dialect.dtype)
-    code = "".join(
-        [
-            f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n',
-            part.text(),
-            "\n",
-            _source_of(dialect, whole, next(iter(policies & set(SILENT)), None)),
-            self_test(_known_answers(whole), dialect),
-        ]
-    )
+    silent = next(iter(policies & set(SILENT)), None)
+    code = f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n{part.text()}\n'
+    code += _source_of(dialect, whole, silent) + self_test(_known_answers(whole), dialect)
     price = _cost(whole)
     written = CCode(name, _header(whole, dialect, price, units, notes), code, price)
     write_files(written, path)
@@ -215,7 +210,8 @@ class _Composition:
     """Both parts on the inputs of the function, ``names``, and what of the law is rounded.
 
     Rounded to the type are the law's range, the model of the rules, ``reference`` and ``tables``;
-    not the law's coefficients. A Polynomial may stand for the law.
+    not the law's coefficients. ``arrays`` are all that C has of the law, these tables among them. A
+    Polynomial may stand for the law.
     """
 
     def __init__(self, law, rules, part, dtype):
@@ -237,6 +233,9 @@ class _Composition:
             self.reference = self.rounded(law.reference_temperature_)
             keys = {"amplitude": "amplitude_", "sagnac": "sagnac_factor_", "bias": "bias_"}
         self.tables = {key: self.rounded(own[name]) for key, name in keys.items()}
+        self.arrays = {"law_low": own["minimum_"], "law_high": own["maximum_"], **self.tables}
+        self.arrays |= {"powers": law.powers} if self.is_cubic else {"law_input": own["columns_"]}
+        self.arrays |= {"rules_input": positions}
 
     def rounded(self, values):
         values = np.asarray(values, dtype=float)
@@ -263,17 +262,14 @@ class _Composition:
 
 def _source_of(dialect, whole, silent):
     """Tables and functions of the law; ``silent`` is the policy of rows without an answer."""
-    law, places = whole.law, whole.rules.positions
-    tables = {"law_low": law.minimum_, "law_high": law.maximum_, **whole.tables}
-    words: dict[str, Any] = {"rules": dialect.name + _SUFFIX, "n_rules_inputs": places.size}
+    law, n_rules_inputs = whole.law, whole.rules.positions.size
+    words: dict[str, Any] = {"rules": dialect.name + _SUFFIX, "n_rules_inputs": n_rules_inputs}
     if whole.is_cubic:
         facts, asin = {"cubic"}, ""
-        tables |= {"powers": law.powers}
         words |= {"n_terms": len(law.powers)}
     else:
         policy, inputs, number = law.out_of_bounds, law.columns_, dialect.number
         facts = {"law", *(["silent"] if policy in SILENT else ["answer", policy])}
-        tables |= {"law_input": inputs}
         words |= {f"n_{key}": values.size for key, values in whole.tables.items()}
         words |= {"n_law": inputs.size, "output": inputs[0], "temperature": number(0.0)}
         if inputs.size > 1:
@@ -283,11 +279,10 @@ def _source_of(dialect, whole, silent):
         words |= {"slope": number(1.0 / np.cos(law.max_phase))}
         called = dialect.write("$ASIN(")
         asin = next(line for line in dialect.functions().splitlines() if called in line) + "\n\n"
-    tables |= {"rules_input": places}
     code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
     parts = [
         "/* Of what the rules are added to: its range, coefficients, and columns of x. */\n",
-        *(f"{dialect.table(key, values)}\n" for key, values in tables.items()),
+        *(f"{dialect.table(key, values)}\n" for key, values in whole.arrays.items()),
         asin,
         dialect.write(rejection(silent, dialect.std)).lstrip(),
         f"\n{dialect.write(code, **words)}\n",
@@ -334,23 +329,21 @@ def _header(whole, dialect, price, units, notes):
 
 
 def _cost(whole):
-    of_rules, itemsize = whole.part.cost, whole.dtype.itemsize
+    of_rules = whole.part.cost
     sizes = [values.size for values in whole.tables.values()]
     n_inputs, n_rules_inputs = whole.law.columns_.size, whole.rules.positions.size
     # Per polynomial its degree; the lag of the thermometer, and the slope beyond the phase.
-    products, divisions, table_bytes = sum(sizes) - len(sizes) + (n_inputs > 2), 2, n_inputs
-    products += not whole.is_cubic and whole.law.out_of_bounds == "linear"
+    products, divisions = sum(sizes) - len(sizes) + (n_inputs > 2), 2
+    products += whole.law.out_of_bounds == "linear"
     if whole.is_cubic:
-        powers = whole.law.powers
-        products, divisions, table_bytes = int(powers.sum()), n_inputs, powers.size
-    table_bytes += itemsize * (sum(sizes) + 2 * n_inputs) + n_rules_inputs
+        products, divisions = int(whole.law.powers.sum()), n_inputs
     n_held = n_rules_inputs + 1 + n_inputs * whole.is_cubic
     return replace(
         of_rules,
         multiply_adds=of_rules.multiply_adds + products,
         divisions=of_rules.divisions + divisions,
-        table_bytes=of_rules.table_bytes + table_bytes,
-        stack_bytes=of_rules.stack_bytes + itemsize * n_held,
+        table_bytes=of_rules.table_bytes + sum(map(table_bytes, whole.arrays.values())),
+        stack_bytes=of_rules.stack_bytes + whole.dtype.itemsize * n_held,
     )
 
 
@@ -362,13 +355,11 @@ def _known_answers(whole):
     law, rules, part = whole.law, whole.rules, whole.part
     low, high = whole.box
     points = qmc.Halton(low.size, scramble=False).random(4 * ROWS)
-    kind = np.arange(len(points)) % 4
-    reach = np.where(kind % 2, 1.0, 2.0)[:, None]
+    reach = np.where(np.arange(len(points)) % 2, 1.0, 2.0)[:, None]
     X = low + (high - low) * (0.5 + reach * (points - 0.5))
     if not whole.is_cubic:
         output = law.columns_[0]
-        swing = 3.0 * law.amplitude_[0] * (points[:, output] - 0.5)
-        X[:, output] = np.where(kind == 3, swing, X[:, output])
+        X[3::4, output] = 3.0 * law.amplitude_[0] * (points[3::4, output] - 0.5)
     X = np.vstack([low, high, X]).astype(whole.dtype).astype(float)
     # NaN past the amplitude.
     phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (phase_of(law, X), law.max_phase)

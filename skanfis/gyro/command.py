@@ -247,7 +247,6 @@ def _write(calibration, options, files, folder):
 
 
 def _apply(options, tell):
-    """Compensate the logs that the options name, and write the rates."""
     paths = find_logs(options.logs)
     if len(paths) > 1 and options.output is None:
         raise UsageError("--apply to several logs needs --output.")
@@ -318,7 +317,6 @@ def _progress(quiet):
         if not quiet:
             seconds = time.monotonic() - start
             sys.stderr.write(f"{seconds:7.1f} s  {printable(text)}\n")
-            sys.stderr.flush()
 
     return tell
 

@@ -2,7 +2,7 @@
 
 import json
 import warnings
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -24,10 +24,6 @@ from .thermal_rate import ThermalRate
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
-_KEYS = (
-    "inputs", "predicts", "scale_factor", "output_unit", "time_constant", "min_coverage", "units",
-    "assumed",
-)  # fmt: skip
 # Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
 _NUMBERS = ("thermometer_lag", "reference_temperature")
@@ -119,15 +115,9 @@ class GyroCompensator:
         refused = ~np.isfinite(compensated)
         compensated[refused] = np.nan
         status = status_word(~inside, refused, ~(coverage >= self.min_coverage))
-        return pd.DataFrame(
-            {
-                "rate_indicated": indicated,
-                "rate_compensated": compensated,
-                "coverage": coverage,
-                "status": status.astype(np.uint8),
-            },
-            index=X.index,
-        )
+        columns = {"rate_indicated": indicated, "rate_compensated": compensated}
+        columns |= {"coverage": coverage, "status": status.astype(np.uint8)}
+        return pd.DataFrame(columns, index=X.index)
 
     def write_json(self, path: str | PathLike[str]) -> None:
         """Write it as text that runs nothing when it is read.
@@ -165,6 +155,9 @@ class GyroCompensator:
             if isinstance(error, UnicodeDecodeError | json.JSONDecodeError):
                 reason = "it is not the JSON that a compensator.json holds"
             raise ValueError(f"{path} is no gyro compensator: {reason}.") from error
+
+
+_KEYS = [each.name for each in fields(GyroCompensator) if each.name != "estimator"]
 
 
 def as_written(compensator):
@@ -240,7 +233,8 @@ def _settings(document):
         raise ValueError(f"inputs is {inputs!r}; it must be of {', '.join(INPUTS)}")
     if document["predicts"] not in ("error", "rate"):
         raise ValueError(f"predicts is {document['predicts']!r}")
-    numbers = {
+    checked = {
+        "inputs": tuple(inputs),
         "scale_factor": _divisor(document["scale_factor"], "scale_factor"),
         "time_constant": number(document["time_constant"], "time_constant", SMALLEST_NUMBER),
         "min_coverage": number(document["min_coverage"], "min_coverage", 0.0, 1.0),
@@ -265,8 +259,7 @@ def _settings(document):
         estimator = joined(_read_law(document["law"], inputs), estimator)
     if document["polynomial"] is not None:
         estimator = joined(_read_polynomial(document["polynomial"], estimator, inputs), estimator)
-    settings = {key: document[key] for key in _KEYS} | numbers
-    return {"estimator": estimator, **settings, "inputs": tuple(inputs)}
+    return {key: document[key] for key in _KEYS} | checked | {"estimator": estimator}
 
 
 def _read_law(document, inputs):
@@ -334,8 +327,4 @@ def _list_of_numbers(values, key, fewest, most, where="law"):
 
 def _are_of(names, known):
     """Whether it is a list of some of the known names, each of them once."""
-    return (
-        isinstance(names, list)
-        and bool(names)
-        and all(name in known and names.count(name) == 1 for name in names)
-    )
+    return isinstance(names, list) and 0 < len(names) == sum(names.count(k) == 1 for k in known)

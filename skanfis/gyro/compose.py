@@ -229,13 +229,13 @@ def law_and_rules(estimator):
         )
     check_is_fitted(found)
     law = found.base_
-    if not isinstance(law, OpenLoopArcsineRegressor | Polynomial):
+    if isinstance(law, OpenLoopArcsineRegressor):
+        check_parameters(law)
+    elif not isinstance(law, Polynomial):
         raise TypeError(
             f"base must be an OpenLoopArcsineRegressor, whose law can be written; it is {law!r}. "
             "The law chooses its columns by its own parameters, and needs no Pipeline."
         )
-    if isinstance(law, OpenLoopArcsineRegressor):
-        check_parameters(law)
     rules = FrozenRules.of(found.residual_, law.n_features_in_)
     if rules.model.n_outputs != 1:
         raise ValueError(f"residual has {rules.model.n_outputs} outputs; the rate is one.")

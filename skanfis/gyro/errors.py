@@ -26,9 +26,7 @@ class LogError(ValueError):
 
     def __init__(self, reason: str, column: str | None = None, row: int | None = None) -> None:
         super().__init__(reason, column, row)
-        self.reason = reason
-        self.column = column
-        self.row = row
+        self.reason, self.column, self.row = reason, column, row
 
     def __str__(self):
         place = [] if self.column is None else [f"column {self.column!r}"]

@@ -1,7 +1,6 @@
 """The report of a calibration as one page of HTML: verdict, tables, pictures, rules, limits."""
 
 import platform
-from collections import Counter
 from importlib.resources import files as resources
 from typing import Any, NamedTuple
 
@@ -80,7 +79,7 @@ def report_page(results, title):
     cautions = [f"Warning: {sentence}" for sentence in cautions]
     if recipe.assumed:
         cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
-    sections = [_check, _merit, _pictures, _sure, _written, _use, _log]
+    sections = (_check, _merit, _pictures, _sure, _written, _use, _log)
     kept = calibration.verdict.recommended != NOTHING
     kept = kept and all(check.result == "pass" for check in results.checks)
     verdict, *reasons = headline(calibration, results.unit)
@@ -139,8 +138,8 @@ def _without_hidden_signs(value):
 
 def specification(checks):
     """How many limits are kept, and which are not."""
-    told = Counter(check.result for check in checks)
-    parts = [f"{told['pass']} of {len(checks)} limits are kept"]
+    n_kept = sum(check.result == "pass" for check in checks)
+    parts = [f"{n_kept} of {len(checks)} limits are kept"]
     for result, words in (("fail", "not kept"), ("not measured", "could not be measured")):
         names = [_words(check.limit.figure) for check in checks if check.result == result]
         parts += [f"{words}: {', '.join(names)}"] if names else []
@@ -149,17 +148,19 @@ def specification(checks):
 
 def _summary(results):
     """For whoever reads one page: the figures that count, and where they hold."""
-    table, calibration = results.merit.set_index("figure"), results.calibration
-    pictures, lines = results.pictures, []
-    for name in (name for name in _FIRST if name in table.index):
-        unit, before, after = table.loc[name, ["unit", "before", "after"]]
-        if pd.notna(after):
-            lines.append((_words(name), three_digits(before), three_digits(after), signs(unit)))
+    calibration, figures = results.calibration, results.merit.set_index("figure")
+    known = figures.reindex(_FIRST)[["before", "after", "unit"]].dropna(subset="after")
+    lines = [
+        (_words(name), three_digits(before), three_digits(after), signs(unit))
+        for name, before, after, unit in known.itertuples()
+    ]
     blocks = [
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
         _box(calibration, "It may be used from"),
-        Block("pictures", [each for name, each in pictures.items() if name == _ON_FIRST_PAGE]),
+        Block(
+            "pictures", [each for name, each in results.pictures.items() if name == _ON_FIRST_PAGE]
+        ),
     ]
     return "Summary", blocks
 
@@ -324,8 +325,8 @@ def _log(results):
     counts |= {f"{name}s": rows[name].nunique() for name in ("run", "device") if name in rows}
     lines = [(name, f"{count:,}", "") for name, count in counts.items()]
     for name in ("temperature", "rate", "output"):
-        unit = "°/s" if name == "rate" else _unit_of(calibration, name)
-        lines.append((name, f"{rows[name].min():.5g} to {rows[name].max():.5g}", unit))
+        ends = f"{rows[name].min():.5g} to {rows[name].max():.5g}"
+        lines.append((name, ends, _unit_of(calibration, name)))
     if calibration.recipe.output_unit in SIGNALS:
         unit = f"{calibration.recipe.output_unit} per °/s"
         lines.append(("scale factor", f"{calibration.compensator.scale_factor:.8g}", unit))
@@ -355,4 +356,4 @@ def _words(name):
 
 
 def _unit_of(calibration, name):
-    return signs(input_units(calibration.compensator).get(name, "deg/s"))
+    return signs(input_units(calibration.compensator)[name])

@@ -223,8 +223,10 @@ class LogFile:
         missing[[part for part in self._optional if part in log]] = False
         # A gap in one column is none in the clock.
         log = log[~missing[[part for part in ("time", *LABELS) if part in log]].any(axis=1)]
+        # In little memory.
+        unlabelled = pd.Categorical.from_codes(np.zeros(len(log), dtype=np.int8), [""])
         for part in LABELS:
-            log[part] = log[part].astype("category") if part in log else self._unlabelled(log)
+            log[part] = log[part].astype("category") if part in log else unlabelled
         if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
             runs = self._told_by_clock(log["time"].to_numpy())
             log = log[: len(runs)].assign(run=runs)
@@ -244,11 +246,6 @@ class LogFile:
             except LogError as error:
                 raise self.located(error, log.index) from error
         return log
-
-    @staticmethod
-    def _unlabelled(rows):
-        """One label for all rows, in little memory."""
-        return pd.Categorical.from_codes(np.zeros(len(rows), dtype=np.int8), [""])
 
     def _converted(self):
         """All rows, in the units of a log."""
@@ -329,7 +326,7 @@ class LogFile:
                     f"{self.path}: is taken as one run, although the time steps by up to "
                     f"{steps.max():.4g} s, {far} time(s) by more than {_NOTED_STEPS:g} usual steps"
                 )
-            return self._unlabelled(code)
+            return pd.Categorical.from_codes(code, [""])
         self.notes.append(
             f"{self.path}: is split into {code[-1] + 1} runs, where the time begins anew or steps "
             f"by more than {longest:.4g} s"
@@ -362,7 +359,7 @@ class LogFile:
             kind = "no time like those before" if clock else "not a number"
             raise LogError(f"{shortened(column.iloc[row])} is {kind}.", part, row)
         is_in_seconds = clock or column.dtype.kind in "mM"
-        return numbers if is_in_seconds else convert(numbers, part, self.layout.units[part])
+        return numbers if is_in_seconds else convert(numbers, self.layout.units[part])
 
     def located(self, error, rows=None, where=None):
         """An error of one part and row, in terms of this file; ``rows`` are positions in it."""
@@ -401,7 +398,6 @@ def _since_power_on(log):
 
 
 def _longest_step(time):
-    """The longest step of the time within a run."""
     steps = np.diff(time)
     forward = steps[steps > 0.0]
     if forward.size == 0:

@@ -3,9 +3,6 @@
 Every column has one value per row: rates in deg/s, temperatures in degC, times in s. The error at
 the input is the output over its scale factor, less the true rate; biases are of it, in deg/h. Where
 a figure does not exist these functions raise ValueError with the reason; they never return NaN.
-
-N, B and K are read off the Allan deviation [deg/h] of tau [h]: N sqrt(1 / tau) where its slope is
--1/2, B sqrt(2 ln 2 / pi) at its minimum, and K sqrt(tau / 3) where its slope is +1/2.
 """
 
 from collections.abc import Callable

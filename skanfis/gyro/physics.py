@@ -178,10 +178,10 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
                 OutOfBoundsWarning,
                 stacklevel=2,
             )
-        phase = np.arcsin(np.clip(sine, -limit, limit))
+        held = np.clip(sine, -limit, limit)
+        phase = np.arcsin(held)
         if goes_on:
-            further = np.where(beyond, np.abs(sine) - limit, 0.0) / np.cos(self.max_phase)
-            phase += np.sign(sine) * further
+            phase += (sine - held) / np.cos(self.max_phase)
         elif self.out_of_bounds == "nan":
             phase[beyond] = np.nan
         difference = self._difference(used)
@@ -222,10 +222,9 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         tau = Polynomial([0.0, 1.0 / std])
 
         def in_units(coefficients, unit, degree):
-            by_degree = np.zeros(1 + (degree if self.temperature is not None else 0))
+            n_terms = 1 + (degree if self.temperature is not None else 0)
             found = Polynomial(coefficients)(tau).coef * unit
-            by_degree[: found.size] = found
-            return by_degree
+            return np.pad(found, (0, n_terms - found.size))
 
         self.amplitude_ = in_units(law.a, output_unit, self.amplitude_degree)
         self.sagnac_factor_ = in_units(law.k, 1.0 / rate_unit, self.sagnac_degree)

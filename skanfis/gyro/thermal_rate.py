@@ -89,7 +89,6 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> np.ndarray:
         """Names of the columns filtered, each with "_rate" behind it."""
         names = super().get_feature_names_out(input_features)
-        check_is_fitted(self)
         return np.array([f"{names[i]}_rate" for i in self._filtered], dtype=object)
 
     def _columns_of(self, X, reset):

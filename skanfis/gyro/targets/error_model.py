@@ -64,17 +64,17 @@ class ErrorModel:
         return np.add(value, [-slack, slack]), slopes
 
 
-def polynomial_ranges(powers, coefficients, low, high):
-    """Range of sum_k c_k prod_j x_j^p_kj over boxes (n_axes, n_boxes), and of its slopes.
+def polynomial_ranges(powers, coefficients, low, high, origin=0.0, width=1.0):
+    """Range of sum_k c_k prod_j s_j^p_kj with s = (x - origin) / width over boxes, and of slopes.
 
-    A coefficient is one number, or one for each box.
+    Boxes of x are (n_axes, n_boxes). A coefficient is one number, or one for each box.
     """
-    slopes = []
+    ends, slopes = [(side - origin) / width for side in (low, high)], []
     for axis in range(powers.shape[1]):
         lowered = np.maximum(powers - (np.arange(powers.shape[1]) == axis), 0)
         steeper = (coefficients.T * powers[:, axis]).T
-        slopes.append(_polynomial_range(lowered, steeper, low, high))
-    return _polynomial_range(powers, coefficients, low, high), np.swapaxes(slopes, 0, 1)
+        slopes.append(_polynomial_range(lowered, steeper, *ends))
+    return _polynomial_range(powers, coefficients, *ends), np.swapaxes(slopes, 0, 1) / width
 
 
 def _polynomial_range(powers, coefficients, low, high):
@@ -96,7 +96,9 @@ def _parts_of(estimator):
     if isinstance(found, OpenLoopArcsineRegressor):
         return [(list(found.columns_), partial(_of_law, found))]
     if isinstance(found, Polynomial):
-        return [(list(found.columns_), partial(_of_polynomial, found))]
+        place = {"origin": found.center[:, None], "width": found.scale[:, None]}
+        ranges = partial(polynomial_ranges, found.powers, found.coefficients, **place)
+        return [(list(found.columns_), ranges)]
     rules = FrozenRules.of(found, getattr(found, "n_features_in_", None))
     sides = [Enclosure(rules.model, 0, sign) for sign in (-1.0, 1.0)]
     return [(list(rules.positions), partial(_of_rules, sides))]
@@ -111,18 +113,12 @@ def _of_rules(sides, low, high):
     return values, slopes
 
 
-def _of_polynomial(polynomial, low, high):
-    scale = polynomial.scale[:, None]
-    ends = [(side - polynomial.center[:, None]) / scale for side in (low, high)]
-    value, slopes = polynomial_ranges(polynomial.powers, polynomial.coefficients, *ends)
-    return value, slopes / scale
-
-
 def _of_law(law, low, high):
     """asin(V / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
-    d = [end[1:2] - law.reference_temperature_ for end in (low, high)]
     (a, a_slope), (k, k_slope), (b, b_slope) = (
-        polynomial_ranges(np.arange(each.size)[:, None], each, *d)
+        polynomial_ranges(
+            np.arange(each.size)[:, None], each, low[1:2], high[1:2], law.reference_temperature_
+        )
         for each in (law.amplitude_, law.sagnac_factor_, law.bias_)
     )
     over_a, over_k = _inverse(a), _inverse(k)
@@ -176,9 +172,8 @@ class Piecewise:
         )
         origins = np.array([given[at] for given, at in zip(self.origins, cells, strict=True)])
         widths = np.reshape(self.widths, (-1, 1))
-        ends = [(side - origins) / widths for side in (low, high)]
-        value, slopes = polynomial_ranges(self.powers, self.coefficients[:, *cells], *ends)
-        return value, slopes / widths
+        coefficients = self.coefficients[:, *cells]
+        return polynomial_ranges(self.powers, coefficients, low, high, origins, widths)
 
 
 def spread(ends):

@@ -97,7 +97,7 @@ class Table:
         self.unit = float(self._scale_of(_MARGIN * np.abs(values).max()))
         values = np.rint(values / self.unit) if self.bits else values
         self.values = values.astype(self.dialect.dtype)
-        self.piecewise = self._piecewise(self.values * self.unit)
+        self.piecewise = self._piecewise(self.values * self.unit, [each[:-1] for each in at])
 
     def _scale_of(self, largest):
         """What 1 stands for where a number may be so large: in fixed point a power of two."""
@@ -117,16 +117,13 @@ class Table:
         self.low, self.high, self.step = ends.astype(float)
         self.counts = np.full(low.size, n_cells)
 
-    def _piecewise(self, values):
+    def _piecewise(self, values, origins):
         powers = np.array(list(product((0, 1), repeat=values.ndim)))
         parts = [values] * len(powers)
         for axis in range(values.ndim):
             for k, part in enumerate(parts):
                 is_slope = powers[k, axis]
                 parts[k] = np.diff(part, axis=axis) if is_slope else np.delete(part, -1, axis)
-        origins, width = [], self.step * self.scale
-        for low, each, n in zip(self.low * self.scale, width, self.counts, strict=True):
-            origins.append(low + each * np.arange(n))
         edges = [np.append(*ends) for ends in zip(origins, self.high * self.scale, strict=True)]
         coefficients = np.array(parts)
         sizes = np.abs(coefficients)
@@ -137,6 +134,7 @@ class Table:
         else:
             eps = np.finfo(self.dialect.dtype).eps
             slack = eps * (8.0 * self.counts.max() * steepest + 24.0 * most)
+        width = self.step * self.scale
         return Piecewise(edges, origins, width, powers, coefficients, float(slack))
 
     def code(self, notes, units):
