@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from .._validation import check_count, position_of
 from ..antecedent import TreeAntecedent
 from ..export import fold, fold_with_rows
-from ..export.folding import by_column, fold_with_reader
+from ..export.columns import by_column
+from ..export.folding import fold_with_reader
 from .labels import as_label, title_of
 from .rules import has_training_data
 from .sentences import PRECISION, rounded

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import check_finite, positive_weights
-from ..export.folding import Level, fold_with_reader
+from ..export.columns import Level
+from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts

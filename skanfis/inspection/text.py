@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..export.folding import by_column, fold_with_reader
+from ..export.columns import by_column
+from ..export.folding import fold_with_reader
 from ..policies import MOST_DIGITS, SILENT, policy_in_words
 from .rules import (
     condition,

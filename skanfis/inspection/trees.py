@@ -8,7 +8,8 @@ import numpy as np
 
 from .._validation import check_choice
 from ..antecedent import TreeAntecedent
-from ..export.folding import Level, fold_with_reader
+from ..export.columns import Level
+from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .displays import _axes, _position, _section
 from .labels import as_label, title_of
