@@ -127,7 +127,7 @@ def model_of(document):
     check_size(n_rules, n_terms, n_inputs, n_outputs)
     groups, initial_groups, term_names = _terms(file["terms"], n_inputs)
     table, rules = _rules(file["rules"], n_terms, n_inputs, n_outputs)
-    antecedent = _rule_base(file["rule_base"], groups, table)
+    antecedent = rule_base(file["rule_base"], groups, table)
     support, posterior = file["support"], file["posterior"]
     if posterior is not None:
         n_slopes = n_inputs if rules["coefficients"].shape[1] > 1 else 0
@@ -137,7 +137,7 @@ def model_of(document):
         **outputs,
         **rules,
         antecedent=antecedent,
-        initial_antecedent=_rule_base(file["rule_base"], initial_groups, table),
+        initial_antecedent=rule_base(file["rule_base"], initial_groups, table),
         out_of_bounds=file["out_of_bounds"],
         max_extrapolation=file["max_extrapolation"],
         support=None if support is None else _support(support, n_rules, n_inputs),
@@ -348,7 +348,7 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     return Posterior(**arrays | own | {"consequents": consequents})
 
 
-def _rule_base(kind, groups, table):
+def rule_base(kind, groups, table):
     """The rule base of a kind with these terms; ValueError where its rules are not the table's."""
     inputs = np.concatenate([group.inputs for group in groups]) if groups else np.empty(0, int)
     antecedent: Antecedent

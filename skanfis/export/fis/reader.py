@@ -4,7 +4,6 @@ Every pattern is anchored and passes over its line once, whatever the line holds
 """
 
 import re
-from collections import Counter
 from functools import partial
 from math import prod
 from os import PathLike
@@ -12,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from ...model import TSKModel
 from ...naming import distinct as distinct  # the application may take it from export alone
+from ..json_reader import rule_base
 from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
 from .functions import theta_of
 
@@ -289,24 +288,16 @@ def _model(inputs, outputs, antecedents, consequents):
     rows = _grid_rows(inputs, antecedents)
     if rows is not None:
         antecedents, consequents = antecedents[rows], consequents[rows]
+    kind, premises = "table" if rows is None else "grid", np.flatnonzero(antecedents.any(axis=0))
     # Input and number of each term that a rule looks at, input by input.
     places: list = [(j, k) for j, own in enumerate(antecedents.T) for k in np.unique(own) if k > 0]
-    premises = np.flatnonzero(antecedents.any(axis=0))
-    is_scattered = rows is None and _is_scattered(inputs, antecedents)
-    if is_scattered:
-        places = [(j, rule[j]) for rule in antecedents for j in premises]
+    if rows is None and _is_scattered(inputs, antecedents):
+        kind, places = "scattered", [(j, rule[j]) for rule in antecedents for j in premises]
     groups = groups_of((j, *inputs[j].terms[k - 1]) for j, k in places)
-    antecedent: Antecedent
-    if rows is not None:
-        counts = tuple(Counter(j for j, _ in places).values())
-        antecedent = GridAntecedent(groups, counts=counts)
-    elif is_scattered:
-        antecedent = ScatteredAntecedent(groups, n_premise_inputs=premises.size)
-    else:
-        table = np.full(antecedents.shape, -1)
-        for t, (j, k) in enumerate(places):
-            table[antecedents[:, j] == k, j] = t
-        antecedent = RuleTableAntecedent(groups, table)
+    table = np.full(antecedents.shape, -1)
+    for t, (j, k) in enumerate(places):
+        table[antecedents[:, j] == k, j] = t
+    antecedent = rule_base(kind, groups, table if kind == "table" else table[:, premises])
     names = [distinct(variable.names) for variable in inputs]
     # Constants beside linear consequents have no slopes.
     n_basis = max(len(term) for output in outputs for term in output.terms)
