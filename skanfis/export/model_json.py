@@ -163,14 +163,12 @@ def _terms(model):
 
 def _laid_out(document):
     """JSON text with one item of every list per line."""
-    entries = []
+    write, entries = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode, []
     for key, value in document.items():
-        is_list = isinstance(value, list)
-        texts = [
-            json.dumps(item, ensure_ascii=False, allow_nan=False)
-            for item in (value if is_list else [value])
-        ]
-        text = "[" + ",".join(f"\n    {item}" for item in texts) + "\n  ]" if is_list else texts[0]
+        if isinstance(value, list):
+            text = "[" + ",".join(f"\n    {write(item)}" for item in value) + "\n  ]"
+        else:
+            text = write(value)
         entries.append(f'  "{key}": {text}')
     return "{\n" + ",\n".join(entries) + "\n}\n"
 

@@ -88,20 +88,20 @@ class Readability:
     @property
     def rules(self) -> Any:
         """The rules; see the class."""
-        found, model = self.measures, self._said.model
+        found, said = self.measures, self._said
+        premises = np.array(premise_texts(said.model, self.levels), dtype=object)
+        rule = np.repeat(np.arange(premises.size), self.model.n_outputs)
         return pd.DataFrame(
             {
-                "if": np.repeat(
-                    np.array(premise_texts(model, self.levels), dtype=object), model.n_outputs
-                ),
-                "output": list(model.output_names) * model.n_rules,
-                "weight": np.repeat(found.rule_weights, model.n_outputs),
-                "rows": np.repeat(found.rule_rows, model.n_outputs),
+                "if": premises[rule],
+                "output": list(self.model.output_names) * premises.size,
+                "weight": found.rule_weights[rule],
+                "rows": found.rule_rows[rule],
                 "alone": found.rule_alone.ravel(),
                 "error": self.rule_errors.ravel(),
-                "numbers": np.repeat(self._said.n_numbers, model.n_outputs),
+                "numbers": said.n_numbers[rule],
             },
-            index=pd.Index(np.repeat(np.arange(model.n_rules), model.n_outputs), name="rule"),
+            index=pd.Index(rule, name="rule"),
         )
 
     @property

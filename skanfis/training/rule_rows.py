@@ -69,13 +69,17 @@ class RuleRows:
         """The rows of both, of which the sums are on this scale."""
         second = self.second + other.second
         distinct = np.unique(np.vstack([self.distinct, other.distinct]), axis=0)
+        far = np.vstack([self.farthest, other.farthest])
+        rules, distance = _distances(far, second, scale)
+        # By rule, the farthest first: a few, since one more row may change who it is.
+        far = far[np.lexsort((-distance, rules))]
         return RuleRows(
             second,
             self.strongest + other.strongest,
             np.maximum(self.peak, other.peak),
             np.maximum(self.extent, other.extent),
             _first_of_each(distinct, second.shape[1]),
-            _far_rows(np.vstack([self.farthest, other.farthest]), second, scale),
+            _first_of_each(far, _MOST_FAR),
         )
 
     def on(self, shift, factor):
@@ -125,9 +129,3 @@ def _distances(farthest, second, scale):
     center, factor = _places(second)
     away = (farthest[:, 1:] - scale.offset) / scale.scale - center[rules]
     return rules, np.linalg.norm(np.einsum("nij,nj->ni", factor[rules], away), axis=1)
-
-
-def _far_rows(rows, second, scale):
-    """Of rows by their rules the few farthest of each: one more row may change who is."""
-    rules, distance = _distances(rows, second, scale)
-    return _first_of_each(rows[np.lexsort((-distance, rules))], _MOST_FAR)
