@@ -185,7 +185,6 @@ def _steps_of(label, estimator):
 
 
 def _columns_after(label, step, columns):
-    """The columns after a step."""
     if not columns or _is_passthrough(step):
         return columns
     if isinstance(step, Pipeline):
