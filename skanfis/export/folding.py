@@ -134,7 +134,9 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
 
 
 def last_step(estimator: Any) -> Any:
-    """The ANFIS estimator at the end of pipelines, wrappers and searches; TypeError for none."""
+    """The ANFIS estimator at the end of pipelines and searches, or a model; TypeError for none."""
+    if isinstance(estimator, TSKModel):
+        return estimator
     label, last = _steps_of("", estimator)[0][-1]
     _model_of(label, last)
     return last
