@@ -44,15 +44,6 @@ class Column:
         numbers = _as_numbers(part_of(X, [self.source]))[:, 0]
         return numbers if self.fill is None else np.where(np.isnan(numbers), self.fill, numbers)
 
-    def edge(self, z, side):
-        """The x of an edge of the box, to the lower (-1) or upper (1) side.
-
-        Two roundings farther out where it is computed: the rows that made it stay inside.
-        """
-        x = self.offset + self.scale * z
-        is_raw = self.offset == 0.0 and self.scale == 1.0
-        return x if is_raw else x + side * 4.0 * np.spacing(max(abs(x), abs(self.offset)))
-
 
 def by_column(levels):
     """Names of indicators by the raw column, and what the levels without one are called."""

@@ -325,9 +325,12 @@ def _with_raw_inputs(model, columns, order):
     coefficients = model.coefficients.copy()
     if model.order:
         coefficients[:, 1:] = (coefficients[:, 1:] / scale[:, None])[:, order]
+    # Edges that are computed lie two roundings farther out: the rows that made them stay inside.
+    low, high = offset + scale * model.minimum, offset + scale * model.maximum
+    is_computed = (offset != 0.0) | (scale != 1.0)
     low, high = (
-        np.array([c.edge(z, side) for c, z in zip(columns, edges.tolist(), strict=True)])
-        for edges, side in ((model.minimum, -1.0), (model.maximum, 1.0))
+        edge + is_computed * side * 4.0 * np.spacing(np.maximum(np.abs(edge), np.abs(offset)))
+        for edge, side in ((low, -1.0), (high, 1.0))
     )
     place = np.argsort(order)
     antecedents = {}

@@ -77,15 +77,14 @@ def export_json(
             rows=model.rule_rows,
             consequents=model.coefficients.transpose(0, 2, 1),
         ),
-        "support": None,
-    }
-    if support:
-        document["support"] = _items(
+        "support": support
+        and _items(
             share=support.share,
             radius=support.radius,
             center=support.center,
             factor=support.factor[:, *np.tril_indices(model.n_inputs)],
-        )
+        ),
+    }
     if posterior:
         if model.posterior is None:
             raise ValueError(
