@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -125,12 +124,7 @@ def bounds(
     0.71 1.00
     """
     model, box = _checked(model, box, tol, max_boxes)
-    low, high = held_box(box, model)
-
-    def evaluated(k, sign):
-        return Enclosure(model, k, sign).values
-
-    return _enclosed(model, box, low, high, evaluated, np.ptp, tol, max_boxes)
+    return _enclosed(model, box, None, np.ptp, tol, max_boxes)
 
 
 def gradient_bounds(
@@ -173,12 +167,7 @@ def gradient_bounds(
     """
     model, box = _checked(model, box, tol, max_boxes)
     (j,) = feature_indices([feature], model.input_names, "feature")
-    low, high = held_box(box, model, _BEYOND)
-
-    def evaluated(k, sign):
-        return partial(Enclosure(model, k, sign).slope, j=j)
-
-    found = _enclosed(model, box, low, high, evaluated, size, tol, max_boxes)
+    found = _enclosed(model, box, j, size, tol, max_boxes)
     names = tuple(f"d {y} / d {model.input_names[j]}" for y in model.output_names)
     return replace(found, output_names=names)
 
@@ -224,7 +213,7 @@ def monotonicity(
     def is_proven(k, sign):
         if is_promised and is_in_order(model, k, sign * (np.arange(model.n_inputs) == j)):
             return True
-        slope = partial(Enclosure(model, k, -float(sign)).slope, j=j)
+        slope = Enclosure(model, k, -float(sign)).evaluate(j)
         return largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0).bound <= 0.0
 
     outputs = range(model.n_outputs)
@@ -236,11 +225,12 @@ def cuts_of(model):
     return np.stack([model.minimum, model.maximum], axis=1)
 
 
-def _enclosed(model, box, low, high, evaluated, scale, tol, max_boxes):
-    """Bounds of what ``evaluated`` by output and sign; ``tol`` is in units of ``scale(ends)``."""
+def _enclosed(model, box, j, scale, tol, max_boxes):
+    """Bounds of outputs, or of their slopes by input j; ``tol`` is in units of ``scale(ends)``."""
+    low, high = held_box(box, model, 0.0 if j is None else _BEYOND)
     X, found = spread_points(low, high).T, []
     for k in range(model.n_outputs):
-        sides = [evaluated(k, sign) for sign in (-1.0, 1.0)]
+        sides = [Enclosure(model, k, sign).evaluate(j) for sign in (-1.0, 1.0)]
         seen = [evaluate(X, X) for evaluate in sides]
         tops = [attained.max() for _, _, attained, _ in seen]
         tolerance = tol * float(scale([-tops[0], tops[1]]))

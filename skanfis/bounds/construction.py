@@ -15,7 +15,7 @@ To fall is the same with all signs reversed. A prediction is within limits where
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,17 +36,18 @@ ONE_RULE = GridAntecedent.build([], [], [])
 class _Pairs(NamedTuple):
     """Pairs of rules, and what must hold of each; widths are negative where predictions fall.
 
-    Rule -1 is zero everywhere; ``column`` is the place of x_j in [1, x].
+    Rule -1 is zero everywhere; ``column`` is the place of x_j in [1, x]. Until they are joined,
+    numbers that are the same of all are given once.
     """
 
-    above: np.ndarray
-    below: np.ndarray
-    column: np.ndarray
-    middle: np.ndarray
-    width: np.ndarray
-    own: np.ndarray  # o
-    curved: np.ndarray  # c
-    least: np.ndarray  # in the place of zero
+    above: Any
+    below: Any
+    column: Any = 0
+    middle: Any = 0.0
+    width: Any = 1.0
+    own: Any = 0.0  # o
+    curved: Any = 0.0  # c
+    least: Any = 0.0  # in the place of zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,7 @@ class RuleOrder:
         """None where no order is known that is enough; columns are those of ``slope_inputs``."""
         every = np.arange(antecedent.n_rules)
         nothing = np.full(every.size, -1)
-        found = [_pairs(every[:0], every[:0])]
+        found = [_Pairs(every[:0], every[:0])]
         for j in np.flatnonzero(signs):
             pairs = _pairs_along(antecedent, j)
             if pairs is None:
@@ -71,11 +72,11 @@ class RuleOrder:
             column = 1 + np.flatnonzero(slope_inputs == j)
             # Without slopes by it there is the plain order.
             slopes = {"column": column[0]} if column.size else {"own": 0.0, "curved": 0.0}
-            found.append(_pairs(**pairs._asdict() | slopes))
+            found.append(pairs._replace(**slopes))
         if np.isfinite(limits[0]):
-            found.append(_pairs(every, nothing, least=limits[0]))
+            found.append(_Pairs(every, nothing, least=limits[0]))
         if np.isfinite(limits[1]):
-            found.append(_pairs(nothing, every, least=-limits[1]))
+            found.append(_Pairs(nothing, every, least=-limits[1]))
         return cls(_joined(found), signs[slope_inputs])
 
     def about(self, reference):
@@ -134,14 +135,9 @@ def is_in_order(model: TSKModel, output, signs, limits=(-np.inf, np.inf)):
     return order is not None and order.about(np.append(0.0, model.reference)).holds(rules, *ends)
 
 
-def _pairs(above, below, column=0, middle=0.0, width=1.0, own=0.0, curved=0.0, least=0.0):
-    """Pairs of rules; numbers that are the same of all are given once."""
-    numbers = (column, middle, width, own, curved, least)
-    return _Pairs(above, below, *(np.broadcast_to(one, len(above)) for one in numbers))
-
-
 def _joined(parts):
-    return _Pairs(*map(np.concatenate, zip(*parts, strict=True)))
+    every = (np.broadcast_arrays(*pairs) for pairs in parts)
+    return _Pairs(*map(np.concatenate, zip(*every, strict=True)))
 
 
 def _pairs_along(antecedent, j):
@@ -151,7 +147,7 @@ def _pairs_along(antecedent, j):
     has_own = np.append(antecedent.term_inputs == j, False)[antecedent.rule_terms]
     lines, shared = np.arange(antecedent.n_rules)[None], 0.0
     if not has_own.any():
-        return _pairs(lines[0, :0], lines[0, :0])
+        return _Pairs(lines[0, :0], lines[0, :0])
     # One term each, of one width: else no order of the rules is known to be enough.
     groups = [group for group in antecedent.groups if (group.inputs == j).any()]
     is_gaussian = all(group.family is Gaussian for group in groups)
@@ -171,20 +167,20 @@ def _pairs_along(antecedent, j):
     above, below = above[is_above], below[is_above]
     width = np.exp(2.0 * widths[0]) / (centers[above] - centers[below])
     middle = 0.5 * (centers[above] + centers[below])
-    return _pairs(above, below, middle=middle, width=width, own=1.0, curved=shared)
+    return _Pairs(above, below, middle=middle, width=width, own=1.0, curved=shared)
 
 
 def _pairs_of_tree(antecedent, j):
     paths, cuts = [dict(path) for path in antecedent.paths], antecedent.groups[0]
     nodes = np.flatnonzero(cuts.inputs == j)
     n_cuts = np.array([sum(node in path for node in nodes) for path in paths])
-    found = [_pairs(nodes[:0], nodes[:0])]
+    found = [_Pairs(nodes[:0], nodes[:0])]
     for node in nodes:
         is_above = np.array([path.get(node, np.nan) for path in paths])
         above, below = _all_pairs(*(np.flatnonzero(is_above == side) for side in (1.0, 0.0)))
         part = 1.0 / np.maximum(n_cuts[above], n_cuts[below])
         cut, width = cuts.theta[0, node], np.exp(cuts.theta[1, node])
-        found.append(_pairs(above, below, middle=cut, width=width, own=part, curved=part))
+        found.append(_Pairs(above, below, middle=cut, width=width, own=part, curved=part))
     return _joined(found)
 
 

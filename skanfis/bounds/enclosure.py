@@ -6,6 +6,7 @@ share; h is the way that is followed out of range. What rounding may add is adde
 """
 
 from dataclasses import dataclass, field, replace
+from functools import partial
 from math import prod
 
 import numpy as np
@@ -76,6 +77,10 @@ class Enclosure:
     def hold(self, values):
         """Values, or bounds of them, within the limits that outputs are held in."""
         return np.clip(values, self.lowest, self.highest)
+
+    def evaluate(self, j=None):
+        """What :func:`~skanfis.bounds.search.largest` takes: of the slope by input j, or values."""
+        return self.values if j is None else partial(self.slope, j=j)
 
     def values(self, low, high):
         """Upper bounds on boxes (n_inputs, n_boxes), a point in each, and the output there.

@@ -318,10 +318,7 @@ class _ConstrainedFit:
 
     def _proof(self, one, model):
         """What branch and bound finds of an inequality, and what its bound must not be above."""
-        enclosure = Enclosure(model, one.output, -one.sign)
-        bound_of = enclosure.values
-        if one.input is not None:
-            bound_of = partial(enclosure.slope, j=one.input)
+        bound_of = Enclosure(model, one.output, -one.sign).evaluate(one.input)
         until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
         most = int(_MOST_BOXES * self.part)
         found = largest(bound_of, *ends, 0.0, most, cuts_of(model), until=until)

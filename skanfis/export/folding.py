@@ -7,11 +7,10 @@ inputs of the folded model in its place.
 """
 
 from collections import UserList
-from collections.abc import Callable
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import repeat
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -28,14 +27,13 @@ from sklearn.preprocessing import (
     RobustScaler,
     StandardScaler,
 )
-from sklearn.utils import check_array
 from sklearn.utils.validation import check_is_fitted
 
 from .._sklearn import safe_indexing
-from .._validation import check_finite
 from ..model import TSKModel
 from ..naming import default_term_names
 from ..options import policy_of
+from .columns import Column, Level, Reader, part_of
 
 
 def fold(estimator: Any) -> TSKModel:
@@ -107,17 +105,17 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     return model, read(X)
 
 
-def fold_with_reader(estimator: Any) -> tuple[TSKModel, "Reader"]:
+def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
     """Return what :func:`fold` does, and what takes the rows of its inputs out of a table."""
     if isinstance(estimator, TSKModel):
-        inputs = [_Column(j, name) for j, name in enumerate(estimator.input_names)]
+        inputs = [Column(j, name) for j, name in enumerate(estimator.input_names)]
         return estimator, Reader(inputs, list(estimator.input_names), True)
     (*steps, (label, last)), target_steps = _steps_of("", estimator)
     model = _model_of(label, last)
     first = next((step for _, step in steps if not _is_passthrough(step)), last)
     given = getattr(first, "feature_names_in_", None)
     names = [f"x{j}" for j in range(first.n_features_in_)] if given is None else list(given)
-    columns = [_Column(j, name) for j, name in enumerate(names)]
+    columns = [Column(j, name) for j, name in enumerate(names)]
     for label, step in steps:
         columns = _columns_after(label, step, columns)
     # What orders the inputs, and no two of them share.
@@ -136,7 +134,9 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, "Reader"]:
 
 
 def last_step(estimator: Any) -> Any:
-    """The ANFIS estimator at the end of pipelines, wrappers and searches; TypeError for none."""
+    """The ANFIS estimator at the end of pipelines and searches, or a model; TypeError for none."""
+    if isinstance(estimator, TSKModel):
+        return estimator
     label, last = _steps_of("", estimator)[0][-1]
     _model_of(label, last)
     return last
@@ -159,46 +159,6 @@ def found_by_search(estimator: Any) -> Any:
     while hasattr(estimator, "best_estimator_"):
         estimator = estimator.best_estimator_
     return estimator
-
-
-@dataclass(frozen=True)
-class _Column:
-    """Raw column ``source`` as x = offset + scale z, or output ``place`` of what encodes it."""
-
-    source: int
-    name: str
-    offset: float = 0.0
-    scale: float = 1.0
-    encode: Callable[..., np.ndarray] | None = None
-    place: int = -1
-    categories: tuple[str, ...] = ()  # of the raw column, if there can be no more
-    fill: Any = None  # in the place of what is missing
-
-    def values(self, X):
-        """The input on the rows of the user's table."""
-        if self.encode is not None:
-            return self.encode(X)[:, self.place].astype(np.float64)
-        numbers = _as_numbers(_part_of(X, [self.source]))[:, 0]
-        return numbers if self.fill is None else np.where(np.isnan(numbers), self.fill, numbers)
-
-    def edge(self, z, side):
-        """The x of an edge of the box, to the lower (-1) or upper (1) side.
-
-        Two roundings farther out where it is computed: the rows that made it stay inside.
-        """
-        x = self.offset + self.scale * z
-        is_raw = self.offset == 0.0 and self.scale == 1.0
-        return x if is_raw else x + side * 4.0 * np.spacing(max(abs(x), abs(self.offset)))
-
-
-def _as_numbers(X):
-    return check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
-
-
-def _part_of(X, columns):
-    """Columns of a frame, or of anything that is an array, by their positions."""
-    table = X if hasattr(X, "columns") else np.asarray(X, dtype=object)
-    return safe_indexing(table, columns, axis=1)
 
 
 def _is_passthrough(step):
@@ -227,7 +187,6 @@ def _steps_of(label, estimator):
 
 
 def _columns_after(label, step, columns):
-    """The columns after a step."""
     if not columns or _is_passthrough(step):
         return columns
     if isinstance(step, Pipeline):
@@ -269,7 +228,7 @@ def _imputed(label, imputer, columns):
 
 def _encoded(label, encoder, columns):
     """Indicators in the place of the columns that an encoder is given."""
-    if any(replace(column, fill=None) != _Column(column.source, column.name) for column in columns):
+    if any(replace(column, fill=None) != Column(column.source, column.name) for column in columns):
         _refuse(label, encoder, "it must be given columns of the table as they are")
     fills = [column.fill for column in columns]
     sources = {column.name: column.source for column in columns}
@@ -277,7 +236,7 @@ def _encoded(label, encoder, columns):
     by_column = copy(encoder).set_params(feature_name_combiner=lambda name, _: name)
 
     def encode(X):
-        table = _part_of(X, list(sources.values()))
+        table = part_of(X, list(sources.values()))
         if any(fill is not None for fill in fills):
             table = pd.DataFrame(table)
             table = table.fillna(dict(zip(table.columns, fills, strict=True)))
@@ -285,25 +244,19 @@ def _encoded(label, encoder, columns):
         encoded = encoder.transform(table)
         return encoded.toarray() if hasattr(encoded, "toarray") else np.asarray(encoded)
 
-    names = zip(
-        by_column.get_feature_names_out(given), encoder.get_feature_names_out(given), strict=True
-    )
-    known: dict[str, tuple[str, ...]] = {}
+    of_each = (one.get_feature_names_out(given).tolist() for one in (by_column, encoder))
+    names = zip(*of_each, strict=True)
+    # All that there can be.
+    known: dict[str, Any] = {}
     if encoder.handle_unknown == "error" and not hasattr(encoder, "infrequent_categories_"):
-        known = {
-            column: tuple(map(str, categories))
-            for column, categories in zip(sources, encoder.categories_, strict=True)
-        }
-    return [
-        _Column(
-            sources[column],
-            str(name),
-            encode=encode,
-            place=place,
-            categories=known.get(column, ()),
-        )
-        for place, (column, name) in enumerate(names)
-    ]
+        known = dict(zip(sources, encoder.categories_, strict=True))
+    found = []
+    for place, (column, name) in enumerate(names):
+        level = name.removeprefix(f"{column}_")
+        others = tuple(other for other in map(str, known.get(column, ())) if other != level)
+        told = Level(column, level, others)
+        found.append(Column(sources[column], name, encode=encode, place=place, level=told))
+    return found
 
 
 def _chosen(chosen, transformer):
@@ -365,72 +318,6 @@ def _model_of(label, estimator):
     return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
 
 
-class Level(NamedTuple):
-    """A level of a raw column, and all others, where there can be no more."""
-
-    column: str
-    level: str
-    others: tuple[str, ...]
-
-    def said(self, value):
-        """Say "fibre is PM" of a 1; of a 0 "fibre is not PM", or, of two levels, the other."""
-        is_not = self.others[0] if len(self.others) == 1 else f"not {self.level}"
-        return f"{self.column} is {self.level if value else is_not}"
-
-
-def by_column(levels):
-    """Names of indicators by the raw column, and what the levels without one are called."""
-    found: dict[str, list[str]] = {}
-    for name, level in levels.items():
-        found.setdefault(level.column, []).append(name)
-    unnamed = {}
-    for column, names in found.items():
-        named = {levels[name].level for name in names}
-        others = [other for other in levels[names[0]].others if other not in named]
-        unnamed[column] = others or ["other"]
-    return found, unnamed
-
-
-@dataclass(frozen=True)
-class Reader:
-    """Takes the inputs of a model out of tables with columns of these names."""
-
-    inputs: list[_Column]
-    names: list[str]
-    is_named: bool
-
-    @property
-    def levels(self) -> dict[str, Level]:
-        """What each indicator tells, by its name, such as "fibre_PM"."""
-        found = {}
-        for one in self.inputs:
-            if one.encode is not None:
-                column = str(self.names[one.source])
-                level = one.name.removeprefix(f"{column}_")
-                others = tuple(name for name in one.categories if name != level)
-                found[one.name] = Level(column, level, others)
-        return found
-
-    def __call__(self, X) -> np.ndarray:
-        """The rows; ValueError for other columns, and for numbers that are not finite."""
-        given = getattr(X, "columns", None)
-        if self.is_named and given is not None and list(given) != self.names:
-            raise ValueError(
-                f"X must have the columns {', '.join(map(repr, self.names))}, in this order; it "
-                f"has {', '.join(map(repr, given))}."
-            )
-        table = X if any(one.encode for one in self.inputs) else _as_numbers(X)
-        n_columns = np.shape(table)[1]
-        if n_columns != len(self.names):
-            raise ValueError(
-                f"X has {n_columns} columns, the estimator takes {len(self.names)}: "
-                f"{', '.join(map(repr, self.names))}."
-            )
-        rows = np.column_stack([one.values(table) for one in self.inputs])
-        check_finite(rows, "X", [one.name for one in self.inputs])
-        return rows
-
-
 def _with_raw_inputs(model, columns, order):
     """The model with its inputs in raw units and in the order of their raw columns."""
     offset, scale = np.array([(column.offset, column.scale) for column in columns]).T
@@ -438,9 +325,12 @@ def _with_raw_inputs(model, columns, order):
     coefficients = model.coefficients.copy()
     if model.order:
         coefficients[:, 1:] = (coefficients[:, 1:] / scale[:, None])[:, order]
+    # Edges that are computed lie two roundings farther out: the rows that made them stay inside.
+    low, high = offset + scale * model.minimum, offset + scale * model.maximum
+    is_computed = (offset != 0.0) | (scale != 1.0)
     low, high = (
-        np.array([c.edge(z, side) for c, z in zip(columns, edges.tolist(), strict=True)])
-        for edges, side in ((model.minimum, -1.0), (model.maximum, 1.0))
+        edge + is_computed * side * 4.0 * np.spacing(np.maximum(np.abs(edge), np.abs(offset)))
+        for edge, side in ((low, -1.0), (high, 1.0))
     )
     place = np.argsort(order)
     antecedents = {}
@@ -470,7 +360,7 @@ def _with_raw_inputs(model, columns, order):
 def _with_raw_target(model, label, transformer):
     """The model with its outputs as a scaler's inverse gives them."""
     label = f"{label}: transformer of the target" if label else "transformer of the target"
-    outputs = [_Column(k, name) for k, name in enumerate(model.output_names)]
+    outputs = [Column(k, name) for k, name in enumerate(model.output_names)]
     columns = _columns_after(label, transformer, outputs)
     if [column.source for column in columns] != list(range(model.n_outputs)):
         raise ValueError(

@@ -34,7 +34,6 @@ KINDS: dict[type[Antecedent], str] = {
     RuleTableAntecedent: "table",
     TreeAntecedent: "tree",
 }
-_LARGEST_LOG = float(np.log(LARGEST_NUMBER))
 # Of weights, each of which is a part of the whole.
 _ROUNDING = 1e-6
 
@@ -75,6 +74,7 @@ def _as_it_is(value, where):
 _list_or_empty = partial(_list, least=0)
 _positive = partial(number, lowest=SMALLEST_NUMBER)
 _not_negative = partial(number, lowest=0.0)
+_log = partial(number, lowest=-float(np.log(LARGEST_NUMBER)), highest=float(np.log(LARGEST_NUMBER)))
 _FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
     "format": _as_it_is,
     "version": _as_it_is,
@@ -127,7 +127,7 @@ def model_of(document):
     check_size(n_rules, n_terms, n_inputs, n_outputs)
     groups, initial_groups, term_names = _terms(file["terms"], n_inputs)
     table, rules = _rules(file["rules"], n_terms, n_inputs, n_outputs)
-    antecedent = _rule_base(file["rule_base"], groups, table)
+    antecedent = rule_base(file["rule_base"], groups, table)
     support, posterior = file["support"], file["posterior"]
     if posterior is not None:
         n_slopes = n_inputs if rules["coefficients"].shape[1] > 1 else 0
@@ -137,7 +137,7 @@ def model_of(document):
         **outputs,
         **rules,
         antecedent=antecedent,
-        initial_antecedent=_rule_base(file["rule_base"], initial_groups, table),
+        initial_antecedent=rule_base(file["rule_base"], initial_groups, table),
         out_of_bounds=file["out_of_bounds"],
         max_extrapolation=file["max_extrapolation"],
         support=None if support is None else _support(support, n_rules, n_inputs),
@@ -248,10 +248,7 @@ def _terms(terms, n_inputs):
         if family is None:
             raise ValueError(f'{where} has no "function" among {", ".join(FAMILIES)}.')
         theta = {
-            key_of(one): number
-            if one.kind == "location"
-            else partial(number, lowest=-_LARGEST_LOG, highest=_LARGEST_LOG)
-            for one in family.parameters
+            key_of(one): number if one.kind == "location" else _log for one in family.parameters
         }
         readers = {
             "name": _text,
@@ -348,10 +345,10 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     return Posterior(**arrays | own | {"consequents": consequents})
 
 
-def _rule_base(kind, groups, table):
+def rule_base(kind, groups, table):
     """The rule base of a kind with these terms; ValueError where its rules are not the table's."""
-    inputs = np.concatenate([group.inputs for group in groups]) if groups else np.empty(0, int)
-    antecedent: Antecedent
+    antecedent: Antecedent = RuleTableAntecedent(groups, table)
+    inputs, fits = antecedent.term_inputs, True
     if kind == "grid":
         counts = tuple(len(list(run)) for _, run in groupby(inputs))
         antecedent = GridAntecedent(groups, counts=counts)
@@ -360,9 +357,7 @@ def _rule_base(kind, groups, table):
         antecedent = ScatteredAntecedent(groups, n_premise_inputs=table.shape[1])
         fits = 0 < table.size == inputs.size
     elif kind == "tree":
-        antecedent, fits = _tree(groups, table), True
-    else:
-        antecedent, fits = RuleTableAntecedent(groups, table), True
+        antecedent = _tree(groups, table)
     if not fits or not np.array_equal(antecedent.rule_terms, table):
         raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
     if kind == "scattered" and (inputs[table] != inputs[table[0]]).any():

@@ -77,15 +77,14 @@ def export_json(
             rows=model.rule_rows,
             consequents=model.coefficients.transpose(0, 2, 1),
         ),
-        "support": None,
-    }
-    if support:
-        document["support"] = _items(
+        "support": support
+        and _items(
             share=support.share,
             radius=support.radius,
             center=support.center,
             factor=support.factor[:, *np.tril_indices(model.n_inputs)],
-        )
+        ),
+    }
     if posterior:
         if model.posterior is None:
             raise ValueError(
@@ -163,14 +162,12 @@ def _terms(model):
 
 def _laid_out(document):
     """JSON text with one item of every list per line."""
-    entries = []
+    write, entries = json.JSONEncoder(ensure_ascii=False, allow_nan=False).encode, []
     for key, value in document.items():
-        is_list = isinstance(value, list)
-        texts = [
-            json.dumps(item, ensure_ascii=False, allow_nan=False)
-            for item in (value if is_list else [value])
-        ]
-        text = "[" + ",".join(f"\n    {item}" for item in texts) + "\n  ]" if is_list else texts[0]
+        if isinstance(value, list):
+            text = "[" + ",".join(f"\n    {write(item)}" for item in value) + "\n  ]"
+        else:
+            text = write(value)
         entries.append(f'  "{key}": {text}')
     return "{\n" + ",\n".join(entries) + "\n}\n"
 

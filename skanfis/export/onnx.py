@@ -6,6 +6,7 @@ strengths by a softmax over the rules, consequents weighed by the strengths. The
 """
 
 from functools import partialmethod
+from typing import Any
 
 import numpy as np
 
@@ -163,6 +164,7 @@ class _Formula:
     def outputs(self, x):
         """The outputs (n_rows, n_outputs) at inputs (n_rows, n_inputs)."""
         numbers, way_out = self.numbers, None
+        group: Any = None
         inside = x.at_least(numbers.low).at_most(numbers.high)
         # Zero, unless an input is infinite or not a number: then NaN, also for a held input.
         not_finite = (x - x).sum()
@@ -171,16 +173,15 @@ class _Formula:
             followed = (x - inside).at_least(-numbers.reach).at_most(numbers.reach)
             # First along a part of the way, since products could overflow.
             far = (followed.abs() * numbers.inverse_spread).sum() + 1.0
-            way_out = followed / far
-        group = numbers.tangent_group
+            way_out, group = followed / far, numbers.tangent_group
         y, change = self._rules(z, way_out if group is None else None)
-        y, changes = y + numbers.offset, [] if change is None else [change]
-        for g in () if group is None or way_out is None else np.unique(group):
+        y = y + numbers.offset
+        if change is not None:
+            y = y + far * change
+        for g in () if group is None else np.unique(group):
             is_here = np.isin(group, (0, g))
             there = z * is_here.astype(float) + np.where(is_here, 0.0, numbers.tangent_at)
-            changes.append(self._rules(there, way_out * (group == g).astype(float))[1])
-        for change in changes:
-            y = y + far * change
+            y = y + far * self._rules(there, way_out * (group == g).astype(float))[1]
         if numbers.output_limits is not None:
             low, high = numbers.output_limits
             y = y.at_least(low).at_most(high)

@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from types import MappingProxyType
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -12,7 +11,8 @@ from numpy.typing import ArrayLike
 from .._validation import check_count, position_of
 from ..antecedent import TreeAntecedent
 from ..export import fold, fold_with_rows
-from ..export.folding import by_column, fold_with_reader
+from ..export.columns import by_column
+from ..export.folding import fold_with_reader
 from .labels import as_label, title_of
 from .rules import has_training_data
 from .sentences import PRECISION, rounded
@@ -306,7 +306,7 @@ def _position(feature, names, what="input"):
     )
 
 
-def _section(model, both, n_points, held=None, levels=MappingProxyType({})):
+def _section(model, both, n_points, held, levels):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 
     The others take their value in ``held``, or their mean in training, in few digits, or what is

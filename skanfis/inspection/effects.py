@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from ..export.columns import by_column
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, covariances, draw
@@ -229,11 +230,8 @@ class Study:
             raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
         if not isinstance(groups, Mapping | None):
             raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
-        found: dict[str, tuple[int, ...]] = {}
-        for name, level in read.levels.items():
-            of_column = found.get(level.column, ())
-            found[level.column] = (*of_column, model.input_names.index(name))
-        found = {column: inputs for column, inputs in found.items() if len(inputs) > 1}
+        place, categories = model.input_names.index, by_column(read.levels)[0].items()
+        found = {name: tuple(map(place, own)) for name, own in categories if len(own) > 1}
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):
                 raise ValueError(f"groups[{label!r}] is {columns!r}: a list of columns is needed.")

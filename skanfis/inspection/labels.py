@@ -3,7 +3,8 @@
 import unicodedata
 from textwrap import fill
 
-# Some scripts are not written without them.
+# Categories of what no reader sees; and joiners, without which some scripts are not written.
+_HIDDEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")
 _JOINERS = "\u200c\u200d"
 # Inputs that a title names, and its letters in a line.
 _MOST_HELD, _LETTERS = 4, 60
@@ -12,7 +13,9 @@ _MOST_HELD, _LETTERS = 4, 60
 def printable(text):
     """The text with escapes for what no reader sees: control signs, lone surrogates, line ends."""
     return "".join(
-        sign.encode("unicode_escape").decode("ascii") if _is_hidden(sign) else sign
+        sign.encode("unicode_escape").decode("ascii")
+        if unicodedata.category(sign) in _HIDDEN and sign not in _JOINERS
+        else sign
         for sign in str(text)
     )
 
@@ -29,9 +32,3 @@ def title_of(held, *notes):
     more = len(values) - _MOST_HELD
     others = [f"{more} more inputs held"] if more > 0 else []
     return fill("; ".join([*values[:_MOST_HELD], *others, *notes]), _LETTERS)
-
-
-def _is_hidden(sign):
-    """Whether it is no sign that a reader sees."""
-    category = unicodedata.category(sign)
-    return (category[0] == "C" or category in ("Zl", "Zp")) and sign not in _JOINERS

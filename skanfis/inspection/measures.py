@@ -27,7 +27,6 @@ _CONSTANT = 16.0 * np.finfo(float).eps
 class Measures:
     """What was found on rows; errors are in standard deviations of the target."""
 
-    weight: float  # of all rows
     deviation: np.ndarray  # standard deviation of the target; one of a constant, (n_outputs,)
     rule_weights: np.ndarray  # part of the rows' weight on which each rule fires, (n_rules,)
     rule_rows: np.ndarray  # weight of the rows on which it is the strongest, (n_rules,)
@@ -101,7 +100,6 @@ def measures_of(target, sums):
     rows = lead[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         return Measures(
-            weight=weight,
             deviation=_scale(target),
             rule_weights=mass / weight,
             rule_rows=lead,

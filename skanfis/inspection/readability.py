@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import check_finite, positive_weights
-from ..export.folding import Level, fold_with_reader
+from ..export.columns import Level
+from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
@@ -87,20 +88,20 @@ class Readability:
     @property
     def rules(self) -> Any:
         """The rules; see the class."""
-        found, model = self.measures, self._said.model
+        found, said = self.measures, self._said
+        premises = np.array(premise_texts(said.model, self.levels), dtype=object)
+        rule = np.repeat(np.arange(premises.size), self.model.n_outputs)
         return pd.DataFrame(
             {
-                "if": np.repeat(
-                    np.array(premise_texts(model, self.levels), dtype=object), model.n_outputs
-                ),
-                "output": list(model.output_names) * model.n_rules,
-                "weight": np.repeat(found.rule_weights, model.n_outputs),
-                "rows": np.repeat(found.rule_rows, model.n_outputs),
+                "if": premises[rule],
+                "output": list(self.model.output_names) * premises.size,
+                "weight": found.rule_weights[rule],
+                "rows": found.rule_rows[rule],
                 "alone": found.rule_alone.ravel(),
                 "error": self.rule_errors.ravel(),
-                "numbers": np.repeat(self._said.n_numbers, model.n_outputs),
+                "numbers": said.n_numbers[rule],
             },
-            index=pd.Index(np.repeat(np.arange(model.n_rules), model.n_outputs), name="rule"),
+            index=pd.Index(rule, name="rule"),
         )
 
     @property

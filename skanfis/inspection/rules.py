@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from .._validation import check_count
 from ..export import fold
 from ..export.folding import fold_with_reader, last_step
-from ..model import TSKModel
 from ..policies import MOST_DIGITS
 from .sentences import Sentences
 
@@ -65,8 +64,7 @@ def parts_led(model):
 
 def readability_in_training(estimator, model, levels):
     """The fit's ``readability_`` in the names of ``model``, the whole; None where there is none."""
-    last = None if isinstance(estimator, TSKModel) else last_step(estimator)
-    found = getattr(last, "readability_", None)
+    found = getattr(last_step(estimator), "readability_", None)
     if found is None:
         return None
     # Columns that were moved and not scaled have the same numbers, rounded as they were.

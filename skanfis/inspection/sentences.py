@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..antecedent.tree import CRISP
-from ..export.folding import Level
+from ..export.columns import Level
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..policies import MOST_DIGITS

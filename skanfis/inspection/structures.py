@@ -7,7 +7,6 @@ from typing import Any, Self
 import numpy as np
 
 from ..export.folding import last_step
-from ..model import TSKModel
 from ..search.choice import tolerated
 from .displays import _axes, _pyplot
 
@@ -65,7 +64,7 @@ class StructureDisplay:
         ax : matplotlib Axes, default=None
             None makes a figure.
         """
-        last: Any = estimator if isinstance(estimator, TSKModel) else last_step(estimator)
+        last = last_step(estimator)
         every = getattr(last, "structures_", [])
         structures = [one for one in every if np.isfinite(one["expected_error"])]
         if not structures:

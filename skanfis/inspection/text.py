@@ -10,7 +10,8 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..export.folding import by_column, fold_with_reader
+from ..export.columns import by_column
+from ..export.folding import fold_with_reader
 from ..policies import MOST_DIGITS, SILENT, policy_in_words
 from .rules import (
     condition,
@@ -124,12 +125,12 @@ def export_text(
     parts += [_wrapped(f"Common to the rules, {line}.") for line in common]
     if common:
         parts[-1] += f"\n{_IN_PLACE}"
-    premises, words = premise_texts(model, said.levels), ["THEN", *[" AND"] * model.n_outputs]
+    premises = premise_texts(model, said.levels)
     for r in chosen:
         heading = ", ".join([f"Rule {r}", *_on_rows(model, found, r)])
         lines = [f"IF {premises[r]}"]
-        for k, (word, name) in enumerate(zip(words, model.output_names, strict=False)):
-            lines.append(f"{word} {name} is {_conclusion(said, r, k)}")
+        for k, name in enumerate(model.output_names):
+            lines.append(f"{' AND' if k else 'THEN'} {name} is {_conclusion(said, r, k)}")
         parts.append("\n".join([f"{heading}:", *(_wrapped(one, "  ", 7 * " ") for one in lines)]))
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
@@ -306,7 +307,10 @@ def _legend(said, precision):
     named = list(compress(model.memberships(), ~said.says_where))
     # Columns of one category are called by it.
     called = [said.levels.get(name, (name,))[0] for name in model.input_names]
-    with_part = set(compress(called, _has_part(said)))
+    has_part = said.is_own.any(axis=(0, 2)) | said.common.any(axis=1)
+    has_part[model.antecedent.term_inputs] = True
+    # Where nothing is predicted outside the range of any input, all of them have.
+    with_part = set(called if model.out_of_bounds in SILENT else compress(called, has_part))
     unnamed = list(dict.fromkeys(one for one in called if one not in with_part))
     without_indicator = by_column(said.levels)[1]
     categories: dict[str, list[int]] = {}
@@ -346,16 +350,6 @@ def _legend(said, precision):
     if model.n_rules == 1 and not model.antecedent.n_terms:
         how = _HOW_OF_ONE
     return "\n".join([*lines, "", _wrapped(how)])
-
-
-def _has_part(said):
-    """Inputs that are told of: with terms, or with a slope that is written, (n_inputs,)."""
-    model = said.model
-    if model.out_of_bounds in SILENT:
-        # Outside the range of any input nothing is predicted.
-        return np.ones(model.n_inputs, dtype=bool)
-    has_terms = np.isin(np.arange(model.n_inputs), model.antecedent.term_inputs)
-    return has_terms | said.is_own.any(axis=(0, 2)) | said.common.any(axis=1)
 
 
 def _term_text(term, locations):

@@ -8,7 +8,8 @@ import numpy as np
 
 from .._validation import check_choice
 from ..antecedent import TreeAntecedent
-from ..export.folding import Level, fold_with_reader
+from ..export.columns import Level
+from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .displays import _axes, _position, _section
 from .labels import as_label, title_of
@@ -158,7 +159,7 @@ class TreeDisplay:
     def _draw_plane(self, ax):
         model, both = self.model, np.unique(self.model.antecedent.term_inputs)
         ax = self.ax_ = _axes(ax)
-        axes, rows, held = _section(model, both, _N_POINTS, levels=self.levels)
+        axes, rows, held = _section(model, both, _N_POINTS, None, self.levels)
         response = model.predict(rows)[:, self.output].reshape(_N_POINTS, _N_POINTS)
         colours = ax.pcolormesh(*axes, response, shading="nearest", rasterized=True)
         name = as_label(model.output_names[self.output])

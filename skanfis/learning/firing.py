@@ -48,21 +48,23 @@ def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients:
     n_rules, n_inputs = antecedent.n_rules, firing.second.shape[1] - 1
     known = np.flatnonzero(firing.n_distinct)
     center, factor = np.zeros((n_rules, n_inputs)), np.zeros((n_rules, n_inputs, n_inputs))
-    mass = firing.second[known, 0, 0]
-    center[known] = firing.second[known, 0, 1:] / mass[:, None]
-    squares = firing.second[known, 1:, 1:] / mass[:, None, None]
-    factor[known] = inverse_factor(squares, center[known])
+    center[known], factor[known] = places(firing.second[known])
     radius = rows.reduce(
         partial(_radii, antecedent=antecedent, center=center, factor=factor), np.maximum
     )
     return RuleSupport(firing.n_distinct / n_coefficients, center, factor, radius)
 
 
-def inverse_factor(second, center):
-    """Lower triangular W with W' W the inverse of the thickened covariances."""
-    covariance = second - center[:, :, None] * center[:, None, :]
+def places(second):
+    """Means of the rows of rules, and lower triangular W, W' W the inverse of their covariances.
+
+    ``second`` are sums of s w_r [1, z] [1, z]'; covariances are thickened.
+    """
+    moments = second / np.maximum(second[:, :1, :1], np.finfo(float).tiny)
+    center = moments[:, 0, 1:].copy()
+    covariance = moments[:, 1:, 1:] - center[:, :, None] * center[:, None, :]
     covariance += _THICKNESS**2 * np.eye(center.shape[1])
-    return np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
+    return center, np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def _sums(rows, antecedent, enough):

@@ -272,7 +272,6 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
 
 
 def _model(sums, problem, evaluation):
-    """The model in the user's units."""
     posterior = None
     if sums.n_rows > 1:
         # Premises stay: what is not known of them is not counted.

@@ -27,8 +27,6 @@ from ..search import Start
 
 @dataclass(frozen=True, eq=False)
 class ValidatedData:
-    """Validated data."""
-
     X: np.ndarray
     y: np.ndarray  # (n_rows, n_outputs)
     sample_weight: np.ndarray | None  # positive

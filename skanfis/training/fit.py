@@ -69,7 +69,8 @@ def fit_rules(
     else:
         run, weights = fit.robust_run()
     fit.warn_unless_converged(run)
-    return fit.frozen(run, weights)
+    fitted = fit.frozen(run, weights)
+    return fitted if data.constraints is None else fit.constrained(fitted, run, weights)
 
 
 class _Fit:
@@ -211,15 +212,10 @@ class _Fit:
         )
 
     def frozen(self, run: SolverRun, weights: np.ndarray | None) -> Fitted:
-        """The model, with its posterior, the range it may be followed to, and what is known kept.
+        """The model of a run, with its posterior and the range it may be followed to.
 
         ``weights`` are those of Huber's loss.
         """
-        fitted = self._free(run, weights)
-        return fitted if self.data.constraints is None else self._constrained(fitted, run, weights)
-
-    def _free(self, run, weights):
-        """The model of a run, whatever is known."""
         rows = self.rows
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
@@ -242,16 +238,9 @@ class _Fit:
             every = np.full(len(self.data.X), np.nan)
             every[self.trained_on] = weights
             weights = self.data.over_all(every, np.nan)
-        return Fitted(
-            model,
-            run.result,
-            run.start,
-            redundant,
-            weights,
-            run.validation_losses,
-        )
+        return Fitted(model, run.result, run.start, redundant, weights, run.validation_losses)
 
-    def _constrained(self, fitted, run, weights):
+    def constrained(self, fitted, run, weights):
         """A model next to it that keeps what is known, its result, and a report."""
         evaluation, constraints = run.evaluation, self.data.constraints
         if evaluation.normal is None:
@@ -263,7 +252,7 @@ class _Fit:
         kept, report = constrained(fitted.model, evaluation, run.problem, constraints, rows)
         if kept.free is not evaluation:
             moved = replace(run.result, evaluation=kept.free)
-            fitted = self._free(replace(run, result=moved), weights)
+            fitted = self.frozen(replace(run, result=moved), weights)
         model = replace(fitted.model, coefficients=kept.coefficients)
         target, posterior = model.target, model.posterior
         return replace(

@@ -10,12 +10,11 @@ import numpy as np
 
 from ..antecedent import strongest_rules
 from ..learning.data import Scale
-from ..learning.firing import FIRES, inverse_factor
+from ..learning.firing import FIRES, places
 from ..support import RuleSupport
 
 # Rows of a rule that are kept because one of them may be its farthest.
 _MOST_FAR = 8
-_TINY = float(np.finfo(float).tiny)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,13 +68,17 @@ class RuleRows:
         """The rows of both, of which the sums are on this scale."""
         second = self.second + other.second
         distinct = np.unique(np.vstack([self.distinct, other.distinct]), axis=0)
+        far = np.vstack([self.farthest, other.farthest])
+        rules, distance = _distances(far, second, scale)
+        # By rule, the farthest first: a few, since one more row may change who it is.
+        far = far[np.lexsort((-distance, rules))]
         return RuleRows(
             second,
             self.strongest + other.strongest,
             np.maximum(self.peak, other.peak),
             np.maximum(self.extent, other.extent),
             _first_of_each(distinct, second.shape[1]),
-            _far_rows(np.vstack([self.farthest, other.farthest]), second, scale),
+            _first_of_each(far, _MOST_FAR),
         )
 
     def on(self, shift, factor):
@@ -87,7 +90,7 @@ class RuleRows:
         """The support of every rule, in the units of X."""
         counts = np.bincount(self.distinct[:, 0].astype(int), minlength=len(self.second))
         known = counts > 0
-        center, factor = _places(self.second)
+        center, factor = places(self.second)
         center[~known], factor[~known] = 0.0, 0.0
         radius = np.zeros(known.size)
         rules, distance = _distances(self.farthest, self.second, scale)
@@ -112,22 +115,9 @@ def _first_of_each(table, most):
     return table[rank < most]
 
 
-def _places(second):
-    """Mean and inverse factor of the covariance of the rows of every rule."""
-    moments = second / np.maximum(second[:, :1, :1], _TINY)
-    center = moments[:, 0, 1:].copy()
-    return center, inverse_factor(moments[:, 1:, 1:], center)
-
-
 def _distances(farthest, second, scale):
     """The rules of rows that were far, and Mahalanobis' distances from these rules' centres."""
     rules = farthest[:, 0].astype(int)
-    center, factor = _places(second)
+    center, factor = places(second)
     away = (farthest[:, 1:] - scale.offset) / scale.scale - center[rules]
     return rules, np.linalg.norm(np.einsum("nij,nj->ni", factor[rules], away), axis=1)
-
-
-def _far_rows(rows, second, scale):
-    """Of rows by their rules the few farthest of each: one more row may change who is."""
-    rules, distance = _distances(rows, second, scale)
-    return _first_of_each(rows[np.lexsort((-distance, rules))], _MOST_FAR)

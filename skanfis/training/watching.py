@@ -60,11 +60,10 @@ class Callbacks:
     """
 
     def __init__(self, estimator, context, data):
-        self.estimator, self.context, self.data = estimator, context, data
+        self.context, self.given = context, {"estimator": estimator, **data}
 
     def begin(self):
-        """Tell of the beginning of the fit."""
-        self.context.call_on_fit_task_begin(estimator=self.estimator, **self.data)
+        self.context.call_on_fit_task_begin(**self.given)
 
     def iteration(self, make_model):
         """Tell of an iteration that has just ended; whether a callback wants to stop.
@@ -72,18 +71,15 @@ class Callbacks:
         ``make_model`` makes the model as it is then, if a callback asks for it.
         """
         context = self.context.subcontext(task_name="iteration")
-        context.call_on_fit_task_begin(estimator=self.estimator, **self.data)
+        context.call_on_fit_task_begin(**self.given)
         return self._end(context, make_model)
 
     def end(self, model):
-        """Tell of the end of the fit."""
         self._end(self.context, lambda: model)
 
     def _end(self, context, make_model):
         return context.call_on_fit_task_end(
-            estimator=self.estimator,
-            reconstruction_attributes=lambda: {"model_": make_model()},
-            **self.data,
+            reconstruction_attributes=lambda: {"model_": make_model()}, **self.given
         )
 
 

@@ -4,7 +4,6 @@ Every pattern is anchored and passes over its line once, whatever the line holds
 """
 
 import re
-from collections import Counter
 from functools import partial
 from math import prod
 from os import PathLike
@@ -12,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
 from ...model import TSKModel
 from ...naming import distinct as distinct  # the application may take it from export alone
+from ..json_reader import rule_base
 from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
 from .functions import theta_of
 
@@ -286,27 +285,18 @@ def _numbers_of_terms(entry, text, variables, kind, lowest):
 
 
 def _model(inputs, outputs, antecedents, consequents):
-    rows = _grid_rows(inputs, antecedents)
-    if rows is not None:
-        antecedents, consequents = antecedents[rows], consequents[rows]
+    kind, rows = _kind_and_order(inputs, antecedents)
+    antecedents, consequents = antecedents[rows], consequents[rows]
+    premises = np.flatnonzero(antecedents.any(axis=0))
     # Input and number of each term that a rule looks at, input by input.
     places: list = [(j, k) for j, own in enumerate(antecedents.T) for k in np.unique(own) if k > 0]
-    premises = np.flatnonzero(antecedents.any(axis=0))
-    is_scattered = rows is None and _is_scattered(inputs, antecedents)
-    if is_scattered:
+    if kind == "scattered":
         places = [(j, rule[j]) for rule in antecedents for j in premises]
     groups = groups_of((j, *inputs[j].terms[k - 1]) for j, k in places)
-    antecedent: Antecedent
-    if rows is not None:
-        counts = tuple(Counter(j for j, _ in places).values())
-        antecedent = GridAntecedent(groups, counts=counts)
-    elif is_scattered:
-        antecedent = ScatteredAntecedent(groups, n_premise_inputs=premises.size)
-    else:
-        table = np.full(antecedents.shape, -1)
-        for t, (j, k) in enumerate(places):
-            table[antecedents[:, j] == k, j] = t
-        antecedent = RuleTableAntecedent(groups, table)
+    table = np.full(antecedents.shape, -1)
+    for t, (j, k) in enumerate(places):
+        table[antecedents[:, j] == k, j] = t
+    antecedent = rule_base(kind, groups, table if kind == "table" else table[:, premises])
     names = [distinct(variable.names) for variable in inputs]
     # Constants beside linear consequents have no slopes.
     n_basis = max(len(term) for output in outputs for term in output.terms)
@@ -335,27 +325,25 @@ def _model(inputs, outputs, antecedents, consequents):
     )
 
 
-def _grid_rows(inputs, antecedents):
-    """Where the rules of a full grid stand, in C order; None where they are no grid.
+def _kind_and_order(inputs, antecedents):
+    """Which rule base the rules are, and where its first, second, ... stand in the file.
 
-    A grid has at least two terms of one family, in order, on every input that it looks at.
+    Rules of a grid are all combinations, in C order, of at least two terms of one family, in order,
+    on every input that they look at. Scattered rules look at the same inputs, by terms of their own
+    and of one family.
     """
-    used = [(one, np.unique(own)) for one, own in zip(inputs, antecedents.T, strict=True)]
-    used = [(variable, own) for variable, own in used if own.any()]
-    for variable, own in used:
-        families, thetas = zip(*(variable.terms[k - 1] for k in own), strict=True)
-        is_ordered = np.all(np.diff([theta[0] for theta in thetas]) > 0.0)
-        if own.size == 1 or own[0] == 0 or len(set(families)) > 1 or not is_ordered:
-            return None
-    rows = np.unique(antecedents, axis=0, return_index=True)[1]
-    is_full = len(antecedents) == rows.size == prod(own.size for _, own in used)
-    return rows if is_full else None
-
-
-def _is_scattered(inputs, antecedents):
-    """Whether all rules look at the same inputs, by terms of their own and of one family."""
+    every = np.arange(len(antecedents))
     used = [(one, own) for one, own in zip(inputs, antecedents.T, strict=True) if own.any()]
-    families = {one.terms[k - 1][0] for one, own in used for k in own if k > 0}
-    return len(families) == 1 and all(
-        own.min() > 0 and np.unique(own).size == own.size for _, own in used
-    )
+    terms = [[one.terms[k - 1] for k in np.unique(own) if k > 0] for one, own in used]
+    families = [{family for family, _ in of_input} for of_input in terms]
+    places = [[theta[0] for _, theta in of_input] for of_input in terms]
+    has_all = all(own.min() > 0 for _, own in used)
+    if has_all and all(
+        len(own) > 1 and len(of_input) == 1 and np.all(np.diff(own) > 0.0)
+        for own, of_input in zip(places, families, strict=True)
+    ):
+        order = np.unique(antecedents, axis=0, return_index=True)[1]
+        if every.size == order.size == prod(map(len, terms)):
+            return "grid", order
+    is_own = has_all and all(len(own) == every.size for own in terms)
+    return "scattered" if is_own and len(set().union(*families)) == 1 else "table", every

@@ -1,0 +1,101 @@
+"""The inputs of a folded model, taken out of tables; what those that encode a category tell."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from sklearn.utils import check_array
+
+from .._sklearn import safe_indexing
+from .._validation import check_finite
+
+
+class Level(NamedTuple):
+    """A level of a raw column, and all others, where there can be no more."""
+
+    column: str
+    level: str
+    others: tuple[str, ...]
+
+    def said(self, value):
+        """Say "fibre is PM" of a 1; of a 0 "fibre is not PM", or, of two levels, the other."""
+        is_not = self.others[0] if len(self.others) == 1 else f"not {self.level}"
+        return f"{self.column} is {self.level if value else is_not}"
+
+
+@dataclass(frozen=True)
+class Column:
+    """Raw column ``source`` as x = offset + scale z, or output ``place`` of what encodes it."""
+
+    source: int
+    name: str
+    offset: float = 0.0
+    scale: float = 1.0
+    encode: Callable[..., np.ndarray] | None = None
+    place: int = -1
+    level: Level | None = None  # what it tells, if it is such an output
+    fill: Any = None  # in the place of what is missing
+
+    def values(self, X):
+        """The input on the rows of the user's table."""
+        if self.encode is not None:
+            return self.encode(X)[:, self.place].astype(np.float64)
+        numbers = _as_numbers(part_of(X, [self.source]))[:, 0]
+        return numbers if self.fill is None else np.where(np.isnan(numbers), self.fill, numbers)
+
+
+def by_column(levels):
+    """Names of indicators by the raw column, and what the levels without one are called."""
+    found: dict[str, list[str]] = {}
+    for name, level in levels.items():
+        found.setdefault(level.column, []).append(name)
+    unnamed = {}
+    for column, names in found.items():
+        named = {levels[name].level for name in names}
+        others = [other for other in levels[names[0]].others if other not in named]
+        unnamed[column] = others or ["other"]
+    return found, unnamed
+
+
+@dataclass(frozen=True)
+class Reader:
+    """Takes the inputs of a model out of tables with columns of these names."""
+
+    inputs: list[Column]
+    names: list[str]
+    is_named: bool
+
+    @property
+    def levels(self) -> dict[str, Level]:
+        """What each indicator tells, by its name, such as "fibre_PM"."""
+        return {one.name: one.level for one in self.inputs if one.level is not None}
+
+    def __call__(self, X) -> np.ndarray:
+        """The rows; ValueError for other columns, and for numbers that are not finite."""
+        given = getattr(X, "columns", None)
+        if self.is_named and given is not None and list(given) != self.names:
+            raise ValueError(
+                f"X must have the columns {', '.join(map(repr, self.names))}, in this order; it "
+                f"has {', '.join(map(repr, given))}."
+            )
+        table = X if any(one.encode for one in self.inputs) else _as_numbers(X)
+        n_columns = np.shape(table)[1]
+        if n_columns != len(self.names):
+            raise ValueError(
+                f"X has {n_columns} columns, the estimator takes {len(self.names)}: "
+                f"{', '.join(map(repr, self.names))}."
+            )
+        rows = np.column_stack([one.values(table) for one in self.inputs])
+        check_finite(rows, "X", [one.name for one in self.inputs])
+        return rows
+
+
+def _as_numbers(X):
+    return check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
+
+
+def part_of(X, columns):
+    """Columns of a frame, or of anything that is an array, by their positions."""
+    table = X if hasattr(X, "columns") else np.asarray(X, dtype=object)
+    return safe_indexing(table, columns, axis=1)
