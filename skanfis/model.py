@@ -201,20 +201,14 @@ class TSKModel:
 
     def _rows(self, X) -> np.ndarray:
         """Rows as an array: the inputs of a table by their names; ValueError where it lacks any."""
-        if hasattr(X, "columns"):
-            lacking = [name for name in self.input_names if name not in X.columns]
-            if lacking:
-                raise ValueError(
-                    f"X lacks the column {lacking[0]!r}: the model takes "
-                    f"{', '.join(map(repr, self.input_names))}."
-                )
-            X = X[list(self.input_names)]
-        X = np.asarray(X, dtype=float)
-        if X.ndim != 2 or X.shape[1] != self.n_inputs:
-            raise ValueError(
-                f"X has the shape {X.shape}; the model takes (n_rows, {self.n_inputs}): "
-                f"{', '.join(map(repr, self.input_names))}."
-            )
+        is_table = hasattr(X, "columns")
+        lacking = [name for name in self.input_names if name not in X.columns] if is_table else []
+        if not lacking:
+            X = np.asarray(X[list(self.input_names)] if is_table else X, dtype=float)
+        if lacking or X.ndim != 2 or X.shape[1] != self.n_inputs:
+            what = f"lacks the column {lacking[0]!r}" if lacking else f"has the shape {X.shape}"
+            names = ", ".join(map(repr, self.input_names))
+            raise ValueError(f"X {what}: the model takes {names}.")
         return X
 
     def in_bounds(self, X) -> np.ndarray:
@@ -224,6 +218,7 @@ class TSKModel:
 
     def strengths(self, X) -> np.ndarray:
         """Normalised firing strengths, shape (n_rows, n_rules); those of the nearest in-box row."""
+        X = self._rows(X)
         return self._by_block(X, lambda Z: self.antecedent.strengths(self._clip(Z)), self.n_rules)
 
     def apply(self, X) -> np.ndarray:
@@ -296,7 +291,7 @@ class TSKModel:
         def of_block(Z):
             return linearised(self._clip(Z))[1].reshape(-1, Z.shape[1])
 
-        n_values = self.n_inputs * self.n_outputs
+        X, n_values = self._rows(X), self.n_inputs * self.n_outputs
         by_row = self._by_block(X, of_block, n_values, self._n_slopes)
         return by_row.reshape(-1, self.n_inputs, self.n_outputs)
 
@@ -404,7 +399,6 @@ class TSKModel:
 
         It takes ``n_more`` values per row besides strengths and outputs.
         """
-        X = self._rows(X)
         n_rows = X.shape[0]
         values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms + n_more
         step = max(BLOCK_BYTES // (8 * values_per_row), FEWEST_ROWS)

@@ -268,9 +268,7 @@ def test_a_table_is_read_by_its_names_and_other_shapes_are_refused(rng):
     name = frozen.input_names[1]
     with pytest.raises(ValueError, match=f"X lacks the column '{name}': the model takes '"):
         frozen.predict(table.drop(columns=name))
-    with pytest.raises(
-        ValueError, match=r"X has the shape \(200, 2\); the model takes \(n_rows, 3\)"
-    ):
+    with pytest.raises(ValueError, match=r"X has the shape \(200, 2\): the model takes '"):
         frozen.strengths(X[:, :2])
 
 

@@ -15,6 +15,7 @@ then all that are below. Both sides have one cut and one width.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import linalg
 
 from ..membership import SigmoidFalling, SigmoidRising
 from .base import TermGroup
@@ -96,19 +97,15 @@ class TreeAntecedent(RuleTableAntecedent):
         other, the truth of one times that of the other, by more than the tolerance.
         """
         nodes, table = self.groups[0], self.table.copy()
-        # Below cut k, and above cut m, by (k, m).
+        # Of two cuts k and m of one input, whether what is below k is below m too.
         is_less = nodes.inputs[:, None] == nodes.inputs
         is_less &= nodes.theta[0][:, None] < nodes.theta[0]
         for k, m in np.argwhere(is_less):
-            if not _overlap(nodes.theta[:, [k, m]]) <= tolerance:
-                is_less[k, m] = False
+            is_less[k, m] = _overlap(nodes.theta[:, [k, m]]) <= tolerance
+        implies = linalg.block_diag(is_less.T, is_less)
         for row in table:
-            on_path = row[row >= 0]
-            above = on_path[on_path < self.n_nodes]
-            below = on_path[on_path >= self.n_nodes] - self.n_nodes
-            implied = [m + self.n_nodes for m in below if is_less[below, m].any()]
-            implied += [k for k in above if is_less[k, above].any()]
-            row[np.isin(row, implied)] = -1
+            own = row[row >= 0]
+            row[np.isin(row, own[implies[np.ix_(own, own)].any(axis=0)])] = -1
         return self if (table == self.table).all() else RuleTableAntecedent(self.groups, table)
 
     def factors(self, Z):
@@ -121,7 +118,6 @@ class TreeAntecedent(RuleTableAntecedent):
 
 def _overlap(theta):
     """The most that x is below the first of two cuts times above the second."""
-    widths = np.exp(theta[1])
     # The product has its peak within some widths of one of them.
-    x = (theta[0] + _AROUND[:, None] * widths).ravel()
+    x = (theta[0] + _AROUND[:, None] * np.exp(theta[1])).ravel()
     return (SigmoidFalling.value(x, theta[:, :1]) * SigmoidRising.value(x, theta[:, 1:])).max()

@@ -32,8 +32,7 @@ _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
 # Steps of 20 times the usual one are no noise; glitches are rare.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LEAST_CORRELATION = 0.9  # of output and rate
-# Rows at which one value of the output is no chance, and the part of the range of rates that they
-# then have.
+# Rows at which one value of the output is no chance, and their part of the range of rates then.
 _FEWEST_SATURATED, _SATURATED = 3, 0.02
 # What an error says of it; of a file its name is put in.
 RATE_COLUMN = "column of the rate"
@@ -302,16 +301,13 @@ def _check_saturation(output, rate):
     values = np.unique(output)
     # As many rates as the resolution of the output leaves to one value, and no more than noise.
     step = np.ptp(rate) * max(_SATURATED, 3.0 / values.size)
-    for value, end in ((values[-1], "largest"), (values[0], "smallest")):
+    for value in values[[0, -1]]:
         at = np.flatnonzero(output == value)
         low, high = rate[at].min(), rate[at].max()
         if at.size >= _FEWEST_SATURATED and high - low > step:
-            raise LogError(
-                f"stands at {value:.6g}, the {end} value, in {at.size} rows, at rates from "
-                f"{low:.4g} to {high:.4g} deg/s: it is saturated. Leave these rows out.",
-                "output",
-                int(at[0]),
-            )
+            told = f"stands at {value:.6g} in {at.size} rows, at rates from {low:.4g} to {high:.4g}"
+            reason = f"{told} deg/s: it is saturated. Leave these rows out."
+            raise LogError(reason, "output", int(at[0]))
 
 
 def find_glitches(log, error):

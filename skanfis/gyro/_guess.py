@@ -175,12 +175,8 @@ def _guess(source, request, layout, first):
     _settle_units(columns, layout, of_first)
     layout.notes.append(_sentence(layout))
     if "time" not in layout.places:
-        named = [column for column in columns if column.score("time") > 0.0 and column.numbers.size]
-        layout.notes += [
-            f"{column.name!r} is not used: it neither rises nor falls throughout, as a time would"
-            for column in named[:1]
-            if not column.can_be("time")
-        ]
+        named = [one.name for one in columns if one.score("time") > 0.0 and one.numbers.size]
+        layout.notes += [f"{name!r} is not used: no time goes up and down" for name in named[:1]]
 
 
 class _Column:

@@ -201,10 +201,7 @@ def _text_of(compensator):
 
 
 def features(log, inputs, time_constant):
-    """Columns that are known on board, in the order of ``inputs``.
-
-    Time counts from power-on: where ``read_log`` found it, else from the first row of each run.
-    """
+    """Columns that are known on board, in the order of ``inputs``; time is since power-on."""
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log))
     columns = {}
     for name in inputs:

@@ -28,7 +28,7 @@ from .metrics import rows_by_run
 _ROWS = 100_000  # of a piece, which is all that is held of a file's texts
 # A rest without power is longer than what a logger drops, and than a few of its steps.
 _SHORTEST_GAP = 60.0  # s
-_STEPS, _NOTED_STEPS = 50.0, 5.0
+_STEPS = 50.0
 _FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
 _SHORTEST_RUN = 3  # rows, at the end of a file
 _BEGINNING = 0.1  # part of a run, where a clock is again that has been set anew
@@ -320,12 +320,6 @@ class LogFile:
             )
             code = code[:-n_last]
         if not code[-1]:
-            usual = np.median(steps[1:]) if len(steps) > 1 else 0.0
-            if (far := np.count_nonzero(steps > _NOTED_STEPS * usual)) and usual > 0.0:
-                self.notes.append(
-                    f"{self.path}: is taken as one run, although the time steps by up to "
-                    f"{steps.max():.4g} s, {far} time(s) by more than {_NOTED_STEPS:g} usual steps"
-                )
             return pd.Categorical.from_codes(code, [""])
         self.notes.append(
             f"{self.path}: is split into {code[-1] + 1} runs, where the time begins anew or steps "

@@ -247,10 +247,7 @@ class DrawnAnova:
         return np.maximum([self.variance - self.closed(every - {g}) for g in every], 0.0)
 
     def conditionals(self, subsets, X):
-        """At rows X in the box, y with all but x_v drawn, less the mean: on average E[y | x_v].
-
-        What has no part in any rule changes neither that nor what is drawn.
-        """
+        """At rows X in the box, y with all but x_v drawn, less the mean: on average E[y | x_v]."""
         found = np.zeros((len(subsets), len(X)))
         for one, subset in zip(found, subsets, strict=True):
             if parts := sorted(g for g in subset if self.has_part[g]):

@@ -70,13 +70,7 @@ class MembershipDisplay:
     inputs: Any
 
     @classmethod
-    def from_estimator(
-        cls,
-        estimator: Any,
-        X: ArrayLike | None = None,
-        *,
-        ax: Any = None,
-    ) -> Self:
+    def from_estimator(cls, estimator: Any, X: ArrayLike | None = None, *, ax: Any = None) -> Self:
         """Draw the memberships of a fitted estimator.
 
         Parameters

@@ -96,6 +96,11 @@ class Sentences:
         )
 
     @property
+    def called(self) -> list[str]:
+        """The column that each input is of; those of one category by its name."""
+        return [self.levels.get(name, (name,))[0] for name in self.model.input_names]
+
+    @property
     def printed(self) -> TSKModel:
         """The model that the written numbers are."""
         model = self.model

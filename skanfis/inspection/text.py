@@ -246,18 +246,14 @@ def _conclusion(said, r, k):
 def _slopes(said, slopes, places, is_said):
     """Say "+5.8 per rooms from 6.3", "-2.1 if private is 1"; what does most comes first.
 
-    Levels of one category stand together. Of no slope, which stands in place of a common one, "no
-    change with rooms".
+    Levels of a category stand together; none in place of a common one is "no change with rooms".
     """
-    parts, does = [], np.abs(slopes) * said.model.spread
-    owner = {
-        j: said.levels[name].column if (name := said.model.input_names[j]) in said.levels else name
-        for j in np.flatnonzero(is_said)
-    }
+    parts, does, called = [], np.abs(slopes) * said.model.spread, said.called
     most: dict[str, float] = {}
-    for j, column in owner.items():
-        most[column] = max(most.get(column, 0.0), does[j])
-    for j in sorted(owner, key=lambda j: (-most[owner[j]], owner[j], -does[j])):
+    for j in np.flatnonzero(is_said):
+        most[called[j]] = max(most.get(called[j], 0.0), does[j])
+    order = sorted(np.flatnonzero(is_said), key=lambda j: (-most[called[j]], called[j], -does[j]))
+    for j in order:
         name, slope, place = said.model.input_names[j], slopes[j], places[j]
         if said.two_valued[j]:
             other = 1.0 - place
@@ -305,8 +301,7 @@ def _legend(said, precision):
     families = [group.family for group in model.antecedent.groups]
     at = {one.name for family in families for one in family.parameters if one.kind == "location"}
     named = list(compress(model.memberships(), ~said.says_where))
-    # Columns of one category are called by it.
-    called = [said.levels.get(name, (name,))[0] for name in model.input_names]
+    called = said.called
     has_part = said.is_own.any(axis=(0, 2)) | said.common.any(axis=1)
     has_part[model.antecedent.term_inputs] = True
     # Where nothing is predicted outside the range of any input, all of them have.

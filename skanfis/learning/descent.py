@@ -233,11 +233,6 @@ class GradientDescent(_Descent):
     error_goal, tol, stiffness
         As for :class:`~skanfis.learning.Hybrid`.
 
-    References
-    ----------
-    .. [1] J.-S. R. Jang, "ANFIS: adaptive-network-based fuzzy inference system", IEEE Transactions
-       on Systems, Man, and Cybernetics 23 (1993) 665-685.
-
     Examples
     --------
     >>> from skanfis import ANFISRegressor

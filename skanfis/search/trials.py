@@ -26,15 +26,7 @@ from .grid import Spacing
 from .lasso import lasso_inputs
 from .sample import effective_weight, to_six_digits, unit_scale
 from .splits import best_splits
-from .tuning import (
-    ARRIVING,
-    FEW_TURNS,
-    FIRST_PENALTY,
-    MOST_TURNS,
-    Tuned,
-    tune,
-    with_sparse_slopes,
-)
+from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters, and at least.
 _ROWS_EACH, FEWEST_ROWS = 40, 1000

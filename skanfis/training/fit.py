@@ -31,13 +31,7 @@ from ..options import EarlyStopping, Huber, policy_of
 from ..search import Start, StructureRequest, effective_weight, report_constant
 from .data import Fitted, SolverRun, ValidatedData
 from .freezing import as_given, extrapolation_distance, frozen_model
-from .robust import (
-    huber_weights,
-    reweighted,
-    robust_start,
-    without_outliers,
-    without_weight,
-)
+from .robust import huber_weights, reweighted, robust_start, without_outliers, without_weight
 from .settings import solver_of
 from .watching import Callbacks, Printer, ValidationLoss, hold_out, watch_all
 
