@@ -130,7 +130,7 @@ class Constraints:
                     found.append(Inequality(k, float(sign), j, 0.0, what))
             for sign, limit in ((1.0, self.lower[k]), (-1.0, self.upper[k])):
                 if np.isfinite(limit):
-                    what = f"the limit {limit:g} of {name!r}"
+                    what = f"the {'lower' if sign > 0.0 else 'upper'} limit {limit:g} of {name!r}"
                     found.append(Inequality(k, sign, None, limit, what))
         return found
 
@@ -163,22 +163,20 @@ class Constraints:
 
 
 def _signs(given, input_names, n_outputs):
-    n_inputs = len(input_names)
+    n_inputs, told = len(input_names), f"monotonic_cst={given!r}"
     if isinstance(given, Mapping):
         given = {str(name): sign for name, sign in given.items()}
         if given:
             feature_indices(list(given), input_names, "monotonic_cst")
         given = [given.get(name, 0) for name in input_names]
-    signs = np.zeros(n_inputs) if given is None else _numbers(given, "monotonic_cst")
+    signs = np.zeros(n_inputs) if given is None else _numbers(given, told)
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):
         raise ValueError(
             f"monotonic_cst has shape {signs.shape}, but X has {n_inputs} columns and y "
             f"{n_outputs}: give one number per column of X, or a row of these per output."
         )
     if not np.isin(signs, (-1, 0, 1)).all():
-        raise ValueError(
-            f"monotonic_cst={given!r} must hold -1 (falling), 0 (free) and 1 (rising) alone."
-        )
+        raise ValueError(f"{told} must hold -1 (falling), 0 (free) and 1 (rising) alone.")
     return np.broadcast_to(signs, (n_outputs, n_inputs)).astype(int)
 
 
@@ -186,11 +184,11 @@ def _numbers(given, what):
     try:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{what}={given!r} must hold numbers alone.") from None
+        raise ValueError(f"{what} must hold numbers alone.") from None
 
 
 def _per_output(given, nothing, what, n_outputs):
-    values = _numbers(nothing if given is None else given, f"{what} in constraints")
+    values = _numbers(nothing if given is None else given, f"{what} in constraints={given!r}")
     if values.ndim > 1 or values.size not in (1, n_outputs) or np.isnan(values).any():
         raise ValueError(
             f"{what}={given!r} must be a number, or one for each of the {n_outputs} outputs."
@@ -207,7 +205,7 @@ def _point(given, input_names):
                 f"X, {names}, and no other."
             )
         given = [given[name] for name in input_names]
-    point = _numbers(given, "FixedPoint.x")
+    point = _numbers(given, f"FixedPoint.x={given!r}")
     if point.shape != (len(input_names),):
         raise ValueError(
             f"FixedPoint.x={given!r} must have a number for each of the {len(input_names)} "

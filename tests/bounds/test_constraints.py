@@ -278,6 +278,8 @@ def test_there_is_always_a_line(rng):
         ({"constraints": [OutputLimits(lower="a")]}, "lower in constraints='a' must hold numbers"),
         ({"constraints": [FixedPoint("abc", 1.0)]}, "FixedPoint.x='abc' must hold numbers"),
         ({"monotonic_cst": ["a", 1]}, r"monotonic_cst=\['a', 1\] must hold numbers alone"),
+        ({"monotonic_cst": {"x0": "up"}}, r"monotonic_cst={'x0': 'up'} must hold numbers alone"),
+        ({"constraints": {"lower": 0}}, r"holds {'lower': 0}: it must be OutputLimits and Fixed"),
         ({"constraints": [OutputLimits([0.0, 1.0])]}, "must be a number, or one for each of the 1"),
         ({"constraints": [FixedPoint([0.0], 1.0)]}, "a number for each of the 2 columns of X"),
         ({"constraints": [FixedPoint({"x0": 0.0}, 1.0)]}, "it must name every column of X"),
@@ -305,7 +307,7 @@ def test_there_is_always_a_line(rng):
         (
             # A line through two points leaves the limit.
             {"n_mfs": 1, "constraints": [*points_on_a_line(-0.5, 0.5), OutputLimits(upper=0.7)]},
-            "1 rule keep the limit 0.7 of 'y', with the 2 fixed points",
+            "1 rule keep the upper limit 0.7 of 'y', with the 2 fixed points",
         ),
     ],
 )
@@ -329,7 +331,7 @@ def test_a_free_fit_without_any_error_is_held_too(n_mfs, seed):
 
 def test_a_constant_keeps_a_limit_that_the_data_contradict():
     held = ANFISRegressor(n_mfs=1, order=0, constraints=[OutputLimits(lower=5.0)])
-    with pytest.warns(ConstraintWarning, match="The data contradict the limit 5 of 'y'"):
+    with pytest.warns(ConstraintWarning, match="The data contradict the lower limit 5 of 'y'"):
         held.fit(X, Y)
     assert_allclose(held.predict(X), 5.0, atol=2e-3 * Y.std())
 
