@@ -298,11 +298,11 @@ class TSKModel:
     def coverage(self, X) -> np.ndarray:
         r"""How well the training data cover each row, from 0 (not at all) to 1, (n_rows,).
 
-        With c the nearest point of the box and delta its distance in standard deviations,
+        With c the nearest point of the box and delta the way there in standard deviations::
 
-            exp(-|delta|^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2) ,
+            exp(-delta^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2)
 
-        see :class:`~skanfis.support.RuleSupport`. Zero everywhere where the model knows of no data.
+        :doc:`/mathematics` has the distances d_r. Zero everywhere where no data are known.
         """
         X, support = self._rows(X), self.support
         if support is None:
