@@ -377,8 +377,8 @@ def _since_power_on(log):
     """
     runs = log.groupby("run")
     times, start = runs["time"], runs["power_on"].first()
-    earliest, step = start.min(), log["time"].diff().abs().median()
-    notes = []
+    notes, earliest = [], start.min()
+    step = log["time"].diff().abs().median() if len(start) > 1 else 0.0
     if 0.0 <= earliest <= step and earliest + step < start.max() < times.last().min():
         late = np.count_nonzero(start > earliest + step)
         notes.append(
