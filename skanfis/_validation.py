@@ -48,6 +48,18 @@ def refuse_lazy(**tables):
             )
 
 
+def rows_by_name(X, names):
+    """Rows as an array: the columns of a table by their names; ValueError where it lacks any."""
+    is_table = hasattr(X, "columns")
+    lacking = [name for name in names if name not in X.columns] if is_table else []
+    if not lacking:
+        X = np.asarray(X[list(names)] if is_table else X, dtype=float)
+    if lacking or X.ndim != 2 or X.shape[1] != len(names):
+        what = f"lacks the column {lacking[0]!r}" if lacking else f"has the shape {X.shape}"
+        raise ValueError(f"X {what}: the model takes {', '.join(map(repr, names))}.")
+    return X
+
+
 def _check_kind(table, what):
     """Raise where a table is sparse or masked, or a column shares its name or holds times."""
     is_frame = hasattr(table, "columns") and hasattr(table, "dtypes")

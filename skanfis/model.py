@@ -22,6 +22,7 @@ from typing import Self
 
 import numpy as np
 
+from ._validation import rows_by_name
 from .antecedent import Antecedent, RuleTableAntecedent, by_group, strongest_rules
 from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import rule_outputs
@@ -199,26 +200,14 @@ class TSKModel:
                 terms.append(term | numbers)
         return terms
 
-    def _rows(self, X) -> np.ndarray:
-        """Rows as an array: the inputs of a table by their names; ValueError where it lacks any."""
-        is_table = hasattr(X, "columns")
-        lacking = [name for name in self.input_names if name not in X.columns] if is_table else []
-        if not lacking:
-            X = np.asarray(X[list(self.input_names)] if is_table else X, dtype=float)
-        if lacking or X.ndim != 2 or X.shape[1] != self.n_inputs:
-            what = f"lacks the column {lacking[0]!r}" if lacking else f"has the shape {X.shape}"
-            names = ", ".join(map(repr, self.input_names))
-            raise ValueError(f"X {what}: the model takes {names}.")
-        return X
-
     def in_bounds(self, X) -> np.ndarray:
         """Whether each row lies in the box of the training data, shape (n_rows,)."""
-        X = self._rows(X)
+        X = rows_by_name(X, self.input_names)
         return ((self.minimum <= X) & (self.maximum >= X)).all(axis=1)
 
     def strengths(self, X) -> np.ndarray:
         """Normalised firing strengths, shape (n_rows, n_rules); those of the nearest in-box row."""
-        X = self._rows(X)
+        X = rows_by_name(X, self.input_names)
         return self._by_block(X, lambda Z: self.antecedent.strengths(self._clip(Z)), self.n_rules)
 
     def apply(self, X) -> np.ndarray:
@@ -227,8 +216,9 @@ class TSKModel:
 
     def predict(self, X, inside=None) -> np.ndarray:
         """Outputs (n_rows, n_outputs) by the policy; ``inside`` is what :meth:`in_bounds` gives."""
-        X = self._rows(X)
-        inside = self.in_bounds(X) if inside is None else inside
+        if inside is None:
+            X = rows_by_name(X, self.input_names)
+            inside = self.in_bounds(X)
         if inside.all():
             return self._by_block(X, self._outputs, self.n_outputs)
         if self.out_of_bounds == "raise":
@@ -249,10 +239,12 @@ class TSKModel:
 
         NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
         """
-        X, posterior, n_values = self._rows(X), self.posterior, 2 * self.n_outputs
+        posterior, n_values = self.posterior, 2 * self.n_outputs
         if posterior is None:
             raise ValueError(self._why_no_posterior())
-        inside = self.in_bounds(X) if inside is None else inside
+        if inside is None:
+            X = rows_by_name(X, self.input_names)
+            inside = self.in_bounds(X)
         if self.out_of_bounds == "raise" and not inside.all():
             raise ValueError(self.describe_out_of_bounds(X))
 
@@ -291,7 +283,7 @@ class TSKModel:
         def of_block(Z):
             return linearised(self._clip(Z))[1].reshape(-1, Z.shape[1])
 
-        X, n_values = self._rows(X), self.n_inputs * self.n_outputs
+        X, n_values = rows_by_name(X, self.input_names), self.n_inputs * self.n_outputs
         by_row = self._by_block(X, of_block, n_values, self._n_slopes)
         return by_row.reshape(-1, self.n_inputs, self.n_outputs)
 
@@ -304,7 +296,7 @@ class TSKModel:
 
         :doc:`/mathematics` has the distances d_r. Zero everywhere where no data are known.
         """
-        X, support = self._rows(X), self.support
+        X, support = rows_by_name(X, self.input_names), self.support
         if support is None:
             return np.zeros(X.shape[0])
 
@@ -333,7 +325,7 @@ class TSKModel:
 
     def way_out(self, X) -> np.ndarray:
         """How far "linear" goes from the box towards each row, (n_rows, n_inputs)."""
-        X = self._rows(X)
+        X = rows_by_name(X, self.input_names)
         return self._followed(self._way(X.T, self._clip(X.T))).T
 
     def describe_out_of_bounds(self, X) -> str:
