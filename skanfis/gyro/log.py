@@ -385,7 +385,7 @@ def _since_power_on(log):
             f"the clock of {late} run(s) begins up to {start.max():.4g} s after power-on, which is "
             f"at {earliest:.4g} s as in the others"
         )
-        log["power_on"] = earliest
+        log = log.assign(power_on=earliest)
     if (log["power_on"] == times.transform("first")).all():
         log = log.drop(columns="power_on")
     return log, notes

@@ -533,9 +533,13 @@ def interleaved(log):
     return table.sort_values(["run", "time", "device"], kind="stable")
 
 
+def of_one_device(log):
+    return log[log["device"] == log["device"].iloc[0]].reset_index(drop=True)
+
+
 def told_by_the_clock(log):
     """No labels: the clock begins anew, and once it jumps."""
-    table = log[log["device"] == log["device"].iloc[0]][PARTS].reset_index(drop=True)
+    table = of_one_device(log)[PARTS]
     table.loc[500:, "time"] += 5000.0
     return table
 
@@ -570,3 +574,46 @@ def test_pieces_give_what_the_whole_gives(two_devices, model, kind, tmp_path, mo
         direct = GyroCompensator.read_json(model).apply(read_log(path))
         found, expected = (each["rate_compensated"] for each in (pieces, direct))
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
+
+
+def cold_starts(log, gap):
+    """Runs of one device on clocks from power-on, the second without its first rows, or values."""
+    table = of_one_device(log)[[*PARTS, "run"]]
+    early = (table["run"] == table["run"].iloc[-1]) & (table["time"] < 100.0)
+    if gap == "rows":
+        return table[~early]
+    return table.assign(output=table["output"].mask(early))
+
+
+@pytest.mark.parametrize("gap", ["rows", "values"])
+def test_time_counts_from_power_on_and_not_from_the_first_row_that_is_left(
+    two_devices, model, gap, tmp_path, say
+):
+    whole = cold_starts(two_devices, "values")
+    cold_starts(two_devices, gap).to_csv(tmp_path / "log.csv", index=False)
+    out = tmp_path / "out.csv"
+    code, told, _ = say("--apply", model, tmp_path / "log.csv", "--output", out, "--quiet")
+    assert code == 0
+    assert ("begins up to 100 s after power-on" in told) == (gap == "rows")
+    kept = whole.dropna()
+    expected = GyroCompensator.read_json(model).apply(whole.ffill().bfill()).loc[kept.index]
+    late = kept["run"].to_numpy() == kept["run"].iloc[-1]
+    settled = ~late | (kept["time"].to_numpy() > 500.0)
+    found = pd.read_csv(out)
+    assert len(found) == len(kept)
+    after, due = (each["rate_compensated"].to_numpy()[settled] for each in (found, expected))
+    np.testing.assert_allclose(after, due, rtol=1e-3)
+
+
+def test_rows_without_the_true_rate_are_compensated(two_devices, model, tmp_path, say):
+    table = of_one_device(two_devices)[[*PARTS, "run"]]
+    answers = []
+    for name, known in (
+        ("all", table),
+        ("few", table.assign(rate=table["rate"].mask(table.index < 99))),
+    ):
+        path, out = tmp_path / f"{name}.csv", tmp_path / f"{name}-out.csv"
+        known.to_csv(path, index=False)
+        assert say("--apply", model, path, "--output", out, "--quiet")[0] == 0
+        answers.append(pd.read_csv(out))
+    pd.testing.assert_frame_equal(*answers)
