@@ -229,7 +229,7 @@ class AllanDisplay(GyroDisplay):
                 raise ValueError(f"{side} is NaN in some rows; leave out these runs.")
         run, unit = rows.get("run"), self._unit
         curves = {side: allan_deviation(rows[side], sampling_interval, run) for side in SIDES}
-        table = pd.concat(curves, names=["curve"]).drop(columns="n").reset_index("curve")
+        table = pd.concat(curves, names=["curve"]).reset_index("curve")
         # It takes deg/s and gives deg/h: 3600 times the unit of what it is given.
         table[["deviation", "error"]] /= PER_HOUR
         names = "averaging time [s]", f"Allan deviation [{unit}]", f"error [{unit}]"

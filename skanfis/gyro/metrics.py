@@ -184,30 +184,28 @@ def allan_deviation(error, sampling_interval, run=None):
     """Overlapping Allan deviation, by allantools, in octaves up to a tenth of the run.
 
     Of an error that is evenly sampled within each run [deg/s]; the variances of runs are averaged.
-    A table: averaging_time [s], deviation and its standard error [deg/h], n, the differences.
+    A table: averaging_time [s], deviation and its standard error [deg/h], by IEEE 952: that of the
+    differences of means that do not overlap.
     """
     told = "The Allan deviation needs allantools: pip install allantools."
     oadev = needed("allantools", told).oadev
     error = check_column(error, "error")
     if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
         raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
-    parts = []
-    for rows in rows_by_run(run, error.size):
-        if rows.size < _ROWS_PER_TIME:
-            continue
-        times, deviations, _, counts = oadev(
-            PER_HOUR * error[rows], rate=1.0 / sampling_interval, data_type="freq", taus="octave"
-        )
-        multiple = np.round(times / sampling_interval)
-        part = pd.DataFrame({"multiple": multiple, "sum": counts * deviations**2, "n": counts})
-        parts.append(part[multiple * _ROWS_PER_TIME <= rows.size])
-    if not parts:
+    runs = [rows for rows in rows_by_run(run, error.size) if rows.size >= _ROWS_PER_TIME]
+    if not runs:
         raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
-    sums = pd.concat(parts).groupby("multiple", as_index=False).sum()
-    curve = pd.DataFrame({"averaging_time": sums["multiple"] * sampling_interval})
-    curve["deviation"] = np.sqrt(sums["sum"] / sums["n"])
-    curve["error"] = curve["deviation"] / np.sqrt(sums["n"])
-    return curve.assign(n=sums["n"].astype(int))
+    parts = []
+    for rows in runs:
+        # In units of the time between rows.
+        steps, deviations, _, counts = oadev(error[rows], data_type="freq", taus="octave")
+        part = pd.DataFrame({"steps": steps, "sum": counts * deviations**2, "n": counts})
+        part["apart"] = rows.size / steps - 1.0
+        parts.append(part[steps * _ROWS_PER_TIME <= rows.size])
+    sums = pd.concat(parts).groupby("steps", as_index=False).sum()
+    curve = pd.DataFrame({"averaging_time": sums["steps"] * sampling_interval})
+    curve["deviation"] = PER_HOUR * np.sqrt(sums["sum"] / sums["n"])
+    return curve.assign(error=curve["deviation"] / np.sqrt(2.0 * sums["apart"]))
 
 
 def allan_figures(tau, deviation):
