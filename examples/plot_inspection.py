@@ -121,21 +121,21 @@ ResponseSurfaceDisplay.from_estimator(model, X.iloc[::5])
 rates = np.linspace(X["rate"].min(), X["rate"].max(), 201)
 told = explain(model, pd.DataFrame({"temperature": 40.0, "rate": rates}))
 parts = told.pivot(index="row", columns="rule", values="contribution").set_index(rates)
-parts.plot(xlabel="rate, °/s", ylabel="contribution, °/s")
+parts.plot(xlabel="rate [°/s]", ylabel="contribution [°/s]")
 
 # %%
 # Training
 # --------
 #
 # The training error by iteration, of three solvers. Of variable projection it is the last run,
-# after the weights of the penalties were found; Jang's rule climbs in the end, since nothing holds
-# back its steps.
+# after the weights of the penalties were found.
 
 figure, ax = plt.subplots(figsize=(5.6, 3.6), layout="constrained")
 for solver in ("varpro", "hybrid", "gradient"):
     model.set_params(anfisregressor__solver=solver)
-    ax.loglog(model.fit(X, error)[-1].loss_curve_, label=solver)
-ax.set(xlabel="iteration", ylabel="mean squared error, standardised target")
+    losses = model.fit(X, error)[-1].loss_curve_
+    ax.loglog(np.arange(1, len(losses) + 1), losses, label=solver)
+ax.set(xlabel="1 + iterations", ylabel="mean squared error, standardised target")
 ax.legend()
 
 plt.show()

@@ -10,6 +10,7 @@ from ..inspection import export_text, readability
 from ..inspection.text import counted
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NAMES, NOTHING
+from .c_compensator import input_units
 from .compensator import features
 from .compose import FrozenRules, Polynomial, rules_of
 from .displays import three_digits
@@ -213,22 +214,24 @@ def formula_of(calibration, name):
 
 
 def rules_text(calibration):
-    """What is written, as text: a formula, or the rules as sentences.
+    """What is written, as text: units, then a formula, or the rules as sentences.
 
     Before these stand what speaks against reading them, and the law's formula.
     """
-    if not calibration.writes_model:
-        return f"{formula_of(calibration, calibration.written)}\n"
     recipe, law, caution = calibration.recipe, "", ""
+    units = input_units(calibration.compensator)
+    inputs = "".join(f", {name} in {units[name]}" for name in recipe.inputs)
+    told = f"Units: rates and errors in deg/s{inputs}.\n\n"
+    if not calibration.writes_model:
+        return f"{told}{formula_of(calibration, calibration.written)}\n"
     if against := against_reading(calibration):
-        head = "What speaks against reading the rules one by one:"
-        caution = "\n".join([head, *against, "", ""])
+        caution = "\n".join(["What speaks against reading the rules one by one:", *against, "", ""])
     if recipe.physics:
         law = f"{law_text(calibration.model.base_, recipe)}\nTo this rate the rules add:\n\n"
     # Folded, a model knows of no readability in training, and the text has the caution once.
     names = ["rate beyond the law" if recipe.physics else "error"]
     rules = export_text(fold(calibration.rules), precision=_DIGITS, output_names=names)
-    return f"{law}{caution}{rules}\n"
+    return f"{told}{law}{caution}{rules}\n"
 
 
 def law_text(law, recipe):

@@ -60,7 +60,8 @@ examples:
 exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
-  5  a target was refused; all else is written    130  interrupted by Ctrl-C
+  5  a target was refused; all else is written
+  6  all is written; a limit is not kept, or not measured    130  interrupted by Ctrl-C
 """
 
 
@@ -85,7 +86,7 @@ def make_parser():
     add("logs", told, nargs="+", metavar="LOG")
     told = f"the column of {', '.join(PARTS)}; what is not named is guessed by names and units"
     add("--columns", told, metavar="PART=NAME", **several)
-    told = f"by default those in the names, or s, degC and deg/s. {units}"
+    told = f"by default those in the names, or what the values tell. {units}"
     add("--units", told, metavar="PART=UNIT", **several)
     told = "of a raw signal at one rate, which does not tell it: counts per deg/s"
     add("--scale-factor", told, type=_scale_factor)

@@ -13,6 +13,7 @@ import pandas as pd
 from ..inspection import MembershipDisplay
 from ._columns import RATE_UNITS, evenly_chosen, label_texts
 from ._options import check_limit
+from .c_compensator import input_units
 from .compensator import features
 from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, signs, three_digits
 from .metrics import rms, rows_for_allan
@@ -223,8 +224,9 @@ class Results:
         axes = list(figure.subplots(n_inputs, squeeze=False).ravel())
         shown = X.iloc[evenly_chosen(len(X), _MOST_ROWS_SHOWN)]
         display = MembershipDisplay.from_estimator(rules, shown, ax=axes)
-        parts = []
-        for each in display.inputs:
+        parts, units = [], input_units(self.calibration.compensator)
+        for panel, each in zip(axes, display.inputs, strict=True):
+            panel.set_xlabel(f"{panel.get_xlabel()} [{signs(units[each.input_name])}]")
             for term, before, after in zip(each.term_names, each.before, each.after, strict=True):
                 truths = {"value": each.grid, "truth before": before, "truth after": after}
                 parts.append(pd.DataFrame({"input": each.input_name, "term": term} | truths))

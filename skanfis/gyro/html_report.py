@@ -17,7 +17,6 @@ from ._headline import (
     ARTICLES,
     against_reading,
     flagged_text,
-    formula_of,
     headline,
     held_out_groups,
     proven_bounds,
@@ -292,11 +291,10 @@ def _written(results):
     calibration, name = results.calibration, results.calibration.written
     if not calibration.writes_model:
         text = (
-            f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model; rates in "
-            "deg/s, inputs in the units of the range of the calibration. The command writes "
-            f"another compensation, with its own report, with --write: rules, {', '.join(NAMES)}."
+            f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model. --write "
+            f"names another, with a report of its own: rules, {', '.join(NAMES)}."
         )
-        formula = Block("open", formula_of(calibration, name), "What to compute")
+        formula = Block("open", rules_text(calibration), "What to compute")
         return "What is written", [Block("text", text), formula, _on_board(calibration)]
     against = against_reading(calibration)
     n_rules, terms = calibration.rules[-1].n_rules_, " × ".join(map(str, calibration.terms))

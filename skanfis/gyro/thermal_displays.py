@@ -182,14 +182,13 @@ class ResidualSurfaceDisplay(GyroDisplay):
         residual, counts = cells.iloc[:, -1], cells["rows"]
         limit = residual.abs().quantile(_NEARLY_ALL) or 1.0
         mesh = _draw_cells(axes[0], cells, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
-        label = signs(cells.columns[-1])
-        self.figure_.colorbar(mesh, ax=axes[0], extend="both").set_label(label)
+        self.figure_.colorbar(mesh, ax=axes[0], extend="both")
         # A scale needs two ends, even where all cells have as many rows.
         norm = LogNorm(vmin=1, vmax=max(counts.max(), 2))
         mesh = _draw_cells(axes[1], cells, counts.where(counts > 0), cmap="viridis", norm=norm)
         bar = self.figure_.colorbar(mesh, ax=axes[1], label="rows in the cell")
         mark_decades(bar.ax.yaxis, norm.vmin, norm.vmax)
-        title = f"residual: largest {three_digits(residual.abs().max())} {self._unit}"
+        title = f"{residual.name}: largest {three_digits(residual.abs().max())}"
         dress(axes[0], "temperature [degC]", "true rate [deg/s]", title)
         empty = np.mean(counts == 0)
         dress(axes[1], "temperature [degC]", title=f"data: {empty:.0%} of the cells empty")
@@ -286,8 +285,7 @@ class CoverageDisplay(GyroDisplay):
         if np.nanmin(flagged, initial=np.inf) < self.min_coverage:
             style = {"colors": "0.15", "linestyles": ":", "linewidths": 1.2}
             panel.contour(x, y, flagged, levels=[self.min_coverage], **style)
-        empty = np.mean(cells["rows"] == 0)
-        title = f"{empty:.0%} of the cells in range are empty (hatched)"
+        title = f"{np.mean(cells['rows'] == 0):.0%} of the cells in range are empty (hatched)"
         dress(panel, labels[0], labels[1], title)
         panel.grid(False)
 

@@ -179,7 +179,8 @@ def test_what_is_recommended_or_asked_for_is_written(
     assert goes_on == (write == "recommended")
     assert "the rules" not in header
     assert compensator.units["output"] == "deg/s"
-    text = (out / "rules.txt").read_text(encoding="utf-8")
+    units, text = (out / "rules.txt").read_text(encoding="utf-8").split("\n\n", 1)
+    assert units == "Units: rates and errors in deg/s, temperature in degC, output in deg/s."
     assert text.startswith("rate [deg/s] = arcsin(" if write == "recommended" else "rate = output")
 
 
@@ -206,7 +207,8 @@ def test_physics_and_policy(tmp_path, log, run):
     code, _, err = run(log, typed)
     assert (code, err) == (0, "")
     assert names_in(out) == sorted([*FILES, "compensator.c", "compensator.h"])
-    rules = (out / "rules.txt").read_text(encoding="utf-8")
+    units, rules = (out / "rules.txt").read_text(encoding="utf-8").split("\n\n", 1)
+    assert "temperature_rate in degC/s" in units
     assert rules.startswith("rate [deg/s] = arcsin(output [deg/s]")
     assert "THEN rate beyond the law is " in rules
     compensator = GyroCompensator.read_json(out / "compensator.json")
@@ -317,6 +319,8 @@ def test_help_names_every_option(say):
     assert code == 0
     for text in ("exit codes", "--apply MODEL", *make_parser()._option_string_actions):
         assert text in told
+    codes = (command.REFUSED, command.EXISTS, command.INCOMPLETE, command.NOT_KEPT)
+    assert all(f"\n  {code}  " in told or f"    {code}  " in told for code in codes)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere names of files are text")

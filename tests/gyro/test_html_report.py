@@ -178,6 +178,12 @@ def test_every_picture_says_what_it_shows_and_has_its_data(page, calibration):
     np.testing.assert_allclose(groups.sort_index(), expected, rtol=1e-8)
 
 
+def test_terms_are_drawn_over_inputs_with_their_units(calibration, monkeypatch):
+    monkeypatch.setattr(Picture, "of", lambda subject, figure, *_: figure)
+    (figure,) = Results(calibration).memberships()
+    assert [axes.get_xlabel() for axes in figure.axes] == ["output [°/s]"]
+
+
 def test_a_file_runs_nothing_in_a_spreadsheet():
     from matplotlib.figure import Figure
 
