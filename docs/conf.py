@@ -72,6 +72,8 @@ sphinx_gallery_conf = {
     "image_scrapers": ("matplotlib",),
     "abort_on_example_error": True,
     "min_reported_time": 1,
+    # What a plot gives back is no result.
+    "ignore_repr_types": "matplotlib|Display|ndarray",
     "show_memory": False,
     # A page that would need a network.
     "write_computation_times": False,

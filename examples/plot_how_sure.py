@@ -80,6 +80,6 @@ figure, panel = plt.subplots(figsize=(7, 3.2), layout="constrained")
 for label, values in coverages.items():
     panel.plot(np.sort(values), "o-", markersize=3, label=f"{label}: mean {np.mean(values):.0%}")
 panel.axhline(0.9, color="grey", linewidth=0.8, linestyle="--")
-panel.set(xlabel="new runs, in order", ylabel="rows in their 90 % interval", ylim=(-0.02, 1.02))
+panel.set(xlabel="new runs, sorted", ylabel="rows in their 90 % interval", ylim=(-0.02, 1.02))
 panel.legend()
 plt.show()

@@ -172,12 +172,10 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         outside, goes_on = self._outside(used), self.out_of_bounds == "linear"
         told = outside | beyond if goes_on else outside & ~beyond
         if told.any():
-            warnings.warn(
-                f"X lies outside the training data: {told.sum()} of {told.size} rows follow the "
-                f"law there, or its tangent beyond max_phase={self.max_phase:g} rad.",
-                OutOfBoundsWarning,
-                stacklevel=2,
-            )
+            past = f", or its tangent beyond max_phase={self.max_phase:g} rad" * goes_on
+            rows = f"{told.sum()} of {told.size} rows follow the law there{past}"
+            message = f"X lies outside the training data: {rows}."
+            warnings.warn(message, OutOfBoundsWarning, stacklevel=2)
         held = np.clip(sine, -limit, limit)
         phase = np.arcsin(held)
         if goes_on:
