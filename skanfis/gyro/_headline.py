@@ -214,10 +214,7 @@ def formula_of(calibration, name):
 
 
 def rules_text(calibration):
-    """What is written, as text: units, then a formula, or the rules as sentences.
-
-    Before these stand what speaks against reading them, and the law's formula.
-    """
+    """What is written, as text: units; a formula, or rules behind what speaks against reading."""
     recipe, law, caution = calibration.recipe, "", ""
     units = input_units(calibration.compensator)
     inputs = "".join(f", {name} in {units[name]}" for name in recipe.inputs)

@@ -76,14 +76,14 @@ def figures_of_merit(full_scale=1.0):
     short, long = (partial(_squares_of_means, over=seconds) for seconds in (10.0, 100.0))
     timed, pooled = ("error", "time"), _pooled_deviation
 
-    def bias(error, rate):
-        # All rows give the line's intercept, which has the nonlinearity in it.
-        at_rest = np.abs(rate) <= _AT_REST * np.abs(rate).max()
-        enough = np.count_nonzero(at_rest) >= _FEWEST_AT_REST
-        return PER_HOUR * (error[at_rest] if enough else error).mean()
+    def bias(error, of_bias):
+        return PER_HOUR * error[of_bias].mean() if of_bias.any() else np.nan
 
     def spread(values):
-        return np.std(values, ddof=1)
+        known = values[np.isfinite(values)]
+        if known.size < 2:
+            raise ValueError("No repeatability: fewer than two runs have rows at rest.")
+        return np.std(known, ddof=1)
 
     def relative_spread(slopes):
         return _PPM * spread(slopes) / abs(np.mean(slopes))
@@ -104,8 +104,8 @@ def figures_of_merit(full_scale=1.0):
             "scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread
         ),
         _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
-        _Figure("bias", "deg/h", bias, ("error", "rate")),
-        from_run_to_run("bias_repeatability", "deg/h", bias, ("error", "rate"), combine=spread),
+        _Figure("bias", "deg/h", bias, ("error", "of_bias")),
+        from_run_to_run("bias_repeatability", "deg/h", bias, ("error", "of_bias"), combine=spread),
         _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), also=ramp),
         _Figure(
             "bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), also=heat
@@ -159,6 +159,13 @@ def input_error(rate, output):
     return output / (1.0 if np.ptp(rate) == 0 else scale_factor(rate, output)) - rate
 
 
+def rows_of_bias(rate):
+    """Rows off which the bias is read: those at rest, or all of a log that has hardly any."""
+    at_rest = np.abs(rate) <= _AT_REST * np.abs(rate).max()
+    # All give the line's intercept, which has the nonlinearity in it.
+    return at_rest | (np.count_nonzero(at_rest) < _FEWEST_AT_REST)
+
+
 def hysteresis(error, temperature, temperature_rate) -> float:
     """Largest gap between mean errors while warming and while cooling, at equal temperature."""
     sides = [temperature_rate > 0, temperature_rate < 0]
@@ -173,10 +180,8 @@ def hysteresis(error, temperature, temperature_rate) -> float:
     means = np.where(counts < ROWS_PER_MEAN, np.nan, sums / np.maximum(counts, 1))
     gaps = np.abs(np.subtract(*means.reshape(2, -1)))
     if np.isnan(gaps).all():
-        raise ValueError(
-            "No hysteresis: warming and cooling share no temperature at which both have "
-            f"{ROWS_PER_MEAN} rows."
-        )
+        told = f"warming and cooling share no temperature at which both have {ROWS_PER_MEAN} rows"
+        raise ValueError(f"No hysteresis: {told}.")
     return float(PER_HOUR * np.nanmax(gaps))
 
 
@@ -333,11 +338,9 @@ def _squares_of_means(error, time, over):
     steps = np.diff(time)
     if (steps <= 0).any():
         raise ValueError("time must increase within each run.")
-    if time.size > 1 and np.median(steps) > over * (1.0 + 1e-9):
-        raise ValueError(
-            f"No bias stability: rows are {np.median(steps):g} s apart, and means are over "
-            f"{over:g} s."
-        )
+    apart = np.median(steps) if steps.size else 0.0
+    if apart > over * (1.0 + 1e-9):
+        raise ValueError(f"No bias stability: rows are {apart:g} s apart, means over {over:g} s.")
     # A time on an edge belongs to the interval that starts there, rounding errors or not.
     place = np.floor((time - time[0]) / over + 1e-9).astype(int)
     _, place, counts = np.unique(place, return_inverse=True, return_counts=True)

@@ -92,13 +92,14 @@ def gyro_report(
         raise ValueError(
             f"rate_unit={rate_unit!r} must be one of {', '.join(RATE_UNITS)}, or None."
         )
-    given = {*table, "output", "residual", "error"}
+    given = {*table, "output", "residual", "error", "of_bias"}
     figures = [
         figure
         for figure in metrics.figures_of_merit(full_scale)
         if given.issuperset(figure.needs) and (figure.fewest_runs < 2 or run is not None)
     ]
     answered = {name: table[name].to_numpy()[is_answered] for name in table}
+    answered["of_bias"] = metrics.rows_of_bias(answered["rate"])
     units, kind = _units(answered)
     # A generator of its own, so that one given moves on by one number alone.
     generator = np.random.RandomState(check_random_state(random_state).randint(2**31 - 1))

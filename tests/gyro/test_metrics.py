@@ -12,6 +12,7 @@ from skanfis.gyro.metrics import (
     figures_of_merit,
     hysteresis,
     input_error,
+    rows_of_bias,
     scale_factor,
 )
 
@@ -74,8 +75,13 @@ def test_repeatability_is_the_spread_over_runs(table):
     assert found == pytest.approx(1e6 * factors.std(ddof=1) / factors.mean())
     means, sizes = np.array([1.0, -2.0, 4.0]), (3, 5, 9)  # deg/h
     error, run = np.repeat(means, sizes) / HOUR, np.repeat([7, 3, 5], sizes)
-    found = figure("bias_repeatability", error=error, run=run, rate=error)
+    # A run without rows at rest has no bias beside that of the others.
+    error, run, of_bias = np.append(error, 9.0), np.append(run, 8), np.arange(18) < 17
+    columns = {"rate": error, "error": error, "run": run}
+    found = figure("bias_repeatability", **columns, of_bias=of_bias)
     assert found == pytest.approx(means.std(ddof=1))
+    with pytest.raises(ValueError, match="fewer than two runs have rows at rest"):
+        figure("bias_repeatability", **columns, of_bias=~of_bias)
 
 
 def test_input_error_takes_the_scale_factor_out(table):
@@ -242,7 +248,11 @@ WARMER = {"error": [1, 2], "temperature": [1, 2]}
             INDEPENDENT,
         ),
         ("bias_temperature_sensitivity", {"error": [1, 2], "temperature": [5, 5]}, "never changes"),
-        ("bias_repeatability", {"error": [1, 2], "run": [0, 0], **AT_REST}, "There is 1 run"),
+        (
+            "bias_repeatability",
+            {"error": [1, 2], "run": [0, 0], "of_bias": [True, True], **AT_REST},
+            "There is 1 run",
+        ),
         ("bias_stability_10s", {"error": [1, 2], "time": [1, 1], **AT_REST}, "time must increase"),
         ("bias_stability_10s", {"error": [1, 2], "time": [0, 60], **AT_REST}, "are 60 s apart"),
         ("bias_stability_10s", {"error": [1, 2], "time": [0, 1], **AT_REST}, "as long as two"),
@@ -260,8 +270,9 @@ def test_the_bias_is_of_the_rows_at_rest_where_there_are_some():
     output = np.where(rate > 0.0, 1.0015, 1.0005) * rate + 5.0 / HOUR
     error = input_error(rate, output)
     # An asymmetry moves the line, not the output at rest.
-    assert figure("bias", error=error, rate=rate) == pytest.approx(5.0, rel=1e-2)
+    found = figure("bias", error=error, of_bias=rows_of_bias(rate))
+    assert found == pytest.approx(5.0, rel=1e-2)
     moving = rate != 0.0
-    of_line = figure("bias", error=error[moving], rate=rate[moving])
+    of_line = figure("bias", error=error[moving], of_bias=rows_of_bias(rate[moving]))
     assert of_line == pytest.approx(HOUR * error[moving].mean(), rel=1e-12)
     assert of_line > 50.0
