@@ -186,7 +186,8 @@ class GroupResidualDisplay(GyroDisplay):
         # Groups without an answer last, at the top: nothing is worse.
         table = np.sqrt(squares).sort_values("after", kind="stable").reset_index()
         table.columns = ["group", *(f"RMS error {side} [{self._unit}]" for side in SIDES)]
-        self._size = 6.2, 1.4 + 0.2 * min(len(table), _MOST_GROUPS)
+        longest = min(table["group"].astype(str).str.len().max(), 60)  # names of files are long
+        self._size = 6.1 + 0.08 * longest, 1.6 + 0.2 * min(len(table), _MOST_GROUPS)
         return {"groups": table}
 
     def _draw(self, axes, groups):
@@ -195,14 +196,13 @@ class GroupResidualDisplay(GyroDisplay):
         panel.hlines(lines, errors[:, 1], errors[:, 0], color="0.8", linewidth=2, zorder=1)
         for (side, color), error in zip(SIDES.items(), errors.T, strict=True):
             panel.plot(error, lines, "o", color=color, label=side, markersize=5)
-        panel.set_xscale("log")
-        panel.margins(x=0.2)
+        panel.set(xscale="log", xmargin=0.2)
         mark_decades(panel.xaxis, *panel.get_xlim())
         panel.set_yticks(lines, [as_label(group) for group in shown["group"]])
         panel.set_ylim(-0.7, len(shown) - 0.3)
         extent = f"worst {len(shown)} of {len(groups)}" if len(shown) < len(groups) else len(shown)
         middle, worst = map(three_digits, (groups.iloc[:, 2].median(), shown.iloc[:, 2].max()))
-        title = f"{extent} groups: after, {middle} in the median, {worst} in the worst"
+        title = f"{extent} groups\nafter: {middle} in the median, {worst} in the worst"
         dress(panel, f"RMS error [{self._unit}]", "held-out group", title, legend="")
 
 

@@ -225,6 +225,12 @@ def test_groups_are_sorted_by_what_is_left_and_only_the_worst_are_drawn(log):
     np.testing.assert_allclose(table.iloc[:-1, 2], 0.001 * (np.array(order[:-1]) + 1))
     labels = [tick.get_text() for tick in display.ax_.get_yticklabels()]
     assert labels == [str(group) for group in order[-30:]]
+    # Long names, as those of files, leave the errors their room, and the title is on the picture.
+    long = display_of(GroupResidualDisplay, log.assign(groups=[f"{k:060}" for k in groups]))
+    long.figure_.canvas.draw()
+    (left, _), (right, _) = long.ax_.transAxes.transform([(0, 0), (1, 0)]) / long.figure_.dpi
+    assert right - left > 3.0
+    assert long.ax_._left_title.get_window_extent().x1 < long.figure_.bbox.x1
     # Rows without a label are a group too.
     some = display_of(GroupResidualDisplay, log.assign(groups=np.where(groups < 9, np.nan, 1.0)))
     assert some.tables()["groups"]["group"].isna().sum() == 1
