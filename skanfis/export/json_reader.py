@@ -338,8 +338,7 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     consequents[np.tril_indices(n_columns)] = arrays["consequents"]
     is_noise = (arrays["noise"] == 0.0) | (arrays["noise"] >= SMALLEST_NUMBER)
     _check_all(is_noise, f"posterior.noise[{{}}] is neither 0 nor {SMALLEST_NUMBER:g} or more.")
-    own = {"inputs": np.array(inputs, dtype=int), "consequents": consequents}
-    return Posterior(**arrays | own)
+    return Posterior(**arrays | {"inputs": np.array(inputs, dtype=int), "consequents": consequents})
 
 
 def rule_base(kind, groups, table):

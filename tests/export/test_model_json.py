@@ -222,6 +222,14 @@ def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
     assert time.perf_counter() - start < 1.0
 
 
+def test_what_would_be_larger_than_is_read_is_not_written(tmp_path, monkeypatch):
+    size = len(export_json(A_GRID).encode())
+    monkeypatch.setattr("skanfis.export.model_json._MOST_BYTES", size - 1)
+    with pytest.raises(ValueError, match=rf"such that it can be read: {size:,} bytes, of at most"):
+        export_json(A_GRID, tmp_path / "large.json")
+    assert not any(tmp_path.iterdir())
+
+
 def test_what_could_not_be_read_is_not_written():
     wide = replace(A_GRID, spread=np.array([1e-60, 1.0, 1.0]))
     with pytest.raises(ValueError, match=r"cannot be written .*: inputs\[0\]\.spread: 1e-60"):
