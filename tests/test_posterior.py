@@ -308,6 +308,7 @@ def document():
     ("change", "message"),
     [
         (lambda p: p.pop("noise"), "posterior has no 'noise'"),
+        (lambda p: p.update(noise=[-0.1]), r"posterior.noise\[0\] is neither 0 nor 1e-50 or more"),
         (lambda p: p.update(noise=[0.1, 0.2]), "posterior.noise: .* not a list of 1"),
         (lambda p: p.update(inputs=[0, 0]), "has an input twice"),
         (lambda p: p["consequents"].pop(), "posterior.consequents: .* is not a list of 78"),

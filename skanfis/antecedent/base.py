@@ -131,8 +131,9 @@ class Antecedent(ABC):
         """
         table, inputs = self.rule_terms, self.term_inputs
         of = np.append(inputs, -1)[table]
-        used = np.unique(of[table >= 0])
-        found = {int(j): np.where((of == j) & (table >= 0), table, inputs.size) for j in used}
+        # Rules that look at nothing have no terms of the first input either.
+        used = np.unique(of[table >= 0]).tolist() or [0]
+        found = {j: np.where((of == j) & (table >= 0), table, inputs.size) for j in used}
         # Most rules have one term of an input: columns that hold none of it go.
         return [{j: where[:, (where < inputs.size).any(axis=0)] for j, where in found.items()}]
 

@@ -31,7 +31,7 @@ from sklearn.utils.validation import check_is_fitted
 
 from .._sklearn import safe_indexing
 from ..model import TSKModel
-from ..naming import default_term_names
+from ..naming import default_term_names, distinct
 from ..options import policy_of
 from .columns import Column, Level, Reader, part_of
 
@@ -127,6 +127,10 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
                 "cannot be written with one membership per column. Let every column reach it once."
             )
     order = np.array(sorted(range(len(columns)), key=keys.__getitem__))
+    # Columns keep their names; a level may be called like one, "fibre_PM".
+    by_claim = sorted(order, key=lambda j: columns[j].encode is not None)
+    for j, name in zip(by_claim, distinct(columns[j].name for j in by_claim), strict=True):
+        columns[j] = replace(columns[j], name=str(name))
     model = _with_raw_inputs(model, columns, order)
     for label, transformer in reversed(target_steps):
         model = _with_raw_target(model, label, transformer)
@@ -277,10 +281,8 @@ def _offsets_and_scales(label, scaler):
     scale: Any = None
     if kind is StandardScaler:
         offset, scale = (scaler.mean_ if scaler.with_mean else None), scaler.scale_
-    elif kind is RobustScaler:
-        offset, scale = scaler.center_, scaler.scale_
-    elif kind is MaxAbsScaler:
-        scale = scaler.scale_
+    elif kind in (RobustScaler, MaxAbsScaler):
+        offset, scale = getattr(scaler, "center_", None), scaler.scale_
     elif kind is MinMaxScaler:
         offset, scale = -scaler.min_ / scaler.scale_, 1.0 / scaler.scale_
     elif kind is not FunctionTransformer or scaler.func or scaler.inverse_func:
@@ -347,7 +349,7 @@ def _with_raw_inputs(model, columns, order):
         minimum=low[order],
         maximum=high[order],
         support=support and support.change_units(offset, scale).reordered(order),
-        input_names=tuple(str(columns[j].name) for j in order),
+        input_names=tuple(columns[j].name for j in order),
         posterior=posterior and posterior.change_units(model.antecedent, scale, order),
         tangent_at=at if at is None else np.clip(offset + scale * at, low, high)[order],
     )

@@ -20,6 +20,7 @@ from ..antecedent import (
 )
 from ..membership import FAMILIES
 from ..model import TSKModel
+from ..naming import distinct
 from ..policies import OUT_OF_BOUNDS, TargetRange
 from ..posterior import MOST_PARAMETERS, Posterior
 from ..support import RuleSupport
@@ -45,18 +46,16 @@ def _list(value, where, least=1):
 
 
 def _text(value, where):
-    if not isinstance(value, str):
+    # Half a surrogate pair is no character: no file can hold it.
+    if not isinstance(value, str) or value != value.encode(errors="ignore").decode():
         raise ValueError(f"{where}: {shown(value)} is not a name in quotes.")
     return value
 
 
-def _one_of(choices):
-    def read(value, where):
-        if value not in choices:
-            raise ValueError(f"{where} is {shown(value)}, not {', '.join(choices)}.")
-        return value
-
-    return read
+def _one_of(choices, value, where):
+    if value not in choices:
+        raise ValueError(f"{where} is {shown(value)}, not {', '.join(choices)}.")
+    return value
 
 
 def _whole(lowest, highest):
@@ -67,23 +66,19 @@ def _or_null(read, null=None):
     return lambda value, where: null if value is None else read(value, where)
 
 
-def _as_it_is(value, where):
-    return value
-
-
 _list_or_empty = partial(_list, least=0)
 _positive = partial(number, lowest=SMALLEST_NUMBER)
 _not_negative = partial(number, lowest=0.0)
 _log = partial(number, lowest=-float(np.log(LARGEST_NUMBER)), highest=float(np.log(LARGEST_NUMBER)))
 _FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
-    "format": _as_it_is,
-    "version": _as_it_is,
-    "out_of_bounds": _one_of(OUT_OF_BOUNDS),
+    "format": partial(_one_of, (FORMAT,)),
+    "version": _whole(1, VERSION),
+    "out_of_bounds": partial(_one_of, OUT_OF_BOUNDS),
     "max_extrapolation": _or_null(_not_negative, inf),
-    "rule_base": _one_of(tuple(KINDS.values())),
+    "rule_base": partial(_one_of, tuple(KINDS.values())),
     "terms": _list_or_empty,
     "support": _or_null(_list),
-    "posterior": _as_it_is,
+    "posterior": lambda value, where: value,
 }
 INPUT = {
     "name": _text,
@@ -210,11 +205,11 @@ def _inputs(inputs):
     found = _columns(inputs, INPUT, "inputs")
     names, arrays = tuple(found.pop("name")), {key: np.array(own) for key, own in found.items()}
     low, high, at = arrays["minimum"], arrays["maximum"], arrays.pop("tangent_at")
+    _check_all(np.equal(names, distinct(names)), "inputs[{}] has the name of another input.")
     _check_all(low <= high, "inputs[{}]: minimum is above maximum.")
-    is_free = np.isnan(at)
-    is_within = is_free | ((low <= at) & (at <= high))
+    is_within = np.isnan(at) | ((low <= at) & (at <= high))
     _check_all(is_within, "inputs[{}]: tangent_at is not from minimum to maximum.")
-    return arrays | {"input_names": names, "tangent_at": None if is_free.all() else at}
+    return arrays | {"input_names": names, "tangent_at": None if np.isnan(at).all() else at}
 
 
 def _outputs(outputs):
@@ -253,7 +248,7 @@ def _terms(terms, n_inputs):
         readers = {
             "name": _text,
             "input": _whole(0, n_inputs - 1),
-            "function": _as_it_is,
+            "function": partial(_one_of, tuple(FAMILIES)),
             "before_training": lambda start, where, theta=theta: _members(start, theta, where),
         }
         found = _members(item, readers | theta, where)
@@ -341,8 +336,9 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     arrays = {key: numbers(found[key], f"posterior.{key}", shape) for key, shape in shapes.items()}
     consequents = np.zeros((n_columns, n_columns))
     consequents[np.tril_indices(n_columns)] = arrays["consequents"]
-    own = {"noise": np.abs(arrays["noise"]), "inputs": np.array(inputs, dtype=int)}
-    return Posterior(**arrays | own | {"consequents": consequents})
+    is_noise = (arrays["noise"] == 0.0) | (arrays["noise"] >= SMALLEST_NUMBER)
+    _check_all(is_noise, f"posterior.noise[{{}}] is neither 0 nor {SMALLEST_NUMBER:g} or more.")
+    return Posterior(**arrays | {"inputs": np.array(inputs, dtype=int), "consequents": consequents})
 
 
 def rule_base(kind, groups, table):
@@ -371,8 +367,7 @@ def rule_base(kind, groups, table):
 
 def _tree(groups, table):
     """The tree whose leaves these are; ValueError where they are none."""
-    families = [group.family.name for group in groups]
-    if families != ["sigmoid_rising", "sigmoid_falling"]:
+    if [group.family.name for group in groups] != ["sigmoid_rising", "sigmoid_falling"]:
         raise ValueError(
             'terms: those of a "tree" are sigmoid_rising first, above each cut, then as many '
             "sigmoid_falling, below it."

@@ -95,9 +95,11 @@ def export_json(
         document["posterior"] = {key: values.tolist() for key, values in state.items()}
     try:
         model_of(document)
+        text = _laid_out(document)
+        if (n_bytes := len(text.encode())) > _MOST_BYTES:
+            raise ValueError(f"{n_bytes:,} bytes, of at most {_MOST_BYTES:,}. joblib can keep it.")
     except ValueError as error:
         raise ValueError(f"the model cannot be written such that it can be read: {error}") from None
-    text = _laid_out(document)
     if path is not None:
         Path(path).write_text(text, encoding="utf-8", newline="\n")
     return text

@@ -7,31 +7,32 @@ import pytest
 from numpy.testing import assert_allclose
 
 from skanfis import ANFISRegressor
-from skanfis.antecedent import TermGroup
+from skanfis.antecedent import RuleTableAntecedent, TermGroup
 from skanfis.bounds import bounds, gradient_bounds, monotonicity
 from skanfis.learning import VariableProjection
 from skanfis.membership import Gaussian
 from skanfis.options import LinearExtrapolation
 
 from ..export.every_model import CASES
-from ..export.rule_bases import MODELS, OFFSET, SCALE
+from ..export.rule_bases import MODELS, OFFSET, SCALE, build
 
 pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+NO_TERMS = build(RuleTableAntecedent((), np.empty((3, 0), dtype=int)), 1, 2)
 ONE_RULE = MODELS["one rule, order 1, 2 outputs"].with_out_of_bounds("linear", 0.5)
 
 
-def test_one_rule_is_bounded_by_its_corners():
+@pytest.mark.parametrize("model", [ONE_RULE, NO_TERMS], ids=["one rule", "no terms"])
+def test_a_line_is_bounded_by_its_corners(model):
     box = np.stack([OFFSET - SCALE, OFFSET + SCALE], axis=1)
-    found = bounds(ONE_RULE, box)
-    slopes = ONE_RULE.coefficients[0, 1:]
-    middle = ONE_RULE.coefficients[0, 0] + (OFFSET - ONE_RULE.reference) @ slopes
-    half = SCALE @ np.abs(slopes)
+    found = bounds(model, box)
+    height, *slopes = model.coefficients.mean(axis=0)
+    middle, half = height + (OFFSET - model.reference) @ slopes, SCALE @ np.abs(slopes)
     assert_allclose(found.lower, middle - half, rtol=1e-8)
     assert_allclose(found.upper, middle + half, rtol=1e-8)
-    slope = gradient_bounds(ONE_RULE, "rate", box)
+    slope = gradient_bounds(model, "rate", box)
     assert_allclose([slope.lower, slope.upper], [slopes[2], slopes[2]], rtol=1e-9)
     assert (slope.tightness >= 0.0).all()
-    assert_allclose(monotonicity(ONE_RULE, 2, box), np.sign(slopes[2]))
+    assert_allclose(monotonicity(model, 2, box), np.sign(slopes[2]))
     assert repr(found).startswith("Bounds(y0 in [")
 
 

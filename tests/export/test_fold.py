@@ -171,16 +171,19 @@ def mixed(n_rows=200):
 
 
 @pytest.mark.parametrize(
-    ("options", "fibres"),
+    ("options", "fibres", "kelvin"),
     [
-        ({}, ["fibre_PM", "fibre_SM", "fibre_rare"]),
-        ({"drop": "first"}, ["fibre_SM", "fibre_rare"]),
-        ({"min_frequency": 0.2}, ["fibre_PM", "fibre_SM", "fibre_infrequent_sklearn"]),
-        ({"handle_unknown": "ignore", "sparse_output": False}, None),
+        ({}, ["fibre_PM", "fibre_SM", "fibre_rare"], "kelvin"),
+        # A level that is called like a column.
+        ({}, ["fibre_PM (2)", "fibre_SM", "fibre_rare"], "fibre_PM"),
+        ({"drop": "first"}, ["fibre_SM", "fibre_rare"], "kelvin"),
+        ({"min_frequency": 0.2}, ["fibre_PM", "fibre_SM", "fibre_infrequent_sklearn"], "kelvin"),
+        ({"handle_unknown": "ignore", "sparse_output": False}, None, "kelvin"),
     ],
 )
-def test_one_hot_encoded_columns_are_inputs(options, fibres):
+def test_one_hot_encoded_columns_are_inputs(options, fibres, kelvin):
     X, y = mixed()
+    X = X.rename(columns={"kelvin": kelvin})
     encode = make_pipeline(OneHotEncoder(**options), StandardScaler(with_mean=False))
     front = ColumnTransformer(
         [("kind", encode, ["axis", "fibre"])], remainder=RobustScaler(), sparse_threshold=0
@@ -188,14 +191,14 @@ def test_one_hot_encoded_columns_are_inputs(options, fibres):
     pipe = make_pipeline(front, regressor(**KINDS["scattered"])).fit(X, y)
     model, rows = fold_with_rows(pipe, X)
     if fibres is not None:
-        assert list(model.input_names[: len(fibres) + 1]) == [*fibres, "kelvin"]
+        assert list(model.input_names[: len(fibres) + 1]) == [*fibres, kelvin]
         indicator = (X["fibre"] == "SM").to_numpy()
         assert_array_equal(rows[:, model.input_names.index("fibre_SM")], indicator)
     else:
         X = X.assign(fibre="unheard of")
     assert_same_predictions(pipe, X, 50.0)
     # Rows out of range as well.
-    assert_same_predictions(pipe, X.assign(kelvin=X["kelvin"] * 1.2), 50.0)
+    assert_same_predictions(pipe, X.assign(**{kelvin: X[kelvin] * 1.2}), 50.0)
 
 
 @pytest.mark.parametrize(

@@ -84,6 +84,8 @@ REFUSED = [
     (_set("outputs", 0, "upper", -0.9), r"outputs\[0\]: lower is not below upper"),
     (_set("outputs", 0, "lower", 1.6), r"outputs\[0\]: nothing from minimum to maximum is within"),
     (lambda d: d["outputs"].pop(), r"rules\[0\]\.consequents: .* is not a list of 1"),
+    (_set("outputs", 0, "name", "\ud800"), r"outputs\[0\]\.name: '\\ud800' is not a name"),
+    (_set("inputs", 1, "name", "time"), r"inputs\[1\] has the name of another input"),
     (_set("inputs", 0, "minimum", 1e9), r"inputs\[0\]: minimum is above maximum"),
     (lambda d: d["support"].pop(), "support has 11 entries; the model has 12 rules"),
     (_set("support", 2, "share", 1.5), r"support\[2\]\.share: 1\.5 is not a number from 0 to 1"),
@@ -218,6 +220,14 @@ def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
     with pytest.raises(ValueError, match="larger than 16,777,216 bytes"):
         read_json(path)
     assert time.perf_counter() - start < 1.0
+
+
+def test_what_would_be_larger_than_is_read_is_not_written(tmp_path, monkeypatch):
+    size = len(export_json(A_GRID).encode())
+    monkeypatch.setattr("skanfis.export.model_json._MOST_BYTES", size - 1)
+    with pytest.raises(ValueError, match=rf"such that it can be read: {size:,} bytes, of at most"):
+        export_json(A_GRID, tmp_path / "large.json")
+    assert not any(tmp_path.iterdir())
 
 
 def test_what_could_not_be_read_is_not_written():
