@@ -34,11 +34,11 @@ _ROWS_EACH, FEWEST_ROWS = 40, 1000
 _STEPS_TO_PROMISE = 1
 # Of a pass over the rows of a training.
 _MOST_OPERATIONS = 1e9
-# Of the inputs, or splits, that the residual asks for most, so many are tried.
+# Inputs, or splits, of the largest scores (``TermScores``, ``splits``) that are tried.
 _TRIED = 4
-# Deviations by which what an input's terms would explain exceeds what they would of noise.
+# A score beyond this is more than chance.
 _SIGNIFICANT = 2.0
-# By which residuals are asked: two do not see an odd curve, as of a saturation, beside a line.
+# Terms on an input for its score: two do not see an odd curve, as of a saturation, beside a line.
 _TERMS = 3
 
 # The premises and consequents that keep what is known of the outputs. They are what is judged;
@@ -83,32 +83,30 @@ class Trials:
         if is_wide:
             self.slope_inputs = lasso_inputs(rows, plan.consequent_inputs)
         self.spacing = Spacing(rows)
-        # Which of two values is meant no reader can say by a bell: that is what a tree is for.
+        # A bell around one of two values is a little true of the other; a tree's cut is not.
         self.bell_inputs = [int(j) for j in plan.premise_inputs if self.spacing.n_values(j) > 2]
         self.one_rule = Candidate((1,) * rows.X.shape[1])
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
 
-    def _asking(self, candidate):
-        """Inputs for terms of scattered rules: those that ask by more than chance, at first one.
+    def _significant_inputs(self, candidate, scores):
+        """Inputs for terms of scattered rules: of scores beyond chance; for the first rules one.
 
-        The loudest first; what it asks for, no other does.
+        The input of the largest score first; what its terms explain counts for no other.
         """
-        left = self.bell_inputs
-        asked: list[int] = []
-        scores = TermScores(self.tuned(candidate), self.spacing, self._crossed(candidate))
+        left, found = self.bell_inputs, []
         work = len(scores.basis) * (_TERMS * scores.basis.shape[1]) ** 2
-        # Where to tell them is too much work, all that ask have terms.
-        while left and work * len(asked) * len(left) <= _MOST_OPERATIONS:
-            if asked:
-                scores.tell(asked[-1], _TERMS)
-            found = scores.of([(j, _TERMS) for j in left])
-            loudest = left[int(np.argmax(found))]
-            left = [left[k] for k in np.flatnonzero(found > _SIGNIFICANT)]
-            if left or not (asked or candidate.inputs):
-                asked.append(loudest)
-            left = [j for j in left if j != loudest]
-        return [*asked, *left]
+        # Where to project is too much work, all whose scores are beyond chance have terms.
+        while left and work * len(found) * len(left) <= _MOST_OPERATIONS:
+            if found:
+                scores.project_out(found[-1], _TERMS)
+            values = scores.of([(j, _TERMS) for j in left])
+            largest = left[int(np.argmax(values))]
+            left = [left[k] for k in np.flatnonzero(values > _SIGNIFICANT)]
+            if left or not (found or candidate.inputs):
+                found.append(largest)
+            left = [j for j in left if j != largest]
+        return [*found, *left]
 
     def rows_for(self, candidate):
         """As many as its parameters need, by powers of two: most candidates see the same."""
@@ -118,23 +116,10 @@ class Trials:
         return replace(part, inputs=unit_scale(part.X))
 
     def larger(self, kind, candidate) -> Candidate | None:
-        """The next of a kind; None where there are not the rows."""
-        if kind == "scattered":
-            anew = candidate.with_more_clusters(self._asking(candidate))
-            grown = [anew, replace(anew, is_grown=True)] if candidate.n_clusters else [anew]
-            grown = grown if anew.inputs else []
-        elif kind == "tree":
-            inputs = self.plan.premise_inputs
-            splits = best_splits(self.tuned(candidate), inputs, self._crossed(candidate), _TRIED)
-            grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
-        else:
-            asking = [(j, candidate.counts[j] + _TERMS - 1) for j in self.bell_inputs]
-            crossed = self._crossed(candidate)
-            scores = TermScores(self.tuned(candidate), self.spacing, crossed).of(asking)
-            best = np.argsort(-scores, kind="stable")[:_TRIED]
-            grown = [candidate.with_more_terms(self.bell_inputs[k]) for k in best]
+        """The next of a kind: of those that are tried, the one that promises most; or None."""
         smaller = self.tuned(candidate)
-        problems = {one: self._problem(one, smaller) for one in grown if self._is_small(one)}
+        tried = filter(self._is_small, self._tried(kind, candidate, smaller))
+        problems = {one: self._problem(one, smaller) for one in tried}
         # Clusters anew have learnt nothing yet: beside rules that go on they take some turns first.
         turns = FEW_TURNS if kind == "scattered" else 0
         # Of rows that are alike but for a few, there are fewer clusters than were asked for.
@@ -145,6 +130,22 @@ class Trials:
         }
         self._begun |= begun
         return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
+
+    def _tried(self, kind, candidate, tuned):
+        """What may be the next of a kind, by the residual of a candidate, ``tuned``."""
+        crossed = self._crossed(candidate)
+        if kind == "tree":
+            splits = best_splits(tuned, self.plan.premise_inputs, crossed, _TRIED)
+            return [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
+        scores = TermScores(tuned, self.spacing, crossed)
+        if kind == "grid":
+            values = scores.of([(j, candidate.counts[j] + _TERMS - 1) for j in self.bell_inputs])
+            best = np.argsort(-values, kind="stable")[:_TRIED]
+            return [candidate.with_more_terms(self.bell_inputs[k]) for k in best]
+        anew = candidate.with_more_clusters(self._significant_inputs(candidate, scores))
+        if not anew.inputs:
+            return []
+        return [anew, replace(anew, is_grown=True)] if candidate.n_clusters else [anew]
 
     def _slope_inputs(self, candidate):
         """Inputs that the consequents of a candidate are linear in."""

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..consequent import MANY_COLUMNS
 from ..learning.evidence import (
     LARGEST,
     PRIOR_DISPLACEMENT,
@@ -41,9 +42,7 @@ FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 FIRST_STEPS = 5
 # Where no premises follow, the weights arrive: most of them within ten.
 ARRIVING = 50
-# Beyond so many consequent parameters every step costs seconds, and there are fewer.
-MOST_COLUMNS = 512
-# Steps and turns of these; so many turns have grids as well (``trials``).
+# Steps and turns beyond ``MANY_COLUMNS``; so many turns have grids as well (``trials``).
 _FEW_STEPS, FEW_TURNS = 3, 2
 # Part of the rows that effective parameters of the premises may be.
 _MOST_EFFECTIVE = 0.5
@@ -124,7 +123,7 @@ def tune(
     weight; ``begun`` is where no turn, or the first ``FEW_TURNS``, have ended before.
     """
     steps = _STEPS
-    if problem.n_columns > MOST_COLUMNS:
+    if problem.n_columns > MANY_COLUMNS:
         first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
@@ -260,7 +259,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, left: float) -> Tu
 def with_sparse_slopes(tuned: Tuned, free, worth) -> Tuned:
     """The same with slopes that are worth so much alone: else one for several rules, or none."""
     problem, posterior, x = tuned.problem, tuned.posterior, tuned.displacement
-    if not {"alpha", "slope"} <= set(free) or problem.n_columns > MOST_COLUMNS:
+    if not {"alpha", "slope"} <= set(free) or problem.n_columns > MANY_COLUMNS:
         return tuned
     common, absent = sparse_slopes(posterior, tuned.solved.normal.coefficients, worth)
     penalty = replace(tuned.penalty, common=common, absent=absent)

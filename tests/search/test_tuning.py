@@ -47,7 +47,7 @@ def test_weights_arrive_where_there_are_more_columns_than_rows(rng):
 
 def test_large_models_find_nearly_the_same_in_few_turns(monkeypatch, two_rules):
     whole = tuning.tune(*two_rules, FREE, 100.0)
-    monkeypatch.setattr(tuning, "MOST_COLUMNS", two_rules[0].n_columns - 1)
+    monkeypatch.setattr(tuning, "MANY_COLUMNS", two_rules[0].n_columns - 1)
     few = tuning.tune(*two_rules, FREE, 100.0)
     # A tenth more; one step at a time does not arrive.
     assert_allclose(few.expected_error, whole.expected_error, rtol=0.15)
