@@ -20,16 +20,6 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-__all__ = [
-    "MANY_COLUMNS",
-    "LocalBasis",
-    "NormalFactor",
-    "basis",
-    "in_user_units",
-    "rule_masses",
-    "rule_outputs",
-]
-
 # A rule that fires on one spot only has no spread there; in standard deviations of the input.
 _SMALLEST_SPREAD = 0.05
 # A rule with less than this part of the data's weight has no usable moments.

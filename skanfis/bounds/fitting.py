@@ -176,6 +176,8 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
 
 
 class _ConstrainedFit:
+    """The consequents that keep the constraints, at the premises of one evaluation."""
+
     def __init__(self, model, evaluation, problem, constraints):
         self.problem, self.constraints = problem, constraints
         # The best at premises for which there is an order.

@@ -32,8 +32,8 @@ from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune,
 _ROWS_EACH, FEWEST_ROWS = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
-# Of a pass over the rows of a training.
-_MOST_OPERATIONS = 1e9
+# Of a pass over the rows of a training, with the solution: of n parameters as many as of 10 n rows.
+_MOST_OPERATIONS, _ROWS_OF_SOLUTION = 1e9, 10.0
 # Inputs, or splits, of the largest scores (``TermScores``, ``splits``) that are tried.
 _TRIED = 4
 # A score beyond this is more than chance.
@@ -41,8 +41,8 @@ _SIGNIFICANT = 2.0
 # Terms on an input for its score: two do not see an odd curve, as of a saturation, beside a line.
 _TERMS = 3
 
-# The premises and consequents that keep what is known of the outputs. They are what is judged;
-# training is free.
+# From a training, which is free, to the premises and consequents that keep what is known of the
+# outputs: these are judged.
 Held = Callable[[SeparableProblem, Evaluation], tuple[Antecedent, np.ndarray]]
 
 
@@ -72,9 +72,9 @@ class Plan:
 
 
 class Trials:
-    """Trainings on one set of rows, whose order says nothing.
+    """Trainings of candidates on one set of rows, in an order that says nothing of them.
 
-    ``is_wide``: whether they are few for so many inputs (``lasso``).
+    ``is_wide``: whether the rows are few for so many inputs (``lasso``).
     """
 
     def __init__(self, rows: StandardisedData, plan: Plan, is_wide=False):
@@ -94,7 +94,8 @@ class Trials:
 
         The input of the largest score first; what its terms explain counts for no other.
         """
-        left, found = self.bell_inputs, []
+        left = self.bell_inputs
+        found: list[int] = []
         work = len(scores.basis) * (_TERMS * scores.basis.shape[1]) ** 2
         # Where to project is too much work, all whose scores are beyond chance have terms.
         while left and work * len(found) * len(left) <= _MOST_OPERATIONS:
@@ -167,8 +168,8 @@ class Trials:
             return False
         if any(count > self.spacing.n_values(j) for j, count in enumerate(candidate.counts)):
             return False
-        # Operations of a pass over its rows and of a solution, about.
-        return (self.rows_for(candidate).n_rows + 10.0 * n) * n**2 <= _MOST_OPERATIONS
+        n_rows = self.rows_for(candidate).n_rows + _ROWS_OF_SOLUTION * n
+        return n_rows * n**2 <= _MOST_OPERATIONS
 
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
@@ -179,8 +180,8 @@ class Trials:
             elif candidate.n_rules == 1:
                 found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
-                # Terms of a grid serve many rules: trained on, they tell runs that lie apart from
-                # one another, and are wild between them.
+                # Terms of a grid serve many rules. After more turns they tell apart runs that lie
+                # far from one another, and the rules are wild between these.
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 begun = self._begun[candidate]
                 found = self._train(begun.problem, turns, begun=begun)

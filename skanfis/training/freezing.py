@@ -49,20 +49,13 @@ def frozen_model(
     trained, inputs = evaluation.antecedent, start.consequent_inputs
     offset, scale, n_coefficients = rows.inputs.offset, rows.inputs.scale, 1 + inputs.size
     firing = RuleFiring.of(rows, trained, n_coefficients)
-    coefficients = in_user_units(
-        evaluation.coefficients,
-        rows.inputs,
-        rows.targets,
-        inputs,
-        request.order,
-        start.penalty.common,
-        evaluation.masses,
-    )
+    units = rows.inputs, rows.targets, inputs, request.order
+    common = start.penalty.common, evaluation.masses
     support = rule_support(rows, trained, n_coefficients, firing)
     model = TSKModel(
         antecedent=trained.change_units(offset, scale),
         initial_antecedent=start.antecedent.change_units(offset, scale),
-        coefficients=coefficients,
+        coefficients=in_user_units(evaluation.coefficients, *units, *common),
         reference=offset,
         spread=scale,
         minimum=rows.inputs.minimum,
