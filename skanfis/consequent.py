@@ -20,17 +20,16 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-__all__ = ["LocalBasis", "NormalFactor", "basis", "in_user_units", "rule_masses", "rule_outputs"]
-
 # A rule that fires on one spot only has no spread there; in standard deviations of the input.
 _SMALLEST_SPREAD = 0.05
 # A rule with less than this part of the data's weight has no usable moments.
 _SMALLEST_MASS = 1e-12
 # Tenfold shifts of a matrix that has no Cholesky factor: from rounding to the matrix itself.
 _MOST_SHIFTS = 20
-# Up to this many columns a trace is exact; beyond, an inverse would cost more than all else, and so
-# many random signs give it to about 1 %.
-_MOST_EXACT = 512
+# Beyond so many columns what takes a matrix of their size costs seconds: a search takes fewer
+# steps, and traces are estimates.
+MANY_COLUMNS = 512
+# Random signs that give a trace to about 1 %.
 _PROBES = 32
 _EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
 
@@ -47,10 +46,18 @@ def rule_outputs(coefficients, strengths, basis_rows):
     return weighted, weighted.sum(axis=0)
 
 
-def in_user_units(coefficients, inputs, targets, slopes, order):
-    """Consequents about the inputs' means, from those on [1, z_slopes] of standardised data."""
+def in_user_units(coefficients, inputs, targets, slopes, order, common=(), masses=None):
+    """Consequents about the inputs' means, from those on [1, z_slopes] of standardised data.
+
+    Slopes that are ``common``, as in ``Penalty``, become one to the last bit: their mean by the
+    rules' ``masses``.
+    """
     n_basis = 1 + slopes.size if order == 1 else 1
-    solved = coefficients.reshape(-1, n_basis, targets.scale.size) * targets.scale
+    solved = coefficients.reshape(-1, n_basis, targets.scale.size).copy()
+    for j, rules in common:
+        own = list(rules), 1 + int(np.flatnonzero(slopes == j)[0])
+        solved[own] = np.average(solved[own], axis=0, weights=masses[own[0]])
+    solved *= targets.scale
     solved[:, 0] += targets.offset
     if order == 0:
         return solved
@@ -58,19 +65,6 @@ def in_user_units(coefficients, inputs, targets, slopes, order):
     found[:, 0] = solved[:, 0]
     found[:, 1 + slopes] = solved[:, 1:] / inputs.scale[slopes, None]
     return found
-
-
-def with_common_slopes(coefficients, masses, common, inputs):
-    """Coefficients on [1, z] in which slopes that are common are one, to the last bit.
-
-    ``common`` as in ``Penalty``; ``inputs`` are those of the slopes.
-    """
-    found = coefficients.reshape(masses.size, 1 + len(inputs), -1).copy()
-    place = {int(j): 1 + k for k, j in enumerate(inputs)}
-    for j, rules in common:
-        own = list(rules), place[j]
-        found[own] = np.average(found[own], axis=0, weights=masses[own[0]])
-    return found.reshape(coefficients.shape)
 
 
 def rule_masses(gram, n_rules):
@@ -199,14 +193,14 @@ class NormalFactor:
 
     def trace(self, matrix):
         """Tr (G + P)^-1 A of a symmetric A; of a large one an estimate (Hutchinson 1990)."""
-        if matrix.shape[0] > _MOST_EXACT:
+        if matrix.shape[0] > MANY_COLUMNS:
             signs, solved = self._probes
             return float(np.vdot(solved, matrix @ signs)) / _PROBES
         return float(np.vdot(self.root @ matrix, self.root))
 
     def squares(self, rows):
         """The diagonal of R (G + P)^-1 R' for the rows of R; estimated as in ``trace``."""
-        if rows.shape[1] > _MOST_EXACT:
+        if rows.shape[1] > MANY_COLUMNS:
             signs, solved = self._probes
             return np.sum((rows @ solved) * (rows @ signs), axis=1) / _PROBES
         half = rows @ self.root.T

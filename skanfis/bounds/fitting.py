@@ -14,7 +14,7 @@ import numpy as np
 
 from .._validation import warn_user
 from ..antecedent import TreeAntecedent
-from ..consequent import NormalFactor, in_user_units, with_common_slopes
+from ..consequent import NormalFactor, in_user_units
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..learning.data import Scale
 from ..learning.objective import Evaluation
@@ -176,6 +176,8 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
 
 
 class _ConstrainedFit:
+    """The consequents that keep the constraints, at the premises of one evaluation."""
+
     def __init__(self, model, evaluation, problem, constraints):
         self.problem, self.constraints = problem, constraints
         # The best at premises for which there is an order.
@@ -359,14 +361,13 @@ class _ConstrainedFit:
     def _with(self, local, targets):
         """The model of local consequents of some targets."""
         problem, inputs = self.problem, self.problem.rows.inputs
-        common, slopes = problem.penalty.common, problem.consequent_inputs
+        design = problem.consequent_inputs, problem.order
+        common = problem.penalty.common, self.model.rule_weights
         coefficients = problem.local.to_global(local)
-        coefficients = with_common_slopes(coefficients, self.model.rule_weights, common, slopes)
-        coefficients = in_user_units(coefficients, inputs, targets, slopes, problem.order)
         return replace(
             self.model,
             antecedent=self.free.antecedent.change_units(inputs.offset, inputs.scale),
-            coefficients=coefficients,
+            coefficients=in_user_units(coefficients, inputs, targets, *design, *common),
             output_names=tuple(map(str, range(targets.scale.size))),
         )
 

@@ -51,10 +51,12 @@ _UNDERDETERMINED = ((1.0, 1e-4), (ROWS_EACH, 1e-6))
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
 _LONGEST_STEP = np.log(100.0)
-# Successive steps of a weight are alike from this ratio on; next to one, all the way is open.
-_ALIKE, _MOST_ALIKE = 0.5, 0.99
+# Successive steps of a weight are alike from this ratio on.
+_ALIKE = 0.5
 # Below all weights: a logarithm can be taken of it.
 _NOTHING = np.finfo(float).tiny
+# Of a number of parameters, and of what is paid for them.
+_ROUNDING = 1e-12
 # What changes a weight by less leaves its second digit as it is.
 _SETTLED = 5e-3
 # What a number, or another turn, must be worth of the evidence, in -2 log p: as much as a parameter
@@ -215,7 +217,7 @@ def least_weights(posterior: Laplace, n_distinct):
     return Penalty(agreement, max(least, noise / _FAR**2), least)
 
 
-def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
+def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
     """The penalty after one step of every free weight, none below ``least``.
 
     With too few distinct rows for so many consequents, one weight is found for all slopes: a weight
@@ -244,7 +246,8 @@ def reestimated(posterior: Laplace, free, least=None, n_distinct=np.inf):
 
 
 def _log_ratio(determined, cost):
-    return np.log((determined + 1e-12) / (cost + 1e-12))
+    # What is neither determined nor paid for stays as it is.
+    return np.log((determined + _ROUNDING) / (cost + _ROUNDING))
 
 
 def _step_to_likeness(cost, determined, weights):
@@ -265,10 +268,8 @@ def _limited(penalty, line, weights, moves, others, least):
     slopes, components = line.kinds == "slope", line.kinds == "alpha"
     # All of a kind, or none.
     moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
-    low, high = line.weights(SMALLEST), line.weights(LARGEST)
-    if least is not None:
-        low = np.maximum(low, line.weights(least))
-    found = np.where(moves, np.clip(weights, low, high), others)
+    low = np.maximum(line.weights(SMALLEST), line.weights(least))
+    found = np.where(moves, np.clip(weights, low, line.weights(LARGEST)), others)
     after: dict[str, Any] = dict(zip(WEIGHTS, found.tolist(), strict=False))
     if moves[slopes].any():
         after["slope"], after["slope_pulls"] = mean_and_parts(found[slopes], line.slopes)
@@ -282,7 +283,8 @@ def extrapolated(line, before, now, after, free, least):
 
     Where data hardly decide on a weight, as with more columns than rows, every step is a small part
     of the way. By Aitken's rule, the logarithms being a geometric sequence, the rest of the way is
-    1 / (1 - r) last steps, r the ratio of one to that before; never more than the largest step.
+    1 / (1 - r) last steps, r the ratio of one to that before; never more than the largest step,
+    which is taken too where r is one or more.
     ``before`` is None where there is no such step.
     """
     if before is None:
@@ -294,8 +296,8 @@ def extrapolated(line, before, now, after, free, least):
     moves &= (step * last > 0.0) & (np.abs(step) >= _ALIKE * np.abs(last))
     if not moves.any():
         return after
-    ratio = np.minimum(step / np.where(moves, last, 1.0), _MOST_ALIKE)
-    jump = np.clip(step / (1.0 - ratio), -_LONGEST_STEP, _LONGEST_STEP)
+    left = np.maximum(1.0 - step / np.where(moves, last, 1.0), np.finfo(float).eps)
+    jump = np.clip(step / left, -_LONGEST_STEP, _LONGEST_STEP)
     far = np.where(moves, np.exp(second + jump), weights[2])
     return _limited(after, line, far, moves, weights[2], least)
 

@@ -25,7 +25,8 @@ _FIRST_RADIUS = 0.3
 # However well the steps before have done: a whole spacing.
 _LARGEST_RADIUS = 1.0
 # Steps up to this much longer than the radius count as on its edge: the radius itself is a guess.
-_LENGTH_SLACK = 1.01
+# So do those that the box has shortened, down to the second part of it.
+_LENGTH_SLACK, _ON_EDGE = 1.01, 0.9
 # Added to every curvature: this part of the largest, far above what rounding leaves where there is
 # none and far below what data give; and this part of the cost, which a step of one must pay for.
 _SMALLEST_CURVATURE = 1e-6
@@ -105,7 +106,7 @@ def varpro(
             accepted = ratio > 0.0
             if not ratio >= 0.25:  # also where the trial is not finite
                 radius = 0.25 * min(length, radius)
-            elif ratio > 0.75 and length > 0.9 * radius:
+            elif ratio > 0.75 and length > _ON_EDGE * radius:
                 radius = min(2.0 * radius, _LARGEST_RADIUS)
             # What a smaller step promises is lost in the rounding of the cost.
             if accepted or radius < NEXT_TO_NOTHING:

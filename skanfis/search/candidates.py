@@ -92,8 +92,8 @@ class Candidate:
 def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = None):
     """The antecedent that a candidate begins with.
 
-    Clusters are sought in the ``rows``; what is no set of clusters anew keeps what a ``smaller``
-    one has learnt.
+    A grid, a tree and scattered rules that are grown go on from what a ``smaller`` candidate has
+    learnt; other scattered rules begin at clusters of the ``rows``.
     """
     known: Any = None if smaller is None else smaller.evaluation.antecedent
     if candidate.splits:
@@ -122,10 +122,11 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
 
 
 class TermScores:
-    """How much the residual of a model asks for terms, beside those that are told.
+    """Score tests: how much of the residual of a model further terms on an input would explain.
 
-    As of the splits of a tree (``splits``), with the shares nu_k of so many even Gaussian terms on
-    an input, less their means, in the place of h - p; z_i are those of the inputs ``crossed``.
+    The statistic of the splits of a tree (``splits``), with the shares nu_k of so many evenly
+    spaced Gaussian terms, less their means, in the place of h - p; z_i are those of the inputs
+    ``crossed``. What was projected out before does not count (Rao 1948).
     """
 
     def __init__(self, tuned: Tuned, spacing: Spacing, crossed):
@@ -135,7 +136,7 @@ class TermScores:
         mean = np.average(tuned.residual, axis=0, weights=self.weight)
         self.residual, self.known = root * (tuned.residual - mean), np.empty((rows.n_rows, 0))
 
-    def tell(self, j, count):
+    def project_out(self, j, count):
         """Take out what so many terms on an input explain, of the residual and of functions."""
         pairs = self._shares(j, count)[:, :, None] * self.basis[:, None]
         functions = pairs.reshape(len(self.X), -1)
@@ -146,19 +147,19 @@ class TermScores:
         self.known = np.hstack([self.known, added])
         self.residual -= added @ (added.T @ self.residual)
 
-    def of(self, asking):
+    def of(self, pairs):
         """Of every pair of an input and a number of terms, in deviations from chance."""
         scores, squared, n_known = [], self.basis**2, self.known.shape[1]
-        asked = (self.residual[:, :, None] * self.basis[:, None]).reshape(len(self.X), -1)
+        products = (self.residual[:, :, None] * self.basis[:, None]).reshape(len(self.X), -1)
         part_free = max(1.0 - n_known / len(self.X), np.finfo(float).eps)
         variance = np.sum(self.residual**2, axis=0) / (part_free * self.weight.sum())
-        for j, count in asking:
+        for j, count in pairs:
             shares = self._shares(j, count)
             norm = (shares**2).T @ squared
             if n_known:
-                told = [self.known.T @ (own[:, None] * self.basis) for own in shares.T]
-                norm = np.maximum(norm - np.sum(np.square(told), axis=1), _RANK * norm)
-            along = (shares.T @ asked).reshape(count, variance.size, -1)
+                explained = [self.known.T @ (own[:, None] * self.basis) for own in shares.T]
+                norm = np.maximum(norm - np.sum(np.square(explained), axis=1), _RANK * norm)
+            along = (shares.T @ products).reshape(count, variance.size, -1)
             least = np.finfo(float).tiny
             squares = along**2 / np.maximum(norm[:, None] * variance[:, None], least)
             free = 1.0 - 1.0 / count  # one of the shares follows from the others

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TreeAntecedent
+from ..consequent import MANY_COLUMNS
 from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_EACH
 from ..learning.objective import SeparableProblem
@@ -23,7 +24,6 @@ from .trials import FEWEST_ROWS, Plan
 from .tuning import (
     ARRIVING,
     FIRST_STEPS,
-    MOST_COLUMNS,
     MOST_TURNS,
     Tuned,
     cost_of,
@@ -92,7 +92,7 @@ def tuned_start(
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
-    if is_bounded and has_rows and problem.n_columns <= MOST_COLUMNS:
+    if is_bounded and has_rows and problem.n_columns <= MANY_COLUMNS:
         unbounded = Premise.of(antecedent, low, high, is_unbounded=True)
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
@@ -109,16 +109,18 @@ def tuned_start(
 
 def _as_given(tuned: Tuned):
     """What there is to say of rules that were given."""
-    problem = tuned.problem
-    n_rules = problem.antecedent.n_rules
-    kind = "scattered" if problem.antecedent.grid_counts is None else "grid"
-    if isinstance(problem.antecedent, TreeAntecedent):
-        kind = "tree"
+    antecedent, n_mfs = tuned.problem.antecedent, None
+    n_rules = antecedent.n_rules
+    kind = "tree" if isinstance(antecedent, TreeAntecedent) else "scattered"
+    if antecedent.grid_counts is not None:
+        kind, n_mfs = "grid" if n_rules > 1 else "one rule", [1] * tuned.problem.rows.X.shape[1]
+        for j, count in zip(antecedent.inputs_with_terms, antecedent.grid_counts, strict=True):
+            n_mfs[j] = count
     return {
-        "structure": f"{n_rules} rules as given",
+        "structure": "one rule as given" if n_rules == 1 else f"{n_rules} rules as given",
         "kind": kind,
         "rules": n_rules,
-        "n_mfs": None,
+        "n_mfs": n_mfs,
         "reading_cost": cost_of(tuned),
         "expected_error": float(np.sqrt(tuned.expected_error)),
         "chosen": True,

@@ -32,17 +32,17 @@ from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune,
 _ROWS_EACH, FEWEST_ROWS = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
-# Of a pass over the rows of a training.
-_MOST_OPERATIONS = 1e9
-# Of the inputs, or splits, that the residual asks for most, so many are tried.
+# Of a pass over the rows of a training, with the solution: of n parameters as many as of 10 n rows.
+_MOST_OPERATIONS, _ROWS_OF_SOLUTION = 1e9, 10.0
+# Inputs, or splits, of the largest scores (``TermScores``, ``splits``) that are tried.
 _TRIED = 4
-# Deviations by which what an input's terms would explain exceeds what they would of noise.
+# A score beyond this is more than chance.
 _SIGNIFICANT = 2.0
-# By which residuals are asked: two do not see an odd curve, as of a saturation, beside a line.
+# Terms on an input for its score: two do not see an odd curve, as of a saturation, beside a line.
 _TERMS = 3
 
-# The premises and consequents that keep what is known of the outputs. They are what is judged;
-# training is free.
+# From a training, which is free, to the premises and consequents that keep what is known of the
+# outputs: these are judged.
 Held = Callable[[SeparableProblem, Evaluation], tuple[Antecedent, np.ndarray]]
 
 
@@ -72,9 +72,9 @@ class Plan:
 
 
 class Trials:
-    """Trainings on one set of rows, whose order says nothing.
+    """Trainings of candidates on one set of rows, in an order that says nothing of them.
 
-    ``is_wide``: whether they are few for so many inputs (``lasso``).
+    ``is_wide``: whether the rows are few for so many inputs (``lasso``).
     """
 
     def __init__(self, rows: StandardisedData, plan: Plan, is_wide=False):
@@ -83,32 +83,31 @@ class Trials:
         if is_wide:
             self.slope_inputs = lasso_inputs(rows, plan.consequent_inputs)
         self.spacing = Spacing(rows)
-        # Which of two values is meant no reader can say by a bell: that is what a tree is for.
+        # A bell around one of two values is a little true of the other; a tree's cut is not.
         self.bell_inputs = [int(j) for j in plan.premise_inputs if self.spacing.n_values(j) > 2]
         self.one_rule = Candidate((1,) * rows.X.shape[1])
         self._found: dict[Candidate, Tuned] = {}
         self._begun: dict[Candidate, Tuned] = {}
 
-    def _asking(self, candidate):
-        """Inputs for terms of scattered rules: those that ask by more than chance, at first one.
+    def _significant_inputs(self, candidate, scores):
+        """Inputs for terms of scattered rules: of scores beyond chance; for the first rules one.
 
-        The loudest first; what it asks for, no other does.
+        The input of the largest score first; what its terms explain counts for no other.
         """
         left = self.bell_inputs
-        asked: list[int] = []
-        scores = TermScores(self.tuned(candidate), self.spacing, self._crossed(candidate))
+        found: list[int] = []
         work = len(scores.basis) * (_TERMS * scores.basis.shape[1]) ** 2
-        # Where to tell them is too much work, all that ask have terms.
-        while left and work * len(asked) * len(left) <= _MOST_OPERATIONS:
-            if asked:
-                scores.tell(asked[-1], _TERMS)
-            found = scores.of([(j, _TERMS) for j in left])
-            loudest = left[int(np.argmax(found))]
-            left = [left[k] for k in np.flatnonzero(found > _SIGNIFICANT)]
-            if left or not (asked or candidate.inputs):
-                asked.append(loudest)
-            left = [j for j in left if j != loudest]
-        return [*asked, *left]
+        # Where to project is too much work, all whose scores are beyond chance have terms.
+        while left and work * len(found) * len(left) <= _MOST_OPERATIONS:
+            if found:
+                scores.project_out(found[-1], _TERMS)
+            values = scores.of([(j, _TERMS) for j in left])
+            largest = left[int(np.argmax(values))]
+            left = [left[k] for k in np.flatnonzero(values > _SIGNIFICANT)]
+            if left or not (found or candidate.inputs):
+                found.append(largest)
+            left = [j for j in left if j != largest]
+        return [*found, *left]
 
     def rows_for(self, candidate):
         """As many as its parameters need, by powers of two: most candidates see the same."""
@@ -118,23 +117,10 @@ class Trials:
         return replace(part, inputs=unit_scale(part.X))
 
     def larger(self, kind, candidate) -> Candidate | None:
-        """The next of a kind; None where there are not the rows."""
-        if kind == "scattered":
-            anew = candidate.with_more_clusters(self._asking(candidate))
-            grown = [anew, replace(anew, is_grown=True)] if candidate.n_clusters else [anew]
-            grown = grown if anew.inputs else []
-        elif kind == "tree":
-            inputs = self.plan.premise_inputs
-            splits = best_splits(self.tuned(candidate), inputs, self._crossed(candidate), _TRIED)
-            grown = [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
-        else:
-            asking = [(j, candidate.counts[j] + _TERMS - 1) for j in self.bell_inputs]
-            crossed = self._crossed(candidate)
-            scores = TermScores(self.tuned(candidate), self.spacing, crossed).of(asking)
-            best = np.argsort(-scores, kind="stable")[:_TRIED]
-            grown = [candidate.with_more_terms(self.bell_inputs[k]) for k in best]
+        """The next of a kind: of those that are tried, the one that promises most; or None."""
         smaller = self.tuned(candidate)
-        problems = {one: self._problem(one, smaller) for one in grown if self._is_small(one)}
+        tried = filter(self._is_small, self._tried(kind, candidate, smaller))
+        problems = {one: self._problem(one, smaller) for one in tried}
         # Clusters anew have learnt nothing yet: beside rules that go on they take some turns first.
         turns = FEW_TURNS if kind == "scattered" else 0
         # Of rows that are alike but for a few, there are fewer clusters than were asked for.
@@ -145,6 +131,22 @@ class Trials:
         }
         self._begun |= begun
         return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
+
+    def _tried(self, kind, candidate, tuned):
+        """What may be the next of a kind, by the residual of a candidate, ``tuned``."""
+        crossed = self._crossed(candidate)
+        if kind == "tree":
+            splits = best_splits(tuned, self.plan.premise_inputs, crossed, _TRIED)
+            return [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
+        scores = TermScores(tuned, self.spacing, crossed)
+        if kind == "grid":
+            values = scores.of([(j, candidate.counts[j] + _TERMS - 1) for j in self.bell_inputs])
+            best = np.argsort(-values, kind="stable")[:_TRIED]
+            return [candidate.with_more_terms(self.bell_inputs[k]) for k in best]
+        anew = candidate.with_more_clusters(self._significant_inputs(candidate, scores))
+        if not anew.inputs:
+            return []
+        return [anew, replace(anew, is_grown=True)] if candidate.n_clusters else [anew]
 
     def _slope_inputs(self, candidate):
         """Inputs that the consequents of a candidate are linear in."""
@@ -166,8 +168,8 @@ class Trials:
             return False
         if any(count > self.spacing.n_values(j) for j, count in enumerate(candidate.counts)):
             return False
-        # Operations of a pass over its rows and of a solution, about.
-        return (self.rows_for(candidate).n_rows + 10.0 * n) * n**2 <= _MOST_OPERATIONS
+        n_rows = self.rows_for(candidate).n_rows + _ROWS_OF_SOLUTION * n
+        return n_rows * n**2 <= _MOST_OPERATIONS
 
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
@@ -178,8 +180,8 @@ class Trials:
             elif candidate.n_rules == 1:
                 found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
-                # Terms of a grid serve many rules: trained on, they tell runs that lie apart from
-                # one another, and are wild between them.
+                # Terms of a grid serve many rules. After more turns they tell apart runs that lie
+                # far from one another, and the rules are wild between these.
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 begun = self._begun[candidate]
                 found = self._train(begun.problem, turns, begun=begun)

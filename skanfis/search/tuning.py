@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ..consequent import MANY_COLUMNS
 from ..learning.evidence import (
     LARGEST,
     PRIOR_DISPLACEMENT,
@@ -34,21 +35,17 @@ from ..learning.sparse_slopes import sparse_slopes
 from ..learning.varpro import TOLERANCE, varpro
 from ..reading_cost import reading_cost
 
-# In the middle of what data of every kind ask for; from there the first steps find their way.
+# In the middle of the weights that the evidence finds for data of every kind.
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Steps of the weights at premises that have not moved yet: each of a hundredfold at the most, they
 # lead from the start to any end.
 FIRST_STEPS = 5
 # Where no premises follow, the weights arrive: most of them within ten.
 ARRIVING = 50
-# Beyond so many consequent parameters every step costs seconds, and there are fewer.
-MOST_COLUMNS = 512
-# Steps and turns of these; so many turns have grids as well (``trials``).
+# Steps and turns beyond ``MANY_COLUMNS``; so many turns have grids as well (``trials``).
 _FEW_STEPS, FEW_TURNS = 3, 2
-# Part of the rows that effective parameters of the premises may be.
-_MOST_EFFECTIVE = 0.5
-# A turn: a few iterations of the premises, and steps of the weights to follow them. Neither is
-# finished while the other moves: what is left is done in the training that follows.
+# A turn: a few iterations of the premises, then steps of the weights. Neither converges while the
+# other moves: the training that follows does the rest.
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
 # The first turn of terms without bounds goes far.
 _UNBOUNDED_ITERATIONS = 25
@@ -69,11 +66,6 @@ class Tuned:
     def penalty(self):
         """The weights found."""
         return self.posterior.penalty
-
-    @property
-    def score(self):
-        """-2 log p."""
-        return self.posterior.minus_twice_log
 
     @cached_property
     def solved(self):
@@ -98,11 +90,11 @@ class Tuned:
 
         That of the consequents on rows that are left out one by one, times what Akaike's final
         prediction error takes for the premises, (1 + k / n) / (1 - k / n) with their effective
-        number k; infinite where that is more than half of the rows.
+        number k; infinite where these are as many as the rows.
         """
         n_rows = self.posterior.n_rows
         share = self.posterior.n_effective_premises / n_rows
-        if share > _MOST_EFFECTIVE:
+        if share >= 1.0:
             return np.inf
         left_out = self.problem.leave_one_out_error(self.solved, n_rows)
         return left_out * (1.0 + share) / (1.0 - share)
@@ -124,7 +116,7 @@ def tune(
     weight; ``begun`` is where no turn, or the first ``FEW_TURNS``, have ended before.
     """
     steps = _STEPS
-    if problem.n_columns > MOST_COLUMNS:
+    if problem.n_columns > MANY_COLUMNS:
         first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
@@ -163,9 +155,9 @@ def _risen(tuned: Tuned, premise, free, turns, steps, has_least=True) -> Tuned:
     best = last = tuned
     for _ in range(turns):
         last = _turned(last, premise, last.penalty, free, steps, has_least=has_least)
-        rises = last.score < best.score - WORTH
-        best = last if last.score < best.score else best
-        if not rises:
+        gain = best.posterior.minus_twice_log - last.posterior.minus_twice_log
+        best = last if gain > 0.0 else best
+        if not gain > WORTH:
             break
     return best
 
@@ -212,7 +204,7 @@ def _improved(
 
     posterior, before = posterior_at(penalty), None
     for left in reversed(range(steps)):
-        least = least_weights(posterior, n_distinct) if has_least else None
+        least = least_weights(posterior, n_distinct) if has_least else SMALLEST
         plain = reestimated(posterior, free, least, n_distinct)
         far = extrapolated(line, before, posterior.penalty, plain, free, least)
         if before is not None and is_settled(line, posterior.penalty, far):
@@ -260,7 +252,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, left: float) -> Tu
 def with_sparse_slopes(tuned: Tuned, free, worth) -> Tuned:
     """The same with slopes that are worth so much alone: else one for several rules, or none."""
     problem, posterior, x = tuned.problem, tuned.posterior, tuned.displacement
-    if not {"alpha", "slope"} <= set(free) or problem.n_columns > MOST_COLUMNS:
+    if not {"alpha", "slope"} <= set(free) or problem.n_columns > MANY_COLUMNS:
         return tuned
     common, absent = sparse_slopes(posterior, tuned.solved.normal.coefficients, worth)
     penalty = replace(tuned.penalty, common=common, absent=absent)

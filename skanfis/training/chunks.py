@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..blocks import fitting_rows, row_blocks
-from ..consequent import LocalBasis, basis, in_user_units, with_common_slopes
+from ..consequent import LocalBasis, basis, in_user_units
 from ..learning import SolverResult
 from ..learning.covariance import posterior_of
 from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
@@ -277,13 +277,11 @@ def _model(sums, problem, evaluation):
         # Premises stay: what is not known of them is not counted.
         posterior = posterior_of(problem, None, evaluation, sums.effective_weight)
     inputs, targets, own = sums.inputs, sums.targets, sums.consequent_inputs
-    order = 1 if own.size else 0
-    coefficients = with_common_slopes(
-        evaluation.coefficients, evaluation.masses, problem.penalty.common, own
-    )
+    units = inputs, targets, own, 1 if own.size else 0
+    common = problem.penalty.common, evaluation.masses
     return replace(
         sums.base,
-        coefficients=in_user_units(coefficients, inputs, targets, own, order),
+        coefficients=in_user_units(evaluation.coefficients, *units, *common),
         reference=inputs.offset,
         spread=inputs.scale,
         minimum=inputs.minimum,

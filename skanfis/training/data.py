@@ -27,6 +27,8 @@ from ..search import Start
 
 @dataclass(frozen=True, eq=False)
 class ValidatedData:
+    """What a user gave, checked: rows of positive weight as arrays of floats, and their names."""
+
     X: np.ndarray
     y: np.ndarray  # (n_rows, n_outputs)
     sample_weight: np.ndarray | None  # positive

@@ -220,12 +220,10 @@ class _Fit:
             n_rows *= share**2 / square
         posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
         model, redundant = self.model(run.start, run.evaluation)
-        model = replace(model, posterior=posterior)
         assert model.support is not None
         marginals = input_marginals(rows, run.evaluation.antecedent)
         support = replace(model.support, marginals=marginals)
-        # Terms of an input that is 0 or 1 are called so, which is known from now on.
-        model = replace(model, support=support, term_names=run.start.term_names)
+        model = replace(model, posterior=posterior, support=support)
         model = replace(model, rows_extrapolation=extrapolation_distance(model, rows))
         model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
         if weights is not None:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..consequent import in_user_units, with_common_slopes
+from ..consequent import in_user_units
 from ..learning import SolverResult
 from ..learning.data import StandardisedData
 from ..learning.firing import RuleFiring, rule_support
@@ -49,14 +49,13 @@ def frozen_model(
     trained, inputs = evaluation.antecedent, start.consequent_inputs
     offset, scale, n_coefficients = rows.inputs.offset, rows.inputs.scale, 1 + inputs.size
     firing = RuleFiring.of(rows, trained, n_coefficients)
-    coefficients = with_common_slopes(
-        evaluation.coefficients, evaluation.masses, start.penalty.common, inputs
-    )
+    units = rows.inputs, rows.targets, inputs, request.order
+    common = start.penalty.common, evaluation.masses
     support = rule_support(rows, trained, n_coefficients, firing)
     model = TSKModel(
         antecedent=trained.change_units(offset, scale),
         initial_antecedent=start.antecedent.change_units(offset, scale),
-        coefficients=in_user_units(coefficients, rows.inputs, rows.targets, inputs, request.order),
+        coefficients=in_user_units(evaluation.coefficients, *units, *common),
         reference=offset,
         spread=scale,
         minimum=rows.inputs.minimum,

@@ -9,7 +9,13 @@ from scipy import integrate, optimize, stats
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.evidence import PRIOR_DISPLACEMENT, extrapolated, laplace, reestimated
+from skanfis.learning.evidence import (
+    PRIOR_DISPLACEMENT,
+    SMALLEST,
+    extrapolated,
+    laplace,
+    reestimated,
+)
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
@@ -255,7 +261,7 @@ def test_logarithms_that_shrink_by_one_factor_are_taken_to_their_limit(ratio):
     line = SeparableProblem(rows, ONE_RULE, 1, FIRST).common_line
     agreements = 0.05 * 0.02 ** (ratio ** np.arange(3))
     three = [Penalty(agreement=float(one), alpha=1.0, slope=1.0) for one in agreements]
-    found = extrapolated(line, *three, ("agreement", "alpha"), None)
+    found = extrapolated(line, *three, ("agreement", "alpha"), SMALLEST)
     assert_allclose(found.agreement, 0.05, rtol=1e-12)
     assert found.alpha == 1.0
 

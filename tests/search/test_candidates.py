@@ -124,5 +124,5 @@ def test_scores_of_terms_are_the_formula_term_by_term(rng, count, n_outputs, tol
     pairs = [(j, count) for j in asking]
     scores = TermScores(tuned, spacing, np.arange(4))
     for one in told:
-        scores.tell(*one)
+        scores.project_out(*one)
     assert_allclose(scores.of(pairs), expected, rtol=1e-5)

@@ -199,11 +199,14 @@ def test_what_does_not_fit_is_refused(data, settings, message):
 @pytest.mark.theory
 def test_rules_that_are_given_are_one_candidate(data):
     X, y = data
-    for settings, kind in (({"n_mfs": [2, 2, 1]}, "grid"), ({"partition": KMEANS}, "scattered")):
+    given = ({"n_mfs": [2, 1, 2]}, "grid"), ({"partition": KMEANS}, "scattered")
+    for settings, kind in (*given, ({"n_mfs": [1, 1, 1]}, "one rule")):
         model = ANFISRegressor(**settings).fit(X, y)
         (told,) = model.structures_
         assert (told["kind"], told["rules"], told["chosen"]) == (kind, model.n_rules_, True)
-        assert (told["structure"], told["n_mfs"]) == (f"{model.n_rules_} rules as given", None)
+        words = "one rule" if kind == "one rule" else f"{model.n_rules_} rules"
+        assert told["structure"] == f"{words} as given"
+        assert told["n_mfs"] == settings.get("n_mfs")
         assert told["reading_cost"] == model.readability_.reading_cost
         # On the rows that it was trained on it leaves less, but not much.
         left = np.std(y - model.predict(X)) / y.std()

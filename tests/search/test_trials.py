@@ -142,11 +142,13 @@ class TestSequences:
         assert sum(map(len, asked)) <= 5 * 3 + 2
         assert all(set(one) >= {0, 1, 2} for one in asked)
 
-    def test_all_that_ask_get_terms_where_to_tell_is_too_much_work(self, rng, monkeypatch):
+    def test_all_beyond_chance_get_terms_where_to_project_is_too_much_work(self, rng, monkeypatch):
         X = rng.normal(size=(500, 6)) + rng.normal(size=(500, 1))
         trials = trials_of(X, np.tanh(X[:, :3].sum(axis=1)) + 0.1 * rng.normal(size=500))
         monkeypatch.setattr("skanfis.search.trials._MOST_OPERATIONS", 1e5)
-        assert sorted(trials._asking(trials.one_rule)) == [0, 1, 2, 3, 4, 5]
+        line = trials.one_rule
+        (anew,) = trials._tried("scattered", line, trials.tuned(line))
+        assert anew.inputs == (0, 1, 2, 3, 4, 5)
 
     def test_rules_are_added_where_those_that_have_learnt_leave_most(self, rng):
         """One rule more: its cluster is all rows, by their squared residuals."""
