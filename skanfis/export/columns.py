@@ -36,6 +36,7 @@ class Column:
     place: int = -1
     level: Level | None = None  # what it tells, if it is such an output
     fill: Any = None  # in the place of what is missing
+    imputed: Callable[..., np.ndarray] | None = None  # the column as an imputer hands it on
 
     def values(self, X):
         """The input on the rows of the user's table."""
@@ -79,9 +80,9 @@ class Reader:
                 f"X must have the columns {', '.join(map(repr, self.names))}, in this order; it "
                 f"has {', '.join(map(repr, given))}."
             )
-        table = X if any(one.encode for one in self.inputs) else _as_numbers(X)
-        n_columns = np.shape(table)[1]
-        if n_columns != len(self.names):
+        # What does not reach the model need not be numbers.
+        table = X if given is not None or any(one.encode for one in self.inputs) else _as_numbers(X)
+        if (n_columns := np.shape(table)[1]) != len(self.names):
             raise ValueError(
                 f"X has {n_columns} columns, the estimator takes {len(self.names)}: "
                 f"{', '.join(map(repr, self.names))}."

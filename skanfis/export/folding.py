@@ -9,6 +9,7 @@ inputs of the folded model in its place.
 from collections import UserList
 from copy import copy
 from dataclasses import replace
+from functools import partial
 from itertools import repeat
 from typing import Any
 
@@ -112,7 +113,7 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
         return estimator, Reader(inputs, list(estimator.input_names), True)
     (*steps, (label, last)), target_steps = _steps_of("", estimator)
     model = _model_of(label, last)
-    first = next((step for _, step in steps if not _is_passthrough(step)), last)
+    first = next((step for _, step in steps if step not in (None, "passthrough")), last)
     given = getattr(first, "feature_names_in_", None)
     names = [f"x{j}" for j in range(first.n_features_in_)] if given is None else list(given)
     columns = [Column(j, name) for j, name in enumerate(names)]
@@ -154,7 +155,7 @@ def final_step(estimator: Any, X: Any = None) -> tuple[Any, Any]:
     if not isinstance(estimator, Pipeline):
         return estimator, X
     for _, step in estimator.steps[:-1] if X is not None else ():
-        X = X if _is_passthrough(step) else step.transform(X)
+        X = X if step in (None, "passthrough") else step.transform(X)
     return final_step(estimator.steps[-1][1], X)
 
 
@@ -163,10 +164,6 @@ def found_by_search(estimator: Any) -> Any:
     while hasattr(estimator, "best_estimator_"):
         estimator = estimator.best_estimator_
     return estimator
-
-
-def _is_passthrough(step):
-    return step is None or (isinstance(step, str) and step == "passthrough")
 
 
 def _described(label, step):
@@ -191,16 +188,14 @@ def _steps_of(label, estimator):
 
 
 def _columns_after(label, step, columns):
-    if not columns or _is_passthrough(step):
+    if not columns or step in (None, "passthrough"):
         return columns
     if isinstance(step, Pipeline):
         for name, part in step.steps:
             columns = _columns_after(name, part, columns)
         return columns
-    if type(step) is OneHotEncoder:
-        return _encoded(label, step, columns)
-    if type(step) is SimpleImputer:
-        return _imputed(label, step, columns)
+    if read := {OneHotEncoder: _encoded, SimpleImputer: _imputed}.get(type(step)):
+        return read(label, step, columns)
     if isinstance(step, SelectorMixin):
         return [columns[j] for j in step.get_support(indices=True)]
     if type(step) is ColumnTransformer:
@@ -224,38 +219,43 @@ def _imputed(label, imputer, columns):
         )
     if pd.isna(imputer.statistics_).any():
         _refuse(label, imputer, "it drops a column that has no values")
-    return [
-        replace(column, fill=value if column.scale == 1.0 else column.offset + column.scale * value)
-        for column, value in zip(columns, imputer.statistics_.tolist(), strict=True)
-    ]
+
+    def imputed(j, X):
+        return np.asarray(imputer.transform(part_of(X, [one.source for one in columns])))[:, j]
+
+    found = list(columns)
+    for j, (one, fill) in enumerate(zip(columns, imputer.statistics_.tolist(), strict=True)):
+        # One imputer leaves the next nothing to fill.
+        if not one.imputed:
+            raw = fill if (one.offset, one.scale) == (0.0, 1.0) else one.offset + one.scale * fill
+            found[j] = replace(one, fill=raw, imputed=partial(imputed, j))
+    return found
 
 
 def _encoded(label, encoder, columns):
     """Indicators in the place of the columns that an encoder is given."""
-    if any(replace(column, fill=None) != Column(column.source, column.name) for column in columns):
+    if any(one.encode or (one.offset, one.scale) != (0.0, 1.0) for one in columns):
         _refuse(label, encoder, "it must be given columns of the table as they are")
-    fills = [column.fill for column in columns]
     sources = {column.name: column.source for column in columns}
     given = None if hasattr(encoder, "feature_names_in_") else list(sources)
     by_column = copy(encoder).set_params(feature_name_combiner=lambda name, _: name)
 
     def encode(X):
         table = part_of(X, list(sources.values()))
-        if any(fill is not None for fill in fills):
-            table = pd.DataFrame(table)
-            table = table.fillna(dict(zip(table.columns, fills, strict=True)))
+        if any(one.imputed for one in columns):
+            # By the imputer itself: to one that fills NaN, None is a category.
+            parts = [one.imputed(X) if one.imputed else part_of(X, [one.source]) for one in columns]
+            table = pd.DataFrame(np.column_stack(parts), columns=list(sources), dtype=object)
             table = table if hasattr(encoder, "feature_names_in_") else table.to_numpy()
         encoded = encoder.transform(table)
         return encoded.toarray() if hasattr(encoded, "toarray") else np.asarray(encoded)
 
     of_each = (one.get_feature_names_out(given).tolist() for one in (by_column, encoder))
-    names = zip(*of_each, strict=True)
     # All that there can be.
-    known: dict[str, Any] = {}
-    if encoder.handle_unknown == "error" and not hasattr(encoder, "infrequent_categories_"):
-        known = dict(zip(sources, encoder.categories_, strict=True))
+    is_all = encoder.handle_unknown == "error" and not hasattr(encoder, "infrequent_categories_")
+    known = dict(zip(sources, encoder.categories_, strict=True)) if is_all else {}
     found = []
-    for place, (column, name) in enumerate(names):
+    for place, (column, name) in enumerate(zip(*of_each, strict=True)):
         level = name.removeprefix(f"{column}_")
         others = tuple(other for other in map(str, known.get(column, ())) if other != level)
         told = Level(column, level, others)
@@ -372,10 +372,9 @@ def _with_raw_target(model, label, transformer):
     offset, scale = np.array([(column.offset, column.scale) for column in columns]).T
     coefficients = model.coefficients * scale
     coefficients[:, 0] += offset
-    target, posterior = model.target, model.posterior
     return replace(
         model,
         coefficients=coefficients,
-        target=target and target.change_units(offset, scale),
-        posterior=posterior and posterior.change_target_units(scale),
+        target=model.target and model.target.change_units(offset, scale),
+        posterior=model.posterior and model.posterior.change_target_units(scale),
     )

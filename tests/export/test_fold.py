@@ -244,18 +244,26 @@ def test_what_stands_for_missing_values_stands_for_them_in_tables(rng):
     table = pd.DataFrame(X, columns=NAMES).assign(fibre=rng.choice(["PM", "SM"], len(X)))
     for name in ("kelvin", "fibre"):
         table.loc[rng.choice(len(X), 30), name] = np.nan
-    table["fibre"] = table["fibre"].astype(object)
-    numbers = make_pipeline(SimpleImputer(strategy="median"), StandardScaler())
+    # To an imputer of NaN, None is a category; and what reaches no model may be text.
+    table["fibre"] = table["fibre"].astype(object).where(rng.random(len(X)) > 0.1, None)
+    table["remark"] = "warm"
+    numbers = make_pipeline(
+        StandardScaler(with_std=False), SimpleImputer(strategy="median"), SimpleImputer()
+    )
     scaled_first = make_pipeline(MinMaxScaler(), SimpleImputer())
     encoder = OneHotEncoder(drop="if_binary", sparse_output=False)
     words = make_pipeline(SimpleImputer(strategy="most_frequent"), encoder)
     every = ColumnTransformer(
         [("n", numbers, NAMES[:2]), ("s", scaled_first, NAMES[2:]), ("w", words, ["fibre"])]
     )
-    pipe = make_pipeline(every, regressor(n_mfs=[2, 2, 1, 1])).fit(table, Y)
-    assert list(fold(pipe).input_names) == [*NAMES, "fibre_SM"]
+    pipe = make_pipeline(every, regressor(n_mfs=[2, 2, 1, 1, 1, 1])).fit(table, Y)
+    assert list(fold(pipe).input_names) == [*NAMES, "fibre_PM", "fibre_SM", "fibre_None"]
     model, rows = fold_with_rows(pipe, table)
     assert_allclose(model.predict(rows)[:, 0], pipe.predict(table), rtol=1e-9)
+    # Text that reaches no model is no matter, without an encoder too.
+    bare = make_pipeline(ColumnTransformer([("n", numbers, NAMES)]), regressor(n_mfs=2))
+    model, rows = fold_with_rows(bare.fit(table, Y), table)
+    assert_allclose(model.predict(rows)[:, 0], bare.predict(table), rtol=1e-9)
 
 
 def test_an_imputer_that_drops_a_column_is_refused():
