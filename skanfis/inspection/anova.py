@@ -175,7 +175,7 @@ class ProductAnova:
         found = [_times_both(a, b)[1, 1].sum() for a, b in zip(products, own, strict=True)]
         return np.maximum(found, 0.0)
 
-    def conditionals(self, subsets, X):
+    def _conditionals(self, subsets, X):
         """E[y | x_v] at rows X in the box, less the mean, (n_subsets, n_rows)."""
         Z = self.scale.apply(X.T)
         factors, parts = self.antecedent.factors(Z), {}
@@ -188,9 +188,20 @@ class ProductAnova:
             one[:] = reduce(_times, (parts[g] for g in subset), others)[1].sum(axis=0)
         return found
 
+    def covariances(self, subsets, X):
+        """Of E[y | x_v] and y over rows X in the box, and the variance of y there."""
+        subsets = [range(self.n_blocks), *subsets]
+        sums = products = np.zeros(len(subsets))
+        n_values = 4 * self.n_blocks * self.n_rules + len(subsets)
+        for part in row_blocks(len(X), fitting_rows(n_values)):
+            found = self._conditionals(subsets, X[part])
+            sums, products = sums + found.sum(axis=1), products + found @ found[0]
+        found = products / len(X) - sums * sums[0] / len(X) ** 2
+        return found[1:], float(found[0])
+
     def curve(self, subset, X):
         """E[y | x_v] at rows X in the box, less the mean."""
-        return self.conditionals([subset], X)[0]
+        return self._conditionals([subset], X)[0]
 
 
 def _times(one, other):
@@ -225,10 +236,11 @@ class DrawnAnova:
         has_part = model.consequents[:, 1:, output].any(axis=0)
         has_part[model.antecedent.term_inputs] = True
         self.has_part = [has_part[list(block.inputs)].any() for block in blocks]
-        self.mean, self.rows = 0.0, draw(blocks, N_DRAWS, np.random.default_rng(0))
-        self.y = self._given((), self.rows, self.rows)
+        rng = np.random.default_rng(0)
+        self.mean, self.rows, self.others = 0.0, *(draw(blocks, N_DRAWS, rng) for _ in "yz")
+        self.y, self.of_others = (self._given((), rows, rows) for rows in (self.rows, self.others))
         self.mean = float(self.y.mean())
-        self.y -= self.mean
+        self.y, self.of_others = self.y - self.mean, self.of_others - self.mean
         self.variance = _but_rounding(float(self.y.var()), self.mean)
 
     def _given(self, subset, X, draws):
@@ -237,40 +249,36 @@ class DrawnAnova:
         draws[:, columns] = X[:, columns]
         return replace(self.model, target=None).predict(draws)[:, self.output] - self.mean
 
+    def _conditional(self, subset, X):
+        """At rows X in the box, y with all but x_v drawn, less the mean: on average E[y | x_v].
+
+        Less what is due to the draws themselves, by the regression on y at these.
+        """
+        if not (parts := [g for g in subset if self.has_part[g]]):
+            return np.zeros(len(X))
+        own = np.resize(self.of_others, len(X))
+        found = self._given(parts, X, np.resize(self.others, X.shape))
+        return found - own * (found @ own) / max(own @ own, np.finfo(float).tiny)
+
     def closed(self, subset):
         """The variance of E[y | x_v], estimated."""
-        return float(self.y @ self.conditionals([subset], self.rows)[0]) / N_DRAWS
+        return float(self.y @ self._conditional(subset, self.rows)) / N_DRAWS
 
     def totals(self):
-        """Of every block, the variance that is left where all others are known."""
-        every = set(range(self.n_blocks))
-        return np.maximum([self.variance - self.closed(every - {g}) for g in every], 0.0)
+        """Of every block, half of the mean square by which it alone moves y (Jansen 1999)."""
+        moved = (self._given((g,), self.others, self.rows.copy()) for g in range(self.n_blocks))
+        return np.array([np.mean((one - self.y) ** 2) / 2.0 for one in moved])
 
-    def conditionals(self, subsets, X):
-        """At rows X in the box, y with all but x_v drawn, less the mean: on average E[y | x_v]."""
-        found = np.zeros((len(subsets), len(X)))
-        for one, subset in zip(found, subsets, strict=True):
-            if parts := sorted(g for g in subset if self.has_part[g]):
-                draws = draw(self.blocks, len(X), np.random.default_rng([1, *parts]))
-                one[:] = self._given(parts, X, draws)
-        return found
+    def covariances(self, subsets, X):
+        """Of E[y | x_v] and y over rows X in the box, and the variance of y there."""
+        X = np.tile(X, (-(-N_DRAWS // len(X)), 1))
+        y = self._given((), X, X)
+        y -= y.mean()
+        found = [y @ self._conditional(v, X) / len(X) for v in subsets]
+        return np.array(found), float(y.var())
 
     def curve(self, subset, X):
         """E[y | x_v] at rows X, less the mean, over the same draws of all others at each."""
         draws = np.tile(self.rows[:N_SHARED], (len(X), 1))
         found = self._given(subset, np.repeat(X, N_SHARED, axis=0), draws)
         return found.reshape(len(X), -1).mean(axis=1)
-
-
-def covariances(anova, subsets, X):
-    """Of E[y | x_v] and y over rows X in the box, and the variance of y there."""
-    if isinstance(anova, DrawnAnova):
-        X = np.tile(X, (-(-N_DRAWS // len(X)), 1))
-    subsets = [range(anova.n_blocks), *subsets]
-    sums = products = np.zeros(len(subsets))
-    n_values = 4 * anova.n_blocks * anova.n_rules + len(subsets)
-    for part in row_blocks(len(X), fitting_rows(n_values)):
-        found = anova.conditionals(subsets, X[part])
-        sums, products = sums + found.sum(axis=1), products + found @ found[0]
-    found = products / len(X) - sums * sums[0] / len(X) ** 2
-    return found[1:], float(found[0])

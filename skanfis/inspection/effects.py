@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..export.columns import by_column
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
-from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, covariances, draw
+from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
 from .displays import _position
 from .text import MOST_NAMED, counted
 
@@ -104,7 +104,7 @@ def effects(
     subsets = [*ones, *study.pairs()]
     columns = {"sobol": study.sobol(subsets)}
     if study.rows is not None:
-        columns["rows"] = _shares(subsets, *covariances(anova, subsets, study.rows))
+        columns["rows"] = _shares(subsets, *anova.covariances(subsets, study.rows))
     table = pd.DataFrame(columns, index=[" and ".join(labels[g] for g in v) for v in subsets])
     # Rounded, so that inputs alike but for rounding errors stay in their order.
     shares = table["sobol"].round(9).tolist()
