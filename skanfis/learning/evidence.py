@@ -45,8 +45,8 @@ _LIKENESS = 1.0 / np.log(3.0) ** 2
 # count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
 # noise is fitted.
 ROWS_EACH = 2
-# Least weights where there are fewer distinct rows than this per consequent.
-_UNDERDETERMINED = ((1.0, 1e-4), (ROWS_EACH, 1e-6))
+# With fewer, no weight is less than this.
+_LEAST = 1e-6
 # Most of a target lies within so many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
@@ -208,8 +208,7 @@ def least_weights(posterior: Laplace, n_distinct):
     that passes through every row explains them without noise, and rounding errors grow by 1 / alpha
     along what the data leave open: there the weights are never next to nothing.
     """
-    rows_each = n_distinct / posterior.n_columns
-    least = next((weight for enough, weight in _UNDERDETERMINED if rows_each < enough), 0.0)
+    least = _LEAST if n_distinct < ROWS_EACH * posterior.n_columns else 0.0
     if posterior.line.n_rules == 1:
         return Penalty(least, least, least)
     noise = posterior.noise_variance / posterior.n_rows
