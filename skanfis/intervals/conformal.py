@@ -234,12 +234,11 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     def _quantiles(self, coverage, confidence):
         masses, groups, columns = self._masses, self._groups, self._scores_by_row.T
         if groups is None:
-            return np.array([_scores.score_quantile(one, masses, coverage) for one in columns])
+            return [_scores.score_quantile(one, masses, coverage) for one in columns]
         if confidence is None:
-            found = [_scores.one_row_per_group(one, masses, groups, coverage) for one in columns]
-            return np.array(found)
+            return [_scores.one_row_per_group(one, masses, groups, coverage) for one in columns]
         by_group = [_scores.group_scores(one, masses, groups, coverage) for one in columns]
-        return np.array([_scores.score_quantile(*one, confidence) for one in by_group])
+        return [_scores.score_quantile(own, mass, confidence) for own, mass in by_group]
 
     def _regressor(self):
         return ANFISRegressor() if self.estimator is None else self.estimator
