@@ -186,7 +186,8 @@ def _draw_curve(axes, curve):
         axes.plot(points, mean, color="black", linewidth=1.8)
     axes.set_xlim(curve["edges"][0], curve["edges"][-1])
     _name(axes.xaxis, curve["input"], points, curve["levels"])
-    title = f"alone {round(100.0 * curve['share'])} % of variance"
+    # Shares by draws may be off by more than there is.
+    title = f"alone {max(round(100.0 * curve['share']), 0)} % of variance"
     axes.set_title(title, fontsize="small", loc="left")
 
 
