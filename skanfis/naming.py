@@ -188,8 +188,8 @@ def distinct(names, numbered="{} ({})"):
 
 
 def _plain(number, digits):
-    """So many significant digits, without an exponent where a person would write none."""
-    if 1e-4 <= abs(number) < 1e9:
+    """So many significant digits; an exponent only where zeros would fill up a large number."""
+    if 1e-4 <= abs(number) < max(1e9, 10.0 ** (digits + 5)):
         shown = {"precision": digits, "unique": False, "fractional": False, "trim": "-"}
         return np.format_float_positional(number, **shown)
     return f"{number:.{digits}g}"

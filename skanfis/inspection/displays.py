@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from numbers import Real
+from textwrap import fill
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -13,7 +14,7 @@ from ..antecedent import TreeAntecedent
 from ..export import fold, fold_with_rows
 from ..export.columns import by_column
 from ..export.folding import fold_with_reader
-from .labels import as_label, title_of
+from .labels import as_label, on_axis, title_of
 from .rules import has_training_data
 from .sentences import PRECISION, rounded
 
@@ -23,7 +24,7 @@ _N_POINTS, _BINS = 201, 30
 _BRIGHTEST = 0.85
 # Beyond so many terms, a legend is longer than the picture is high.
 _MOST_NAMED = 7
-# Characters of a legend that a panel has room for.
+# Characters of a legend, or of a note below, that a panel has room for.
 _LEGEND_WIDTH = 42
 # Contours that can still be told apart by colour.
 _LEVELS = 15
@@ -90,14 +91,11 @@ class MembershipDisplay:
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the memberships on ``ax``, as of :meth:`from_estimator`."""
-        self.axes_ = _panels(ax, len(self.inputs))
+        data = "" if self.inputs[0].counts is None else "; grey: data"
+        self.axes_ = _panels(ax, len(self.inputs), f"dashed: before training{data}")
         self.figure_ = self.axes_[0].figure
         for terms, axes in zip(self.inputs, self.axes_, strict=True):
             _draw_terms(axes, terms)
-        if ax is None:
-            data = "" if self.inputs[0].counts is None else "; grey: data"
-            note = f"dashed: before training{data}"
-            self.figure_.supxlabel(note, fontsize="small", color="0.4")
         return self
 
 
@@ -127,7 +125,7 @@ def _draw_terms(axes, terms):
     for t, shade in zip(np.argsort(places, kind="stable"), shades, strict=True):
         axes.plot(terms.grid, terms.before[t], "--", color=shade, linewidth=1.0, alpha=0.7)
         axes.plot(terms.grid, terms.after[t], color=shade, linewidth=1.8, label=names[t])
-    axes.set(xlabel=as_label(terms.input_name), ylabel="membership", ylim=(0.0, 1.05))
+    axes.set(xlabel=on_axis(terms.input_name), ylabel="membership", ylim=(0.0, 1.05))
     axes.set_xlim(terms.grid[0], terms.grid[-1])
     if len(names) <= _MOST_NAMED:
         columns = max(_LEGEND_WIDTH // (max(map(len, names)) + 5), 1)
@@ -239,21 +237,20 @@ class ResponseSurfaceDisplay:
         ax = self.ax_ = _axes(ax)
         self.figure_ = ax.figure
         x, y = self.xx0[0], self.xx1[:, 0]
-        grid = (x, y, self.response)
         # Extrapolation shall not set the colours.
         seen = self.response[self.coverage >= _COVERED]
         seen = seen if seen.size > 1 else self.response
         low, high = np.min(seen), np.max(seen)
         levels = _pyplot().MaxNLocator(_LEVELS).tick_values(low, high) if high > low else None
-        self.surface_ = ax.contourf(*grid, levels=levels, extend="both")
-        self.figure_.colorbar(self.surface_, ax=ax, label=as_label(self.output_name))
+        self.surface_ = ax.contourf(x, y, self.response, levels=levels, extend="both")
+        self.figure_.colorbar(self.surface_, ax=ax, label=on_axis(self.output_name))
         # White over the surface, the thicker the less data cover it; under the points.
         white = np.ones((*self.coverage.shape, 4))
         white[..., 3] = 0.85 * np.clip(1.0 - self.coverage, 0.0, 1.0)
         ax.pcolormesh(x, y, white, zorder=1.5)
         if self.points is not None:
             ax.plot(*self.points.T, ".", color="black", markersize=2, alpha=0.5)
-        first, second = map(as_label, self.input_names)
+        first, second = map(on_axis, self.input_names)
         ax.set(xlabel=first, ylabel=second, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
         notes = ["pale: few training data"] if np.any(self.coverage < _COVERED) else []
         ax.set_title(title_of(self.held, *notes), fontsize="small", loc="left")
@@ -265,8 +262,8 @@ def _axes(ax, figsize=(5.6, 4.2)):
     return _pyplot().subplots(figsize=figsize, layout="constrained")[1] if ax is None else ax
 
 
-def _panels(ax, count):
-    """So many axes as an array: those given, or of a new figure."""
+def _panels(ax, count, note):
+    """So many axes as an array: those given, or of a new figure, with a note at its foot."""
     if ax is not None:
         axes = np.ravel(ax)
         if axes.size != count:
@@ -275,6 +272,7 @@ def _panels(ax, count):
     columns = min(3, count)
     rows = -(-count // columns)
     figure = _pyplot().figure(figsize=(3.2 * columns, 2.6 * rows), layout="constrained")
+    figure.supxlabel(fill(note, _LEGEND_WIDTH * columns), fontsize="small", color="0.4")
     return np.array([figure.add_subplot(rows, columns, i + 1) for i in range(count)])
 
 

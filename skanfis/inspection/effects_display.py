@@ -11,7 +11,7 @@ from .._validation import check_count
 from .anova import N_SHARED, draw
 from .displays import _BINS, _BRIGHTEST, _panels, _pyplot
 from .effects import Study
-from .labels import as_label
+from .labels import on_axis
 
 _N_POINTS, _N_ACROSS = 61, 31
 # A pair of a smaller share, beside what that may be off by, is not drawn.
@@ -96,23 +96,19 @@ class EffectsDisplay:
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the effects on ``ax``, as of :meth:`from_estimator`."""
-        self.axes_ = _panels(ax, len(self.curves) + len(self.pairs))
+        note = "curve: mean over all other inputs, ± 2 sd; shaded: terms; grey: data"
+        note += "; colours: beyond what both do alone" if self.pairs else ""
+        self.axes_ = _panels(ax, len(self.curves) + len(self.pairs), note)
         self.figure_ = self.axes_[0].figure
         # One scale for all, so that what is flat looks flat.
-        ends = [
-            one["mean"] + side * one["deviation"] for one in self.curves for side in (-2.0, 2.0)
-        ]
-        low, high = np.min(np.concatenate(ends)), np.max(np.concatenate(ends))
+        mean, sd = (np.hstack([one[key] for one in self.curves]) for key in ("mean", "deviation"))
+        low, high = np.min(mean - 2.0 * sd), np.max(mean + 2.0 * sd)
         room = _ROOM * (high - low or 1.0)
         for axes, curve in zip(self.axes_, self.curves, strict=False):
             _draw_curve(axes, curve)
-            axes.set(ylim=(low - room, high + room), ylabel=as_label(self.output_name))
+            axes.set(ylim=(low - room, high + room), ylabel=on_axis(self.output_name))
         for axes, pair in zip(self.axes_[len(self.curves) :], self.pairs, strict=True):
             _draw_pair(axes, pair)
-        if ax is None:
-            note = "curve: mean over all other inputs, ± 2 sd; shaded: terms; grey: data"
-            note += "; colours: beyond what both do alone" if self.pairs else ""
-            self.figure_.supxlabel(note, fontsize="small", color="0.4")
         return self
 
 
@@ -190,7 +186,8 @@ def _draw_curve(axes, curve):
         axes.plot(points, mean, color="black", linewidth=1.8)
     axes.set_xlim(curve["edges"][0], curve["edges"][-1])
     _name(axes.xaxis, curve["input"], points, curve["levels"])
-    title = f"alone {round(100.0 * curve['share'])} % of variance"
+    # Shares by draws may be off by more than there is.
+    title = f"alone {max(round(100.0 * curve['share']), 0)} % of variance"
     axes.set_title(title, fontsize="small", loc="left")
 
 
@@ -206,9 +203,9 @@ def _draw_pair(axes, pair):
 
 
 def _name(side, name, points, levels):
-    side.set_label_text(as_label(name))
+    side.set_label_text(on_axis(name))
     if levels is not None:
-        side.set_ticks(points, [as_label(level) for level in levels])
+        side.set_ticks(points, [on_axis(level) for level in levels])
         if len(levels) * max(map(len, levels)) > _MOST_LETTERS:
             turned = 90.0 if side.axis_name == "x" else 0.0
             side.set_tick_params(rotation=turned, labelsize="x-small")

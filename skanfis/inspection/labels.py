@@ -1,13 +1,13 @@
 """Names from files and tables, as pictures and terminals may show them."""
 
 import unicodedata
-from textwrap import fill
+from textwrap import fill, wrap
 
 # Categories of what no reader sees; and joiners, without which some scripts are not written.
 _HIDDEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")
 _JOINERS = "\u200c\u200d"
-# Inputs that a title names, and its letters in a line.
-_MOST_HELD, _LETTERS = 4, 60
+# Inputs that a title names, its letters in a line, and those along an axis of a panel.
+_MOST_HELD, _LETTERS, _LETTERS_ON_AXIS = 4, 60, 20
 
 
 def printable(text):
@@ -23,6 +23,11 @@ def printable(text):
 def as_label(name):
     """A name for matplotlib, which takes what stands between dollars for mathematics."""
     return printable(name).replace("$", r"\$")
+
+
+def on_axis(name):
+    """The same along an axis, in lines that a small panel has room for."""
+    return "\n".join(map(as_label, wrap(printable(name), _LETTERS_ON_AXIS)))
 
 
 def title_of(held, *notes):

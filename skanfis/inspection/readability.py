@@ -170,10 +170,8 @@ class Readability:
         is_poor = found.rule_errors > np.maximum(GREATEST_ERROR * found.rule_spreads, _ROUNDING)
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
-            errs, spread = (
-                number(self._unit[k] * one[r, k], 2)
-                for one in (found.rule_errors, found.rule_spreads)
-            )
+            both = found.rule_errors[r, k], found.rule_spreads[r, k]
+            errs, spread = (number(self._unit[k] * one, 2) for one in both)
             named.append(f"{rule} (errs by {errs}, a constant by {spread})")
         what = "Errs more on its own rows than a constant would: rule"
         return [f"{what} {_named(named)}."] if named else []

@@ -93,9 +93,8 @@ class StructureDisplay:
         rules = "one rule" if chosen["rules"] == 1 else f"{chosen['rules']} rules"
         ring = {"markersize": 13, "markerfacecolor": "none", "markeredgecolor": "black"}
         ax.plot(*_places([chosen]), "o", **ring, label=f"chosen: {rules}")
-        dashed = {"linestyle": "--", "color": "0.5", "linewidth": 1}
         label = f"tolerated, simplicity={self.simplicity:g}"
-        ax.axhline(self.tolerance, **dashed, label=label)
+        ax.axhline(self.tolerance, linestyle="--", color="0.5", linewidth=1, label=label)
         errors = [one["expected_error"] for one in structures]
         ax.set_xlabel("reading cost, numerals in the rules")
         ax.set_ylabel("error expected of new rows, sd of the target")

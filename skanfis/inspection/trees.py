@@ -12,17 +12,17 @@ from ..export.columns import Level
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .displays import _axes, _position, _section
-from .labels import as_label, title_of
+from .labels import as_label, on_axis, title_of
 from .rules import condition, parts_led
-from .sentences import Sentences
+from .sentences import Sentences, rounded
 from .text import counted, percent, plain
 
 # Inches: of a letter, of a leaf, around the tree.
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
 # Line widths, in points, of a branch that no row takes and more of one that all do.
 _THIN, _THICK = 0.6, 6.0
-# Points of the plane along each input.
-_N_POINTS = 200
+# Points of the plane along each input; digits of what it spans, and where these may stand.
+_N_POINTS, _DIGITS, _INSIDE = 200, 3, (0.06, 0.94)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -30,8 +30,8 @@ class TreeDisplay:
     """The rules of a tree: cuts, and at each leaf its value and on which part of the rows it leads.
 
     A branch is the thicker the more rows take it. With ``kind="plane"`` it is the prediction over
-    the two inputs that are cut, with lines where another rule becomes the strongest, and the values
-    in the middle of each rule's rows. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
+    the two inputs that are cut, with lines where another rule becomes the strongest, and what each
+    rule says there in the middle of its rows. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
@@ -107,9 +107,8 @@ class TreeDisplay:
     @property
     def leaves(self) -> list[str]:
         """Of every leaf, what stands at it."""
-        values = [plain(value) for value in self.values]
-        shares = map(percent, parts_led(self.model))
-        return [f"{value}  ({share})" for value, share in zip(values, shares, strict=True)]
+        both = zip(self.values, parts_led(self.model), strict=True)
+        return [f"{plain(value)}  ({percent(share)})" for value, share in both]
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw on ``ax``, as of :meth:`from_estimator`."""
@@ -162,15 +161,21 @@ class TreeDisplay:
         axes, rows, held = _section(model, both, _N_POINTS, None, self.levels)
         response = model.predict(rows)[:, self.output].reshape(_N_POINTS, _N_POINTS)
         colours = ax.pcolormesh(*axes, response, shading="nearest", rasterized=True)
-        name = as_label(model.output_names[self.output])
-        ax.figure.colorbar(colours, ax=ax, label=name)
+        ax.figure.colorbar(colours, ax=ax, label=on_axis(model.output_names[self.output]))
         strongest = model.strengths(rows).argmax(axis=1).reshape(response.shape)
         borders = np.arange(model.n_rules - 1) + 0.5
         ax.contour(*axes, strongest, levels=borders, colors="white", linewidths=1.5)
         box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "boxstyle": "round"}
-        for value, center in zip(self.values, self._said.places[:, both], strict=True):
+        said, low, high = self._said, model.minimum[both], model.maximum[both]
+        # From the middle of its rows to where the other inputs are held.
+        away = rows[0] - said.places
+        away[:, both] = 0.0
+        values = self.values + np.sum(away * said.slopes[:, :, self.output], axis=1)
+        values = rounded(values, np.ptp(response) or 1.0, _DIGITS)
+        inside = np.clip(said.places[:, both], *low + np.outer(_INSIDE, high - low))
+        for value, center in zip(values, inside, strict=True):
             ax.text(*center, plain(value), fontsize="small", ha="center", va="center", bbox=box)
-        first, second = (as_label(model.input_names[j]) for j in both)
-        xlim, ylim = zip(model.minimum[both], model.maximum[both], strict=True)
+        first, second = (on_axis(model.input_names[j]) for j in both)
+        xlim, ylim = zip(low, high, strict=True)
         ax.set(xlabel=first, ylabel=second, xlim=xlim, ylim=ylim)
         ax.set_title(title_of(held), fontsize="small", loc="left")

@@ -65,10 +65,8 @@ def checked_targets(caller, y, sample_weight, groups):
     if sample_weight is not None:
         sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
         positive_weights(sample_weight, len(targets))
-    if groups is None:
-        return targets, sample_weight, None
-    numbers = group_numbers(groups)
-    if numbers.max() == 0:
+    numbers = None if groups is None else group_numbers(groups)
+    if numbers is not None and numbers.max() == 0:
         raise ValueError("groups has a single group; at least 2 are needed to hold one out.")
     return targets, sample_weight, numbers
 
@@ -102,12 +100,11 @@ def one_part(regressor, n_rows, groups, fraction, seed):
         return every, every
     kind = ShuffleSplit if groups is None else GroupShuffleSplit
     splitter = kind(1, test_size=fraction, random_state=seed)
-    training, held_out = next(splitter.split(every, groups=groups))
-    return np.sort(training), np.sort(held_out)
+    return tuple(np.sort(part) for part in next(splitter.split(every, groups=groups)))
 
 
 def folds(cv, targets, groups, seed):
-    """Pairs of rows to train on and rows held out, every row held out once."""
+    """Pairs of rows to train on and rows held out, every row held out once, groups as a whole."""
     n_rows = len(targets)
     if not isinstance(cv, Integral):
         splitter = check_cv(cv)
@@ -128,6 +125,14 @@ def folds(cv, targets, groups, seed):
             f"cv={splitter!r} holds out row {row} {counts[row]} times; every row must be held "
             "out once, as KFold, GroupKFold and LeaveOneGroupOut do."
         )
+    own, what = (np.arange(n_rows), "it") if groups is None else (groups, "its group")
+    for training, held_out in found:
+        seen = held_out[np.isin(own[held_out], own[training])]
+        if seen.size:
+            raise ValueError(
+                f"cv={splitter!r} holds out row {seen[0]} and trains on {what}; a model may not "
+                "have seen what it is judged on. Whole groups are held out by GroupKFold."
+            )
     return found
 
 

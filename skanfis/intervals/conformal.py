@@ -143,8 +143,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If the data are not finite, ``cv`` does not hold out every row once, there is one group,
-            or groups with "loo"; if the regressor has no standard deviation.
+            If the data are not finite, ``cv`` does not hold out every row once and groups as a
+            whole, there is one group, or groups with "loo"; if the regressor has no deviation.
         """
         X, y, sample_weight, groups = indexable(X, y, sample_weight, groups)
         targets, weight, numbers = _scores.checked_targets(
@@ -168,8 +168,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             estimator = data.fitted(regressor)
             scores = _scores.leave_one_out_scores(estimator, data, weight, least)
         else:
-            estimator = data.fitted(regressor)
             parts = _scores.folds(self.cv, targets, numbers, seed)
+            estimator = data.fitted(regressor)
             estimators = Parallel(n_jobs=self.n_jobs)(
                 delayed(data.fitted)(regressor, training) for training, _ in parts
             )
@@ -188,9 +188,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self._least, self._scores_by_row = least, scores
         self._groups, self._masses, self.n_units_ = own_groups, masses, n_units
         self._single_output = targets.ndim == 1
-        self.scores_ = np.sort(scores, axis=0)
-        if self._single_output:
-            self.scores_ = self.scores_[:, 0]
+        self.scores_ = np.sort(scores[:, 0] if self._single_output else scores, axis=0)
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:
@@ -234,18 +232,13 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return (lower[:, 0], upper[:, 0]) if self._single_output else (lower, upper)
 
     def _quantiles(self, coverage, confidence):
-        found = []
-        for scores in self._scores_by_row.T:
-            if self._groups is None:
-                found.append(_scores.score_quantile(scores, self._masses, coverage))
-            elif confidence is None:
-                found.append(
-                    _scores.one_row_per_group(scores, self._masses, self._groups, coverage)
-                )
-            else:
-                own, masses = _scores.group_scores(scores, self._masses, self._groups, coverage)
-                found.append(_scores.score_quantile(own, masses, confidence))
-        return np.array(found)
+        masses, groups, columns = self._masses, self._groups, self._scores_by_row.T
+        if groups is None:
+            return [_scores.score_quantile(one, masses, coverage) for one in columns]
+        if confidence is None:
+            return [_scores.one_row_per_group(one, masses, groups, coverage) for one in columns]
+        by_group = [_scores.group_scores(one, masses, groups, coverage) for one in columns]
+        return [_scores.score_quantile(own, mass, confidence) for own, mass in by_group]
 
     def _regressor(self):
         return ANFISRegressor() if self.estimator is None else self.estimator

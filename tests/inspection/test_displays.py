@@ -20,6 +20,7 @@ from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
 
 plt = pytest.importorskip("matplotlib.pyplot")
+Bbox = pytest.importorskip("matplotlib.transforms").Bbox
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 # One of every kind, of both orders and both numbers of outputs.
 EACH = pytest.mark.parametrize(
@@ -215,6 +216,21 @@ def test_every_picture_takes_every_name():
     assert [axes.get_xlabel() for axes in memberships.axes_] == labels
     surface = drawn(ResponseSurfaceDisplay.from_estimator(model, None, model.input_names[:2]))
     assert [surface.ax_.get_xlabel(), surface.ax_.get_ylabel()] == labels[:2]
+
+
+@pytest.mark.parametrize("n_inputs", [1, 2])
+def test_long_names_and_notes_stay_in_the_picture(n_inputs, rng):
+    names = [f"the long name of input number {j} in milliwatts per kelvin" for j in range(n_inputs)]
+    X = pd.DataFrame(rng.uniform(-1.0, 1.0, (60, n_inputs)), columns=names)
+    y = pd.Series(np.tanh(9.0 * X.prod(axis=1)), name=names[0].replace("input", "output"))
+    model = quick(n_mfs=2).fit(X, y)
+    kinds = [MembershipDisplay, EffectsDisplay, ResponseSurfaceDisplay][: n_inputs + 1]
+    for display in (drawn(kind.from_estimator(model, X)) for kind in kinds):
+        figure = display.figure_
+        page, own = figure.bbox, [axes.get_tightbbox() for axes in figure.axes]
+        note = [figure._supxlabel.get_window_extent()] if figure._supxlabel else []
+        for box in own + note:
+            assert_array_equal(Bbox.union([page, box]).bounds, page.bounds)
 
 
 def test_means_that_are_held_have_the_digits_of_their_deviation(rng):

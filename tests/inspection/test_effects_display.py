@@ -160,4 +160,7 @@ def test_a_pair_that_does_nothing_is_not_drawn_and_zero_though_by_draws(rng):
     assert re.search(r"\n\d pairs more ", str(found))
     display = drawn(EffectsDisplay.from_estimator(model, X))
     assert display.pairs == []
+    # By draws a share may be less than nothing.
+    display.curves[0]["share"] = -0.01
+    assert "alone 0 %" in display.plot().axes_[0].get_title(loc="left")
     assert not any("-0 %" in axes.get_title(loc="left") for axes in display.axes_)

@@ -97,6 +97,18 @@ def test_plane_has_the_cuts_and_the_values(rng):
         assert abs(model.predict(row)[0] - float(text)) < 0.2
     assert (display.ax_.get_xlabel(), display.ax_.get_ylabel()) == ("x0", "x2")
     assert "x1 = " in display.ax_.get_title(loc="left")
+    # A value is that of the plane as it is drawn, and stands in it: the commonest of 0 and 1 is 0.
+    X[:, 1] = rng.random(300) < np.where(X[:, 0] > 0.2, 0.7, 0.2)
+    X[:, 2] = rng.random(300) < 0.5
+    y = X[:, 2] + 4.0 * X[:, 1] * (X[:, 0] > 0.2) + 0.01 * rng.normal(size=300)
+    model = quick(partition="tree", premise_features=[0, 2], max_rules=4, simplicity=0).fit(X, y)
+    display = TreeDisplay.from_estimator(model, kind="plane")
+    assert display.ax_.get_title(loc="left") == "x1 = 0"
+    assert display.values.max() > 3.0
+    for text, place in texts(display).items():
+        assert 0.05 < place[1] < 0.95
+        row = np.array([[place[0], 0.0, round(place[1])]])
+        assert abs(model.predict(row)[0] - float(text)) < 0.2
 
 
 def test_what_cannot_be_drawn_is_refused(rng):

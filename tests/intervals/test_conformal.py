@@ -230,6 +230,11 @@ def test_groups_and_weights_reach_a_regressor_in_a_pipeline(rng):
 RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
 
 
+class NeverFitted(BayesianRidge):
+    def fit(self, X, y, sample_weight=None):
+        raise AssertionError("Splits are to be refused before anything is fitted.")
+
+
 @pytest.mark.parametrize(
     ("match", "params", "given"),
     [
@@ -241,6 +246,12 @@ RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
         ("not have: use scaled=False", {"estimator": LinearRegression()}, {}),
         ("every row must be held out once", {"cv": ShuffleSplit(2, random_state=0)}, {}),
         ("An iterator can be used once only", {"cv": iter([])}, {}),
+        (
+            "holds out row 3 and trains on its group; a model may not have seen",
+            {"cv": list(KFold(6).split(np.ones(24))), "estimator": NeverFitted()},
+            {"groups": np.arange(24) // 3},
+        ),
+        ("holds out row 0 and trains on it;", {"cv": [(np.arange(24),) * 2]}, {}),
         (
             "out_of_bounds='raise' refuses rows held out",
             {"estimator": make_pipeline(StandardScaler(), quick(n_mfs=1, out_of_bounds="raise"))},
