@@ -50,7 +50,7 @@ _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
 # The first turn of terms without bounds goes far.
 _UNBOUNDED_ITERATIONS = 25
 # Of agreement: less of a rise is not worth a training.
-_HALVINGS, _LEAST_RAISE = 8, 2.0
+_MOST_RAISES, _HALVINGS, _LEAST_RAISE = 3, 8, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +236,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, left: float) -> Tu
         return tuned
     others = [key for key in free if key != "agreement"]
     most, best, agreement = left * tuned.expected_error, tuned, 0.0
-    for _ in range(MOST_TURNS):
+    for _ in range(_MOST_RAISES):
         agreement = agreement or _most_agreement(best, most)
         if agreement < _LEAST_RAISE * best.penalty.agreement:
             break
