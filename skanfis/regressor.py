@@ -572,7 +572,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             self._sums = RowSums.of(base, own, *rows)
         else:
             is_fitted = False
-            chunk_checks.check_outputs(before.base, data.y.shape[1], data.output_names)
+            chunk_checks.check_outputs(before.base, data.output_names)
             if n_rows == 0:
                 return
             latest = RowSums.of(before.base, before.consequent_inputs, *rows)
@@ -597,7 +597,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             self.fit(X, y, data.over_all(weight, 0.0))
             own = inputs_with_slopes(self.model_, own)
         elif after_fit:
-            chunk_checks.check_outputs(self.model_, data.y.shape[1], data.output_names)
+            chunk_checks.check_outputs(self.model_, data.output_names)
             warnings.warn(
                 "partial_fit after fit: the premises stay, but fit keeps no sums over its "
                 f"{self.model_.rule_rows.sum():.0f} rows that others could be added to, and the "

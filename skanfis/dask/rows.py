@@ -46,7 +46,7 @@ class Layout:
                     "give both as dask arrays or DataFrames."
                 )
             if one.ndim not in dimensions:
-                raise ValueError(f"{what} has {one.ndim} dimensions, and cannot be trained on.")
+                raise ValueError(f"{what} has {one.ndim} dimensions: X must have 2, y 1 or 2.")
         n_inputs, n_outputs = X.shape[1], 1 if y.ndim == 1 else y.shape[1]
         is_named = hasattr(y, "divisions") and getattr(y, "name", None) is not None
         names = getattr(y, "columns", [y.name] if is_named else None)

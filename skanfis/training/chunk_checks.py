@@ -79,15 +79,15 @@ def check_begin(estimator, n_rows, finds_structure):
         )
 
 
-def check_outputs(base: TSKModel, n_outputs, names):
-    """Raise ValueError where a chunk has other targets than those before."""
-    if n_outputs != base.n_outputs:
+def check_outputs(base: TSKModel, names):
+    """Raise ValueError where a chunk has other targets than those before, or has them elsewhere."""
+    before = base.output_names
+    if len(names) != len(before):
         raise ValueError(
-            f"y has {n_outputs} outputs, but the chunks before had {base.n_outputs} "
-            f"({', '.join(base.output_names)})."
+            f"y has {len(names)} outputs, but the chunks before had {len(before)} "
+            f"({', '.join(before)})."
         )
-    before = list(base.output_names)
-    if list(names) != before and sorted(names) == sorted(before):
+    if any(name != old and name in before for name, old in zip(names, before, strict=True)):
         raise ValueError(
             f"The columns of y are {', '.join(names)}, but those of the chunks before were "
             f"{', '.join(before)}: give them in this order."

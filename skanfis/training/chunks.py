@@ -190,10 +190,9 @@ class _ProblemOfSums(SeparableProblem):
         means = (sums.gram / sums.weight, sums.slope / sums.weight, sums.square / sums.weight)
         self._sums_at_start = self._means = means
         self.local = LocalBasis.from_gram(means[0], self.antecedent.n_rules)
-        own = self.consequent_inputs
-        extent = np.maximum(sums.rules.extent / sums.inputs.scale[own], 1.0)
-        slopes = sums.inputs.varying(own)
-        self.common_line = CommonLine(self.local, extent, self.antecedent, slopes)
+        own, inputs = self.consequent_inputs, sums.inputs
+        extent = np.maximum(sums.rules.extent / inputs.scale[own], 1.0)
+        self.common_line = CommonLine(self.local, extent, self.antecedent, inputs.varying(own))
 
     def mean_squares(self, evaluation):
         """Mean squared error of every standardised output."""

@@ -13,7 +13,7 @@ from ..learning.data import Scale
 from ..learning.firing import FIRES, places
 from ..support import RuleSupport
 
-# Rows of a rule that are kept because one of them may be its farthest.
+# Farthest rows of a rule that are kept, beside those at its ends.
 _MOST_FAR = 8
 
 
@@ -33,10 +33,9 @@ class RuleRows:
     @classmethod
     def none(cls, n_rules, n_inputs, n_slopes):
         """Of no rows."""
-        n_basis = 1 + n_inputs
         extent, zeros = np.zeros((n_rules, n_slopes)), np.zeros(n_rules)
-        second, nothing = np.zeros((n_rules, n_basis, n_basis)), np.empty((0, n_basis))
-        return cls(second, zeros, zeros, extent, np.empty((0, 2)), nothing)
+        second = np.zeros((n_rules, 1 + n_inputs, 1 + n_inputs))
+        return cls(second, zeros, zeros, extent, np.empty((0, 2)), second[:0, 0])
 
     @classmethod
     def of(cls, X, basis_rows, strengths, weight, numbers, slope_inputs, centers):
@@ -70,15 +69,15 @@ class RuleRows:
         distinct = np.unique(np.vstack([self.distinct, other.distinct]), axis=0)
         far = np.vstack([self.farthest, other.farthest])
         rules, distance = _distances(far, second, scale)
-        # By rule, the farthest first: a few, since one more row may change who it is.
         far = far[np.lexsort((-distance, rules))]
+        rank = np.arange(len(distinct)) - np.searchsorted(distinct[:, 0], distinct[:, 0])
         return RuleRows(
             second,
             self.strongest + other.strongest,
             np.maximum(self.peak, other.peak),
             np.maximum(self.extent, other.extent),
-            _first_of_each(distinct, second.shape[1]),
-            _first_of_each(far, _MOST_FAR),
+            distinct[rank < second.shape[1]],
+            _outermost(far),
         )
 
     def on(self, shift, factor):
@@ -96,9 +95,8 @@ class RuleRows:
         rules, distance = _distances(self.farthest, self.second, scale)
         np.maximum.at(radius, rules, distance)
         share = np.minimum(counts, n_coefficients) / n_coefficients
-        return RuleSupport(share, center, factor, radius * known).change_units(
-            scale.offset, scale.scale
-        )
+        support = RuleSupport(share, center, factor, radius * known)
+        return support.change_units(scale.offset, scale.scale)
 
 
 def rescaled(sums, shift, factor):
@@ -109,10 +107,13 @@ def rescaled(sums, shift, factor):
     return blocks.reshape(sums.shape)
 
 
-def _first_of_each(table, most):
-    """So many rows of every number in the first column, by which the table is sorted."""
-    rank = np.arange(len(table)) - np.searchsorted(table[:, 0], table[:, 0])
-    return table[rank < most]
+def _outermost(far):
+    """Of rows by rule, the farthest first: who may be the farthest when the centre has moved."""
+    kept = []
+    for own in np.split(far, np.flatnonzero(np.diff(far[:, 0])) + 1):
+        ends = np.concatenate([own.argmin(axis=0), own.argmax(axis=0)])
+        kept.append(own[np.union1d(np.arange(min(_MOST_FAR, len(own))), ends)])
+    return np.vstack(kept)
 
 
 def _distances(farthest, second, scale):

@@ -312,6 +312,8 @@ def test_prediction_wants_the_columns_of_training():
         fitted().predict(da.zeros((10, 3)))
     with pytest.raises(ValueError, match="X has 1 dimensions, and a table has two"):
         fitted().predict(da.zeros(10))
+    with pytest.raises(ValueError, match="X has 1 dimensions: X must have 2, y 1 or 2"):
+        DaskANFISRegressor().fit(da.zeros(10), da.zeros(10))
 
 
 def test_arrays_without_names_are_warned_of_once_and_not_by_every_block():

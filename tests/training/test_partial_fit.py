@@ -116,7 +116,7 @@ def test_any_chunks_equal_one_fit(premises, whole_and_settings, chunking):
     assert support.center == pytest.approx(expected.center, rel=1e-9)
     # The farthest row of a rule may be gone: then another one, hardly nearer, stands for it.
     assert np.all(support.radius <= expected.radius * (1.0 + 1e-9))
-    assert np.all(support.radius >= 0.9 * expected.radius)
+    assert np.all(support.radius >= 0.99 * expected.radius)
     assert model.n_samples_seen_ == 300
 
 
@@ -265,6 +265,14 @@ def test_rows_far_beyond_the_premises_are_refused_by_name(premises):
     assert np.isfinite(model.partial_fit(X, y).predict(X[:3])).all()
 
 
+def test_rows_of_before_a_jump_stay_covered(premises):
+    """What was near the centre of a rule is its farthest row once the centre has moved."""
+    jumped = np.where(np.arange(300)[:, None] < 150, X, X - [3e4, -1.0])
+    model = in_chunks(chunk(premises, **GIVEN), jumped, Y, [30] * 10)
+    once = chunk(premises, **GIVEN).partial_fit(jumped, Y)
+    assert model.coverage(jumped) == pytest.approx(once.coverage(jumped), abs=1e-3)
+
+
 def test_unseen_ranges_are_flagged_until_they_are_seen(premises):
     model = chunk(premises).partial_fit(X, Y)
     beyond = np.add(X[:1], [900.0, 0.0])
@@ -326,8 +334,9 @@ def test_what_chunks_cannot_be_asked(premises):
     model = chunk(premises).partial_fit(X, pd.DataFrame(y, columns=["u", "v"]))
     with pytest.raises(ValueError, match="y has 1 outputs, but the chunks before had 2"):
         model.partial_fit(X, one)
-    with pytest.raises(ValueError, match="columns of y are v, u"):
-        model.partial_fit(X, pd.DataFrame(y[:, ::-1], columns=["v", "u"]))
+    for names in (["v", "u"], ["v", "w"], ["w", "u"]):
+        with pytest.raises(ValueError, match=f"columns of y are {', '.join(names)}, but .* u, v:"):
+            model.partial_fit(X, pd.DataFrame(y[:, ::-1], columns=names))
     with pytest.raises(ValueError, match="weights that count against those of other chunks"):
         model.partial_fit(X, y, np.full(60, 1e200))
     with pytest.raises(ValueError, match="order was 1 at the first partial_fit"):
