@@ -106,6 +106,8 @@ def one_part(regressor, n_rows, groups, fraction, seed):
 def folds(cv, targets, groups, seed):
     """Pairs of rows to train on and rows held out, every row held out once, groups as a whole."""
     n_rows = len(targets)
+    if n_rows == 1:
+        raise ValueError("X has one sample; at least 2 are needed to hold one out.")
     if not isinstance(cv, Integral):
         splitter = check_cv(cv)
     elif groups is None:
