@@ -38,10 +38,10 @@ class Column:
     fill: Any = None  # in the place of what is missing
     imputed: Callable[..., np.ndarray] | None = None  # the column as an imputer hands it on
 
-    def values(self, X):
-        """The input on the rows of the user's table."""
+    def values(self, X, encoded):
+        """The input on the rows of the user's table, and of what encoders make of these."""
         if self.encode is not None:
-            return self.encode(X)[:, self.place].astype(np.float64)
+            return encoded[self.encode][:, self.place].astype(np.float64)
         numbers = _as_numbers(part_of(X, [self.source]))[:, 0]
         return numbers if self.fill is None else np.where(np.isnan(numbers), self.fill, numbers)
 
@@ -74,20 +74,20 @@ class Reader:
 
     def __call__(self, X) -> np.ndarray:
         """The rows; ValueError for other columns, and for numbers that are not finite."""
-        given = getattr(X, "columns", None)
+        given, known = getattr(X, "columns", None), ", ".join(map(repr, self.names))
         if self.is_named and given is not None and list(given) != self.names:
             raise ValueError(
-                f"X must have the columns {', '.join(map(repr, self.names))}, in this order; it "
-                f"has {', '.join(map(repr, given))}."
+                f"X must have the columns {known}, in this order; it has "
+                f"{', '.join(map(repr, given))}."
             )
         # What does not reach the model need not be numbers.
-        table = X if given is not None or any(one.encode for one in self.inputs) else _as_numbers(X)
+        encoders = {one.encode for one in self.inputs if one.encode}
+        table = X if given is not None or encoders else _as_numbers(X)
         if (n_columns := np.shape(table)[1]) != len(self.names):
-            raise ValueError(
-                f"X has {n_columns} columns, the estimator takes {len(self.names)}: "
-                f"{', '.join(map(repr, self.names))}."
-            )
-        rows = np.column_stack([one.values(table) for one in self.inputs])
+            told = f"X has {n_columns} columns, the estimator takes {len(self.names)}: {known}."
+            raise ValueError(told)
+        encoded = {encode: encode(table) for encode in encoders}
+        rows = np.column_stack([one.values(table, encoded) for one in self.inputs])
         check_finite(rows, "X", [one.name for one in self.inputs])
         return rows
 
