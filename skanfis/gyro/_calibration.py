@@ -185,8 +185,8 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
     glitches = [
-        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop this row "
-        "and calibrate again."
+        f"{name_row(row)}: {reason} is supported by no other row; if that is a glitch, drop such "
+        "rows and calibrate again."
         for row, reason in find_glitches(log, before - rate)
     ]
     for sentence in glitches:

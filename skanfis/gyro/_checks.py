@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
+from ..inspection.text import counted
 from ._columns import CANONICAL, SIGNALS, convert, convert_back, declared_units, units_of
 from .errors import LogError
 
@@ -47,6 +48,7 @@ _N_NEIGHBOURS = 8
 _MOST_CANDIDATES = 2_000  # the rows farthest off
 # A temperature moves slowly: a part of its range is a lot from one row to the next.
 _SMOOTH = 0.2
+_SOUND = 0.9  # of the rows, at least, are no glitches
 
 
 def check_log(
@@ -152,8 +154,8 @@ def _check_time(log, unit, runs):
         row = int(bad[0])
         raise LogError(
             f"time does not increase within a run: {time[row]:.13g} s after {before[row]:.13g} s "
-            f"({bad.size} such rows). Rows must be in the order of time; if several runs follow "
-            "each other, say which column tells them apart (run=NAME).",
+            f"({bad.size} such rows). Rows must be in the order of time, each with a time of its "
+            "own; if several runs follow each other, say which column tells them apart (run=NAME).",
             "time",
             row,
         )
@@ -237,15 +239,11 @@ def _check_plausible(values, part, unit):
     bad = (values < low) | (values > high)
     if not bad.any():
         return
+    advice, ends = "", convert_back(np.array([values.min(), values.max()]), unit)
+    ranges = {other: convert(ends, other) for other in units_of(part) if other not in SIGNALS}
+    others = [other for other, (least, most) in ranges.items() if low <= least and most <= high]
     # More than half: the unit; few: glitches of the measurement.
-    advice, others = "", []
-    if bad.mean() > 0.5:
-        ends = convert_back(np.array([values.min(), values.max()]), unit)
-        for other in units_of(part):
-            least, most = convert(ends, other)
-            if other not in (unit, *SIGNALS) and low <= least and most <= high:
-                others.append(other)
-    if others:
+    if others and bad.mean() > 0.5:
         advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
     row = int(np.argmax(bad))
     raise LogError(
@@ -314,18 +312,22 @@ def find_glitches(log, error):
     """Rows that no other row supports, and what is odd about each; ``error`` is of every row.
 
     Two things are looked at: the error, beside that of the rows nearest in temperature, rate and
-    order, and the temperature, beside that of the rows before and after in the run. Least squares
-    bends the whole model towards one such row.
+    order, and the temperature, which lies between those of the rows before and after in the run.
+    Least squares bends the whole model towards one such row. Of many, the first ones are named.
     """
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
     by_run = pd.Series(temperature).groupby(runs)
-    around = np.column_stack([by_run.shift(step) for step in (-2, -1, 1, 2)])
-    around = np.where(np.isnan(around), temperature[:, None], around)
-    found = {
-        row: f"the temperature of {temperature[row]:.4g} degC"
-        for row in _alone(temperature - np.median(around, axis=1), _SMOOTH * _spread(temperature))
-    }
+    # At the ends of a run those on the one side count twice.
+    shifted = [by_run.shift(step).fillna(by_run.shift(-step)) for step in (-2, -1, 1, 2)]
+    _, low, high, _ = np.sort(np.column_stack(shifted), axis=1).T
+    beyond = np.maximum(np.maximum(low - temperature, temperature - high), 0.0)
+    least = max(_SMOOTH * _spread(temperature), _ALONE * np.nanquantile(beyond, _SOUND))
+    jumps = np.flatnonzero(beyond > least).tolist()
+    named, more = jumps[:_MOST_GLITCHES], len(jumps) - _MOST_GLITCHES
+    found = {row: f"the temperature of {temperature[row]:.4g} degC" for row in named}
+    if more > 0:
+        found[named[-1]] += f" (and that of {counted(f'{more:,}', 'row')} more)"
     # What is far from its neighbours by more than all errors spread is far from the middle too.
     far = np.argsort(-np.abs(error - np.median(error)), kind="stable")[:_MOST_CANDIDATES]
     places = np.column_stack([temperature, rate, np.arange(len(log))])
@@ -333,25 +335,16 @@ def find_glitches(log, error):
     places /= np.where(scale > 0.0, scale, 1.0)
     # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
     tree = cKDTree(places, balanced_tree=False)
+    # Itself among them, which a median stands too.
     nearest = tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
-    # Not itself, or else not the farthest.
-    own = nearest == far[:, None]
-    own[~own.any(axis=1), -1] = True
-    others = np.median(error[nearest[~own].reshape(len(far), -1)], axis=1)
-    for row in far[_alone(error[far] - others, _spread(error))].tolist():
+    sizes = np.abs(error[far] - np.median(error[nearest], axis=1))
+    order = np.argsort(-sizes, kind="stable")[: _MOST_GLITCHES + 1]
+    first, next_one = sizes[order[:-1]], sizes[order[1:]]
+    alone = np.flatnonzero(first > np.maximum(_ALONE * next_one, _spread(error)))
+    for row in far[order[: alone.max(initial=-1) + 1]].tolist():
         output = log["output"].iloc[row]
         found.setdefault(row, f"the output of {output:.4g} at a rate of {rate[row]:.4g} deg/s")
     return sorted(found.items())
-
-
-def _alone(deviations, least):
-    """Rows, three at most, whose deviation is above the least and far beyond that of all others."""
-    sizes = np.abs(deviations)
-    order = np.argsort(-sizes, kind="stable")[: _MOST_GLITCHES + 1]
-    for count in range(len(order) - 1, 0, -1):
-        if sizes[order[count - 1]] > max(_ALONE * sizes[order[count]], least):
-            return order[:count].tolist()
-    return []
 
 
 def _spread(values):

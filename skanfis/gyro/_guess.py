@@ -9,7 +9,7 @@ import pandas as pd
 
 from ._checks import PARTS
 from ._columns import CANONICAL, declared_units, unit_in
-from ._source import CLOCK, Clock, as_numbers, dated
+from ._source import CLOCK, as_numbers, clock_form, dated
 from ._units import settle_units
 from .errors import LogError
 
@@ -155,7 +155,7 @@ def _guess(source, request, layout, first):
         _Column(place, name, sample[place], source.decimal)
         for place, name in enumerate(source.header)
     ]
-    for choose in (_by_name, _by_unit):
+    for choose in (_by_name, _by_unit, _by_text):
         for part in _QUANTITIES:
             if part not in layout.places:
                 choose(part, columns, layout)
@@ -168,11 +168,13 @@ def _guess(source, request, layout, first):
     of_first = request.assumed if first is None else first.units
     _settle_axis(columns, layout)
     place, taken = layout.places.get("time"), set(layout.places.values())
-    if place is not None and columns[place].is_time and Clock(sample[place]).form == CLOCK:
+    if place is not None and columns[place].is_time and clock_form(sample[place]) == CLOCK:
         texts = [each.place for each in columns if each.numbers.size == 0]
-        moments = {k: Clock(dated(sample[k], sample[place])) for k in texts if k not in taken}
-        layout.dates = [k for k, clock in moments.items() if clock.form][:1]
+        forms = {k: clock_form(dated(sample[k], sample[place])) for k in texts if k not in taken}
+        layout.dates = [k for k, form in forms.items() if form][:1]
     _settle_units(columns, layout, of_first)
+    if first is not None:
+        layout.others = first.others
     layout.notes.append(_sentence(layout))
     if "time" not in layout.places:
         named = [one.name for one in columns if one.score("time") > 0.0 and one.numbers.size]
@@ -199,10 +201,11 @@ class _Column:
         numbers = as_numbers(values, decimal)
         self.aligned = np.where(np.isfinite(numbers), numbers, np.nan)
         self.numbers = numbers[np.isfinite(numbers)]
-        self.is_time = values.dtype.kind in "mM"
+        self.is_time, self.text = values.dtype.kind in "mM", ""
         if self.numbers.size <= 0.5 * len(values):
             self.numbers = np.empty(0)
-            self.is_time = Clock(values).form != ""
+            self.is_time = clock_form(values) != ""
+            self.text = "".join(values[np.isnan(self.aligned)].dropna().head(1).astype(str))
         self.quantity: str | None
         self.unit: str | None
         self.quantity, self.unit = meant or ("time" if self.is_time else None, None)
@@ -249,6 +252,14 @@ def _by_unit(part, columns, layout):
     found = [column for column in _free(part, columns, layout) if column.quantity]
     if part != "rate" and len(found) == 1:
         layout.places[part] = found[0].place
+
+
+def _by_text(part, columns, layout):
+    """A column that is called so, of what begins like numbers: reading says why it holds none."""
+    for column in columns:
+        is_free = column.place not in layout.places.values() and part != "time"
+        if is_free and column.score(part) > 0.0 and column.text.lstrip("+-.,\u2212")[:1].isdigit():
+            layout.places.setdefault(part, column.place)
 
 
 def _settle_axis(columns, layout):

@@ -111,16 +111,17 @@ def beyond(parts):
     return f" ({', '.join(named)})" if named else ""
 
 
-def errors_and_verdict(calibration):
+def errors_and_verdict(calibration, name_row="row {}".format):
     """Lines of the command: errors before and after, which compensation to use."""
     before, after = (rates - calibration.rate for rates in (calibration.before, calibration.after))
     inside = calibration.in_range
     outside = ~calibration.inside & np.isfinite(after)
-    peak, constant = np.abs(after[inside]).max(), calibration.verdict.rms["constant"]
+    sizes, constant = np.where(inside, np.abs(after), 0.0), calibration.verdict.rms["constant"]
     lines = [
         f"error before   {rms(before[inside]):.4g} deg/s RMS, {constant:.4g} once a constant (the "
         f"output at rest) is taken off, on {inside.sum():,} held-out rows in range",
-        f"error after    {rms(after[inside]):.4g} deg/s RMS, peak {peak:.4g}, on the same rows",
+        f"error after    {rms(after[inside]):.4g} deg/s RMS on the same rows, half of them within "
+        f"{np.median(sizes[inside]):.4g}, peak {sizes.max():.4g} ({name_row(int(sizes.argmax()))})",
     ]
     if outside.any():
         lines.append(

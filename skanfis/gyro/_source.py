@@ -262,8 +262,10 @@ def _is_data(values):
     return bool(filled) and 2 * sum(bool(_VALUE.match(cell)) for cell in filled) >= len(filled)
 
 
-def as_numbers(column, decimal="."):
-    """A column as floats; dates and durations in s, NaN for all else."""
+def as_numbers(column, decimal=".", form=""):
+    """A column as floats; dates, durations and texts of a form in s, NaN for all else."""
+    if form:
+        return _moments(_plain(column), form)
     if column.dtype.kind == "M":
         column = pd.to_datetime(column, utc=True) - _EPOCH
     if column.dtype.kind == "m":
@@ -274,44 +276,36 @@ def as_numbers(column, decimal="."):
     return pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
 
 
-class Clock:
-    """Turns texts of one column into seconds, piece by piece; a clock goes on past midnight.
+def clock_form(column):
+    """The form of most of the first texts of a column; empty where these are no times."""
+    texts = _plain(column).dropna()[:_CLOCK_ROWS]
+    fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
+    best = max(_FORMATS, key=lambda form: fits[form])
+    return best if 2 * fits[best] > len(texts) else ""
 
-    ``form`` is that of most of the first values; empty where these are no times.
+
+def going_on(time, form, counter):
+    """Times [s], some NaN, that go on where the clock went back, and rows of all but midnights.
+
+    A clock of some form goes back at midnight and at the end of daylight saving, any other by the
+    range of its counter [s]; where that is set anew instead, it has not gone round.
     """
-
-    def __init__(self, sample):
-        texts = _plain(sample).dropna()[:_CLOCK_ROWS]
-        fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
-        best = max(_FORMATS, key=lambda form: fits[form])
-        self.form = best if 2 * fits[best] > len(texts) else ""
-        self._ends, self._added, self.notes = None, 0.0, []
-
-    def seconds(self, column):
-        """Seconds since 1970, or since the midnight before the first row; NaN for no time."""
-        seconds = _moments(_plain(column), self.form)
-        known = np.flatnonzero(np.isfinite(seconds))
-        if known.size:
-            seconds[known] = self._going_on(seconds[known], column.iloc[known])
-        return seconds
-
-    def _going_on(self, values, texts):
-        """Times that go on past midnight, and where the clock was put one hour back."""
-        first, last = self._ends or (values[0], values[0])
-        steps = np.diff(values, prepend=last)
-        added = self._added + _DAY * np.cumsum((steps < -0.5 * _DAY) & (self.form == CLOCK))
-        usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else np.inf
-        back = (steps < 0.0) & (np.abs(steps + _HOUR - usual) <= 3.0 * usual)
+    known = np.flatnonzero(np.isfinite(time))
+    steps = np.diff(time[known], prepend=time[known[:1]])
+    if (steps >= 0.0).all():
+        return time, known[:0]
+    usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else 0.0
+    days = _DAY * np.cumsum((steps < -0.5 * _DAY) & (form == CLOCK))
+    by = _HOUR if form else counter
+    back = (steps < 0.0) & (np.abs(steps + by - usual) <= 3.0 * usual)
+    if form:
         # An hour back to where all began is a clock that was set anew.
-        back &= values + added > first + usual
-        for row in np.flatnonzero(back):
-            self.notes.append(
-                f"the clock goes one hour back at {texts.iloc[row]!s}: daylight saving; the time "
-                "goes on"
-            )
-        added += _HOUR * np.cumsum(back)
-        self._ends, self._added = (first, values[-1]), float(added[-1])
-        return values + added
+        back &= time[known] + days > time[known[0]] + usual
+    rounds, is_new = np.cumsum(back), (steps < 0.0) & ~back & (form == "")
+    rounds -= np.maximum.accumulate(np.where(is_new, rounds, 0))
+    time = time.copy()
+    time[known] += days + by * rounds
+    return time, known[back]
 
 
 def dated(dates, times):

@@ -92,7 +92,7 @@ def _calibrate(options, tell):
         targets = list(write_targets(calibration, options.target, written))
     for message in calibration.warnings:
         tell(f"warning: {message}")
-    _say(errors_and_verdict(calibration))
+    _say(errors_and_verdict(calibration, reading.name_row))
     names = ", ".join(sorted(path.name for path in folder.iterdir()))
     _say([f"check          {split.sentence}", f"written to     {folder}: {names}"])
     _say(f"note           {note}" for note in reading.notes)

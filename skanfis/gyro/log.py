@@ -20,7 +20,7 @@ from ..export.fis.reader import distinct
 from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, settle
-from ._source import NO_VALUE, Clock, as_numbers, dated, open_source
+from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_source
 from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
 from .metrics import rows_by_run
@@ -197,7 +197,7 @@ class LogFile:
         self.notes = [*self.source.notes, *self.layout.notes]
         self.n_rows = 0
         self.runs = pd.DataFrame()  # labels of device and run, of each run that was read
-        self._clock: Clock | None = None
+        self._form = ""  # of a clock of texts
         if first is None:
             return
         differ = sorted(set(self.layout.places) ^ set(first.layout.places))
@@ -267,11 +267,17 @@ class LogFile:
                     columns[part].append(values)
             except LogError as error:
                 raise self.located(error, table.index) from error
-        if self._clock is not None:
-            self.notes += self._clock.notes
         nothing = [pd.Series(dtype=float)]
         # One by one, and not copied again: a long log is held once.
         parts = {part: pd.concat(columns.pop(part) or nothing) for part in places}
+        if "time" in parts:
+            counter = convert(2.0**32, self.layout.units["time"])
+            time, back = going_on(parts["time"].to_numpy(), self._form, counter)
+            parts["time"] = pd.Series(time, parts["time"].index)
+            by = "one hour (daylight saving)" if self._form else "by the range of its 32 bits"
+            for place in map(self.source.place_of, back[:1]):
+                told = f"the clock goes back {by} in {back.size} place(s), first at {place}"
+                self.notes.append(f"{self.path}: {told}; the time goes on")
         return pd.DataFrame(parts, copy=False)
 
     def _in_order(self, log):
@@ -289,18 +295,13 @@ class LogFile:
             # A row that follows itself is no run.
             twice &= log["time"].diff() == 0.0
         if twice.any():
-            first, last = map(self._time_as_written, log.index[twice][[0, -1]])
+            first, last = map(self.source.place_of, log.index[twice][[0, -1]])
             self.notes.append(
-                f"{self.path}: {twice.sum():,} rows occur twice, from time {first} to {last}; the "
+                f"{self.path}: {twice.sum():,} rows occur twice, from {first} to {last}; the "
                 "second time they are left out"
             )
             log = log[~twice]
         return log
-
-    def _time_as_written(self, row):
-        place = self.layout.places["time"]
-        pieces = self.source.pieces([place], _ROWS)
-        return next(piece[place][row] for piece in pieces if row in piece.index)
 
     def _told_by_clock(self, time):
         """Labels of runs: "1", "2" and so on, where the time begins anew or steps far.
@@ -339,20 +340,19 @@ class LogFile:
 
     def _numbers(self, column, part):
         numbers = as_numbers(column, self.source.decimal)
-        if part == "time" and self._clock is None and not np.isfinite(numbers).any():
-            found = Clock(column)
-            if found.form:
-                self._clock = found
-                self.notes.append(f"the time is read in s, its form is {found.form}")
-        clock = self._clock if part == "time" else None
-        numbers = clock.seconds(column) if clock else numbers
+        if part == "time" and not self._form and not np.isfinite(numbers).any():
+            self._form = clock_form(column)
+            if self._form:
+                self.notes.append(f"the time is read in s, its form is {self._form}")
+        form = self._form if part == "time" else ""
+        numbers = as_numbers(column, form=form) if form else numbers
         bad = np.isnan(numbers)
         bad[bad] = (column[bad].notna() & ~column[bad].isin(NO_VALUE)).to_numpy()
         if bad.any():
             row = int(bad.argmax())
-            kind = "no time like those before" if clock else "not a number"
+            kind = "no time like those before" if form else "not a number"
             raise LogError(f"{shortened(column.iloc[row])} is {kind}.", part, row)
-        is_in_seconds = clock or column.dtype.kind in "mM"
+        is_in_seconds = form or column.dtype.kind in "mM"
         return numbers if is_in_seconds else convert(numbers, self.layout.units[part])
 
     def located(self, error, rows=None, where=None):

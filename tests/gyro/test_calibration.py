@@ -111,7 +111,11 @@ def test_before_after_and_what_is_simpler_are_of_the_same_rows():
     for train, test in calibration.split.folds:
         left[test] -= before[train].mean()
     assert verdict.rms["constant"] == pytest.approx(np.sqrt(np.mean(left[rows] ** 2)))
-    shown = errors_and_verdict(calibration)[0]
+    shown, left, *_ = errors_and_verdict(calibration)
+    error = np.abs(calibration.after - calibration.rate)[calibration.in_range]
+    row = np.flatnonzero(calibration.in_range)[error.argmax()]
+    told = f"half of them within {np.median(error):.4g}, peak {error.max():.4g} (row {row})"
+    assert left.endswith(told)
     errors = [f"{verdict.rms[name]:.4g}" for name in ("no compensation", "constant")]
     assert f"{errors[0]} deg/s RMS, {errors[1]} once a constant (the output at rest)" in shown
     assert f"is taken off, on {rows.sum():,} held-out rows in range" in shown

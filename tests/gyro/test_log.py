@@ -244,6 +244,18 @@ def test_three_rows_are_named_and_more_support_each_other():
     assert glitches(log) == []
 
 
+def test_however_many_temperatures_are_glitches_and_a_step_is_none():
+    log = simulated(sampling_interval=2.0)
+    cold = log.loc[log.index[::400], "temperature"].index
+    log.loc[cold, "temperature"] = 85.0  # a thermometer that starts anew
+    named = find_glitches(log, (log["output"] - log["rate"]).to_numpy())
+    assert [row for row, _ in named] == cold[:3].tolist()
+    assert named[2][1] == f"the temperature of 85 degC (and that of {cold.size - 3} rows more)"
+    # Soaks, with nothing logged on the way from one to the next.
+    soak = np.repeat([-20.0, 60.0, 20.0], len(log) // 3 + 1)[: len(log)]
+    assert glitches(log.assign(temperature=soak, run=0)) == []
+
+
 def test_the_sentence_on_a_glitch_says_what_is_odd():
     log = simulated().assign(rate=0.0)
     log["output"] = 0.01 * np.random.default_rng(0).normal(size=len(log))

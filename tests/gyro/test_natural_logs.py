@@ -117,6 +117,9 @@ def test_the_rate_of_a_temperature_is_no_rate_of_the_table(tmp_path, truth, name
     commas = truth["rate"].map("{:.6f}".format).str.replace(".", ",")
     with pytest.raises(LogError, match=r"line 2, column 'rate': '-?\d+,\d{6}' is not a number"):
         found_in(tmp_path, table.assign(rate=commas))
+    thousands = (3600.0 * truth["rate"]).map("{:,.1f}".format)
+    with pytest.raises(LogError, match=r"column 'table \[deg/h\]' \(rate\): '\S+' is not a number"):
+        found_in(tmp_path, table.assign(**{"table [deg/h]": thousands}))
 
 
 @pytest.mark.parametrize("decimal", [".", ","])
@@ -380,7 +383,19 @@ def test_a_clock_that_is_put_one_hour_back_goes_on(tmp_path, truth, form):
     np.testing.assert_allclose(np.diff(reading.log["time"]), 20.0)
     assert "run" not in reading.log
     told = "; ".join(reading.notes)
-    assert f"one hour back at {local[250].strftime(form)}: daylight saving" in told
+    assert "the clock goes back one hour (daylight saving) in 1 place(s), first at line 252" in told
+
+
+@pytest.mark.parametrize(("unit", "steps", "times"), [(1e-6, 2e7, 2), (1e-3, 6e5, 1)])
+def test_a_counter_of_32_bits_that_begins_again_goes_on(tmp_path, truth, unit, steps, times):
+    """One of microseconds does every 72 minutes: no run begins there."""
+    clock = (steps * np.arange(-15.5, 284.0)) % 2**32
+    name = {1e-6: "t_us", 1e-3: "t_ms"}[unit]
+    reading = found_in(tmp_path, truth[PARTS[1:]].assign(**{name: clock}))
+    np.testing.assert_allclose(np.diff(reading.log["time"]), steps * unit)
+    assert "run" not in reading.log
+    told = f"back by the range of its 32 bits in {times} place(s), first at line 18; the time goes"
+    assert told in "; ".join(reading.notes)
 
 
 def test_a_block_that_occurs_twice_is_left_out(tmp_path, truth):
@@ -389,7 +404,7 @@ def test_a_block_that_occurs_twice_is_left_out(tmp_path, truth):
     reading = found_in(tmp_path, pd.concat([table[:200], table[100:]]))
     same(reading, truth)
     told = "; ".join(reading.notes)
-    assert "100 rows occur twice, from time 01.03.2026 10:16:40 to 01.03.2026 10:33:10" in told
+    assert "100 rows occur twice, from line 202 to line 301" in told
 
 
 @pytest.mark.parametrize("n_runs", [1, 5])
