@@ -200,10 +200,8 @@ def check_at_rest(log, unit):
                 f"spans {low:.4g} to {high:.4g} deg/s: no bias does, the gyro was not at rest.",
                 "output",
             )
-    steps = np.abs(np.diff(output))
-    if "run" in log:
-        run = log["run"].to_numpy()
-        steps = steps[run[1:] == run[:-1]]
+    runs = log["run"] if "run" in log else np.zeros(len(log))
+    steps = log["output"].groupby(runs).diff().dropna().abs().to_numpy()
     if not steps.any():
         return
     usual = max(np.median(steps), steps[steps > 0.0].min())
@@ -239,7 +237,8 @@ def _check_plausible(values, part, unit):
     bad = (values < low) | (values > high)
     if not bad.any():
         return
-    advice, ends = "", convert_back(np.array([values.min(), values.max()]), unit)
+    advice = "; leave cells that hold no value empty"
+    ends = convert_back(np.array([values.min(), values.max()]), unit)
     ranges = {other: convert(ends, other) for other in units_of(part) if other not in SIGNALS}
     others = [other for other, (least, most) in ranges.items() if low <= least and most <= high]
     # More than half: the unit; few: glitches of the measurement.

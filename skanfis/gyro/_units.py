@@ -10,6 +10,7 @@ import numpy as np
 from ._columns import CANONICAL, SIGNALS, convert, convert_back, units_of
 from .errors import UsageError
 
+_NO_TEMPERATURE = 500.0  # marks of no value, such as 9999, are beyond it in any unit
 _COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
 # Logs that stay above the one, or reach the other, may be in degF; beyond the last nothing else is.
 _WARM, _HOT, _HOTTEST = 30.0, 86.0, 130.0
@@ -33,6 +34,8 @@ def settle_units(values, units, *, is_all=True):
     UsageError, with the options to copy, where more than one reading is plausible; unless these are
     not all values, which may tell it.
     """
+    heat = values.get("temperature", np.empty(0))
+    values = values | {"temperature": np.where(np.abs(heat) < _NO_TEMPERATURE, heat, np.nan)}
     values = {part: column for part, column in values.items() if np.isfinite(column).any()}
     readings: list[dict] = [{}]
     for part, find in (("temperature", _of_temperature), ("time", _of_time)):
@@ -115,9 +118,8 @@ def _of_time(values, units):
     # Of the first run, if the clock tells one from another.
     ends = np.flatnonzero(steps < 0.0)
     end = ends[0] + 1 if ends.size and ends[0] > 10 else time.size
-    unit = units.get("temperature", "degC")
-    heating = np.nanmax(heat[:end]) - np.nanmin(heat[:end])
-    heating = convert(heating, unit) - convert(0.0, unit)
+    degrees = convert(heat[:end], units.get("temperature", "degC"))
+    heating = np.nanmax(degrees) - np.nanmin(degrees)
     step, duration = np.median(steps[steps > 0.0]), max(np.ptp(time[:end]), 1e-300)
 
     def is_plausible(unit, heat_limits):

@@ -99,6 +99,14 @@ def test_a_temperature_in_either_scale_is_asked_for(tmp_path, truth, low, high):
         reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
 
 
+@pytest.mark.parametrize("mark", [9999.0, -9999.0])
+def test_marks_of_no_value_tell_no_unit_and_are_refused(tmp_path, truth, mark):
+    heat = truth["temperature"].where(np.arange(len(truth)) % 20 != 7, mark)
+    told = rf"line 9, column 'temp' .*: {mark} degC .*; leave cells that hold no value empty"
+    with pytest.raises(LogError, match=told):
+        reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
+
+
 def test_round_levels_of_a_rate_table_tell_its_unit(tmp_path, truth):
     rate = np.repeat([-20.0, -10.0, 0.0, 10.0, 20.0], len(truth) // 5)
     log = truth.iloc[: rate.size].assign(rate=rate, output=1.01 * rate)
