@@ -317,11 +317,11 @@ def find_glitches(log, error):
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
     by_run = pd.Series(temperature).groupby(runs)
-    # At the ends of a run those on the one side count twice.
+    # At the ends of a run those on the one side count twice. Of two rows nothing is known.
     shifted = [by_run.shift(step).fillna(by_run.shift(-step)) for step in (-2, -1, 1, 2)]
     _, low, high, _ = np.sort(np.column_stack(shifted), axis=1).T
-    beyond = np.maximum(np.maximum(low - temperature, temperature - high), 0.0)
-    least = max(_SMOOTH * _spread(temperature), _ALONE * np.nanquantile(beyond, _SOUND))
+    beyond = np.nan_to_num(np.maximum(low - temperature, temperature - high))
+    least = max(_SMOOTH * _spread(temperature), _ALONE * np.quantile(beyond, _SOUND))
     jumps = np.flatnonzero(beyond > least).tolist()
     named, more = jumps[:_MOST_GLITCHES], len(jumps) - _MOST_GLITCHES
     found = {row: f"the temperature of {temperature[row]:.4g} degC" for row in named}

@@ -254,6 +254,8 @@ def test_however_many_temperatures_are_glitches_and_a_step_is_none():
     # Soaks, with nothing logged on the way from one to the next.
     soak = np.repeat([-20.0, 60.0, 20.0], len(log) // 3 + 1)[: len(log)]
     assert glitches(log.assign(temperature=soak, run=0)) == []
+    # Runs of two rows, with the step within one.
+    assert glitches(log[1:].assign(temperature=soak[1:], run=np.arange(1, len(log)) // 2)) == []
 
 
 def test_the_sentence_on_a_glitch_says_what_is_odd():
