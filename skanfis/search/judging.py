@@ -3,7 +3,8 @@ r"""What is expected of new rows: the error on rows that had no part in anything
 A sequence of candidates is grown anew without some of the rows, and its members are judged on
 these, size by size. With few rows in five folds; with many, half of the rows are enough to grow and
 half to judge, once. Rows that come in groups, runs of an instrument say, are left out in whole
-groups, a fifth of them at a time.
+groups, a fifth of them at a time. Rows beyond the range that a fold grows on do not judge, unless
+most are.
 
 Rows are dealt in the order of their target, so that neither the order in which they come nor that
 of the columns makes a difference; what is equal in all columns is one row with a weight.
@@ -51,14 +52,15 @@ def splits(rows: StandardisedData):
         if n_rows >= FOLDS * _ENOUGH:
             found = [(every[1::2], every[::2])]
         found = found[: int(np.ceil(len(found) * _ENOUGH / n_rows))]
-    return [(grow, _in_range(rows.X, grow, judge)) for grow, judge in found]
+    inside = [(grow, _in_range(rows.X, grow, judge)) for grow, judge in found]
+    left_out, in_range = (sum(judge.size for _, judge in part) for part in (found, inside))
+    return [part for part in inside if part[1].size] if 2 * in_range >= left_out else found
 
 
 def _in_range(X, grow, judge):
-    """Those of the rows to judge that are within the range of the others, where most of them are.
+    """Those of the rows to judge that are within the range of the others.
 
     The model of all rows has seen their like; to this fold they are beyond the data.
     """
     low, high = X[grow].min(axis=0), X[grow].max(axis=0)
-    inside = ((X[judge] >= low) & (X[judge] <= high)).all(axis=1)
-    return judge[inside] if 2 * np.count_nonzero(inside) >= judge.size else judge
+    return judge[((X[judge] >= low) & (X[judge] <= high)).all(axis=1)]

@@ -121,13 +121,10 @@ class StructureSearch:
 
     def _variance(self):
         """Squared error of the mean on the rows that judge."""
-        squares = [
-            np.sum(
-                (rest.y - np.average(fold.rows.y, axis=0, weights=fold.rows.sample_weight)) ** 2,
-                axis=1,
-            )
-            for fold, rest in zip(self.folds, self.rest, strict=True)
-        ]
+        squares = []
+        for fold, rest in zip(self.folds, self.rest, strict=True):
+            mean = np.average(fold.rows.y, axis=0, weights=fold.rows.sample_weight)
+            squares.append(np.sum((rest.y - mean) ** 2, axis=1))
         return self.judges.mean(np.concatenate(squares))
 
     def _report(self, found):

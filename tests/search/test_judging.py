@@ -49,14 +49,19 @@ def left_out(rows, grow):
     return np.setdiff1d(np.arange(rows.n_rows), grow)
 
 
+def in_range(rows, grow):
+    """Of the rows left out, those in the range of the others."""
+    left = left_out(rows, grow)
+    low, high = rows.X[grow].min(axis=0), rows.X[grow].max(axis=0)
+    return left[((rows.X[left] >= low) & (rows.X[left] <= high)).all(axis=1)]
+
+
 def assert_judges(rows, folds):
-    """Of those left out, the ones in the range of the others judge, where most of them are."""
-    for grow, judge in folds:
-        left = left_out(rows, grow)
-        low, high = rows.X[grow].min(axis=0), rows.X[grow].max(axis=0)
-        inside = left[((rows.X[left] >= low) & (rows.X[left] <= high)).all(axis=1)]
-        expected = inside if inside.size >= left.size / 2 else left
-        assert_array_equal(np.sort(judge), expected)
+    """Of those left out, the ones in the range of the others judge, where most of all are."""
+    left, inside = ([of(rows, grow) for grow, _ in folds] for of in (left_out, in_range))
+    expected = inside if 2 * sum(map(len, inside)) >= sum(map(len, left)) else left
+    for (_, judge), own in zip(folds, expected, strict=True):
+        assert_array_equal(np.sort(judge), own)
 
 
 class TestSplits:
@@ -83,6 +88,18 @@ class TestSplits:
         for (grow, _), own in zip(folds, left, strict=True):
             assert not np.intersect1d(rows.groups[grow], rows.groups[own]).size
         assert_judges(rows, folds)
+
+    def test_a_run_at_an_end_of_the_range_does_not_judge(self, rng):
+        """Each run has its own temperature; the coldest and the hottest are in a fold alone."""
+        X, y = measured(rng, 500)
+        X[:, 0] = groups = np.arange(500) % 5
+        rows = dealt(X, y, groups=groups)
+        folds = splits(rows)
+        assert len(folds) == 3
+        assert_array_equal(np.unique(rows.groups[np.concatenate([j for _, j in folds])]), [1, 2, 3])
+        # Of three runs most rows are at an end: the search cannot do without.
+        rows = dealt(X[groups < 3], y[groups < 3], groups=groups[groups < 3])
+        assert_array_equal(np.sort(np.concatenate([j for _, j in splits(rows)])), np.arange(300))
 
     def test_one_row_judges_itself(self, rng):
         (fold,) = splits(dealt(*measured(rng)).part([0]))
