@@ -38,8 +38,17 @@ def gyro(n_rows=120):
     return X, y
 
 
+def tenths():
+    """Set points on two inputs: there is nothing for the rest of the departures to pull on."""
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1.0, 1.0, (150, 2))
+    X[:, 0] = X[:, 0].round(1)
+    return X, np.tanh(3.0 * X[:, 0]) + X[:, 1] ** 2 + 0.1 * rng.normal(size=150)
+
+
 DATA = {
     "gyro": gyro,
+    "tenths": tenths,
     "sinc": make_jang_sinc,
     "mackey-glass": lambda: tuple(part[:120] for part in make_mackey_glass()),
 }
@@ -51,6 +60,7 @@ CASES = {
     "gyro, 4 rules": ("gyro", {"n_mfs": [2, 1, 2]}),
     "gyro, clusters": ("gyro", {"partition": KMEANS}),
     "sinc, constant rules": ("sinc", {"n_mfs": 3, "order": 0, "mf": "bell"}),
+    "tenths, 16 rules": ("tenths", {"n_mfs": 4}),
     "mackey-glass, clusters": ("mackey-glass", {"partition": KMEANS, "mf": "bell"}),
 }
 GIVEN = {"agreement": 1e-3, "alpha": 1e-5, "solver": VariableProjection(stiffness=1e-3)}

@@ -30,11 +30,13 @@ def contradicted(free, held, inequalities, fixed, rows, raised):
     points, values = fixed
     gap = np.zeros(values.shape)
     if len(points):
-        gap = np.abs(free.predict(points) - values) - _CERTAIN * _deviation(free, points).T
+        # Beyond the range they are answered as its edge, or what is followed from there.
+        reach = free.max_extrapolation * free.spread if free.out_of_bounds == "linear" else 0.0
+        answered = np.clip(points, free.minimum - reach, free.maximum + reach)
+        gap = np.abs(free.predict(points) - values) - _CERTAIN * _deviation(free, answered).T
     for k, output in enumerate(free.output_names):
-        guilty = [
-            one.name for one in inequalities if one.output == k and _speaks_against(one, free, some)
-        ]
+        own = [one for one in inequalities if one.output == k]
+        guilty = [one.name for one in own if _speaks_against(one, free, some)]
         guilty += [f"FixedPoint at {points[i]}" for i in np.flatnonzero(gap[:, k] > 0.0)]
         if not guilty:
             continue

@@ -55,7 +55,7 @@ _LONGEST_STEP = np.log(100.0)
 _ALIKE = 0.5
 # Below all weights: a logarithm can be taken of it.
 _NOTHING = np.finfo(float).tiny
-# Of a number of parameters, and of what is paid for them.
+# Of a number of parameters, of what is paid for them, and of steps: less has no sign of its own.
 _ROUNDING = 1e-12
 # What changes a weight by less leaves its second digit as it is.
 _SETTLED = 5e-3
@@ -283,8 +283,7 @@ def extrapolated(line, before, now, after, free, least):
     Where data hardly decide on a weight, as with more columns than rows, every step is a small part
     of the way. By Aitken's rule, the logarithms being a geometric sequence, the rest of the way is
     1 / (1 - r) last steps, r the ratio of one to that before; never more than the largest step,
-    which is taken too where r is one or more.
-    ``before`` is None where there is no such step.
+    which is taken too where r is one or more. ``before`` is None where there is no such step.
     """
     if before is None:
         return after
@@ -292,7 +291,7 @@ def extrapolated(line, before, now, after, free, least):
     first, second, third = np.log(np.maximum(weights, _NOTHING))
     step, last = third - second, second - first
     moves = np.isin(line.kinds, free)
-    moves &= (step * last > 0.0) & (np.abs(step) >= _ALIKE * np.abs(last))
+    moves &= (step * last > _ROUNDING) & (np.abs(step) >= _ALIKE * np.abs(last))
     if not moves.any():
         return after
     left = np.maximum(1.0 - step / np.where(moves, last, 1.0), np.finfo(float).eps)

@@ -49,7 +49,6 @@ class StructureRequest(Plan):
         if isinstance(self.partition, TSKModel):
             model = self.partition
             antecedent = imported_antecedent(model, rows)
-            self._check_number(antecedent.n_rules)
             # Names that say where terms stand are made anew when these have moved.
             names = () if model.term_names == default_term_names(model) else model.term_names
             return replace(self._tuned(antecedent, rows), term_names=names)
@@ -106,8 +105,6 @@ class StructureRequest(Plan):
         if self.max_rules is not None and n_rules > self.max_rules:
             is_word = isinstance(self.n_mfs, str)
             given = f"partition={self.partition!r}" if is_word else f"n_mfs={self.n_mfs!r}"
-            if isinstance(self.partition, TSKModel):
-                given = "partition"
             raise ValueError(
                 f"{given} makes {n_rules:,} rules, more than max_rules={self.max_rules}: give "
                 "fewer, or leave max_rules at None."

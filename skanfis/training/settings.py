@@ -82,6 +82,8 @@ def _imported(estimator, names, sample_weight):
         )
     check_inputs(model, names, "partition")
     refused = {"premise_features": "to imported rules, which have their inputs:"}
+    if model.n_rules > (estimator.max_rules or model.n_rules):
+        refused["max_rules"] = f"where partition has {model.n_rules:,} rules: give fewer, or"
     if estimator.max_iter == 0:
         why = "where imported rules are taken as they are (max_iter=0): use solver='lse', or"
         refused |= dict.fromkeys(("monotonic_cst", "constraints", "consequent_features"), why)

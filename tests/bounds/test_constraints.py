@@ -1,6 +1,7 @@
 """Constraints of the estimator: kept everywhere, proven, the least change, and what is refused."""
 
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -231,7 +232,10 @@ def test_points_beyond_the_range_are_met_by_the_policy(policy):
     points = np.stack([X.max(axis=0), X.min(axis=0)]) + np.array([[0.4, -0.3], [0.0, -0.1]])
     known = [FixedPoint(point, value) for point, value in zip(points, (0.2, -0.1), strict=True)]
     params = QUICK | {"out_of_bounds": policy}
-    held = ANFISRegressor(**params, constraints=known).fit(X, Y)
+    # The edge that is held all the way is known from its rows.
+    told = pytest.warns(ConstraintWarning) if policy == "clip" else nullcontext()
+    with told:
+        held = ANFISRegressor(**params, constraints=known).fit(X, Y)
     free = ANFISRegressor(**params).fit(X, Y)
     assert_allclose(held.predict(points), [0.2, -0.1], atol=1e-9)
     std = held.model_.standard_deviation(np.clip(points, X.min(axis=0), X.max(axis=0)))[:, 0]

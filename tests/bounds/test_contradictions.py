@@ -46,6 +46,18 @@ def test_a_hump_speaks_against_rising_and_against_a_limit(rng):
     assert not told(free, X, y, Inequality(0, -1.0, None, 1.6, "limit"))
 
 
+@pytest.mark.parametrize("policy", ["clip", "linear"])
+def test_a_point_out_of_range_is_held_to_what_is_answered_there(policy, rng):
+    """However far it is: the edge, or what is followed from there, is what has to give way."""
+    X = rng.uniform(-1.0, 1.0, (300, 1))
+    y = np.tanh(3.0 * X[:, 0]) + 0.1 * rng.normal(size=300)
+    free = ANFISRegressor(n_mfs=3, out_of_bounds=policy).fit(X, y)
+    X = np.array([[1.2], [9.0]])
+    for value, is_against in ((0.0, True), (free.model_.predict(X[1:])[0, 0] + 0.02, False)):
+        found = told(free, X, X[:, 0], fixed=(X[1:], np.array([[value]])))
+        assert bool(found) == is_against
+
+
 def test_what_is_true_is_not_contradicted():
     """Draws of a saturation, which is flat for half of the range, by three terms."""
     for seed in range(12):

@@ -154,10 +154,13 @@ def test_clusterings_find_rules_that_generalise(partition):
     assert np.sqrt(np.mean((model.predict(X[300:]) - y[300:]) ** 2)) < 1.4
 
 
-def test_an_imported_model_may_not_have_more_rules_than_the_most(data, known):
+@pytest.mark.parametrize("settings", [{}, {"max_iter": 0}, {"solver": "lse"}], ids=str)
+def test_an_imported_model_may_not_have_more_rules_than_the_most(data, known, settings):
     n_rules = known.n_rules_
-    with pytest.raises(ValueError, match=f"partition makes {n_rules} rules, more than max_"):
-        ANFISRegressor(partition=known, max_rules=n_rules - 1).fit(*data)
+    many = ANFISRegressor(partition=known, max_rules=n_rules - 1, **settings)
+    for learn in (many.fit, many.partial_fit):
+        with pytest.raises(ValueError, match=f"max_rules=.* partition has {n_rules} rules: give"):
+            learn(*data)
     model = quick(partition=known, max_rules=n_rules).fit(*data)
     assert model.n_rules_ == n_rules
 
