@@ -5,7 +5,6 @@ squares would be decided by a group ten times larger than the others.
 """
 
 import warnings
-from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +16,7 @@ from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
 from ..exceptions import OutOfBoundsWarning
+from ..inspection.text import counted
 from ._checks import LARGEST_AT_REST, find_glitches
 from ._columns import SIGNALS, ask
 from ._simpler import NAMES, ROUNDS, Simpler, make_law, simpler_compensations
@@ -30,10 +30,9 @@ _TIME_CONSTANT = 30.0  # of the rate of the temperature [s]
 _MOST_FIT_ROWS = 10_000
 # Of the law beside rules, in temperature: of degree 1 rules would have to bend for it.
 _DEGREE = 2
-# Terms are looked for among so many rows, and fitted to all. More rules than three terms of three
-# inputs make were taken on no log that was tried, and looking at them takes half of the time.
-_ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 27
-_FEWEST_GROUPS = 4  # whose range is that of the others when one is left out
+# Rules are looked for among so many rows, and fitted to all. More than eight were taken on no log
+# that was tried, and looking at them takes half of the time.
+_ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 12
 # Of a verdict: the name of the model in it, and what a gain must be above to be worth having.
 _MODEL, _LEAST_GAIN = "this model", 1.02
 _CONFIDENCE = 0.95
@@ -100,7 +99,7 @@ class Calibration:
     ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
     the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
     rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
-    of the model that had not seen it. ``terms`` are the model's numbers of them.
+    of the model that had not seen it.
     ``simpler`` are compensations without rules, judged with the model by ``verdict`` on the rows in
     range. ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
     ``n_rows`` is how many rows there were, of which ``log`` has some.
@@ -116,7 +115,6 @@ class Calibration:
     before: np.ndarray
     after: np.ndarray
     inside: np.ndarray
-    terms: tuple[int, ...]
     simpler: list[Simpler]
     verdict: Verdict
     n_fit_rows: int
@@ -197,7 +195,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
     tell("comparing with simpler compensations")
     simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
-    estimator, terms, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
+    estimator, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
     predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
     model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
     # The same rows for all: those that the model answered in range.
@@ -228,7 +226,6 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         before=before,
         after=chosen.after,
         inside=judged,
-        terms=terms,
         simpler=simpler,
         verdict=verdict,
         n_fit_rows=rows.size,
@@ -240,45 +237,26 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
 
 
 def fit_model(X, target, groups, recipe):
-    """The fitted estimator of a recipe, and its numbers of terms; groups tell what is not given."""
-    terms, rules, rows = recipe.terms, None, np.arange(len(X))
-    if isinstance(terms, str):
-        rows = some_rows(_shared_rows(X, groups), _ROWS_FOR_SEARCH, X, np.random.default_rng(0))
-        left = target
-        if recipe.physics:
-            left = target - make_law(recipe.inputs, _DEGREE, "linear").fit(X, target).predict(X)
-        rules = _make_rules(recipe, terms)
-        rules.fit(X.iloc[rows], left[rows], anfisregressor__groups=groups[rows])
-        counts = Counter(term["input"] for term in rules[-1].memberships_)
-        terms = tuple(max(counts[name], 1) for name in rules[-1].model_.input_names)
-    if not recipe.physics:
-        # What was found in all rows is fitted to them.
-        is_done = rules is not None and rows.size == len(X)
-        return rules if is_done else _make_rules(recipe, terms).fit(X, target), terms
-    # In every round the same terms: looked for once, in what the law leaves.
-    law, rules = make_law(recipe.inputs, _DEGREE, recipe.outside), _make_rules(recipe, terms)
-    return ResidualRegressor(law, rules, n_rounds=ROUNDS).fit(X, target), terms
+    """The fitted estimator of a recipe; groups tell the rules that are not given."""
+    law = make_law(recipe.inputs, _DEGREE, recipe.outside) if recipe.physics else None
+    if not isinstance(recipe.terms, str):
+        structure: dict[str, Any] = {"n_mfs": list(recipe.terms)}
+    else:
+        rows = some_rows(np.arange(len(X)), _ROWS_FOR_SEARCH, X, np.random.default_rng(0))
+        left = target - law.fit(X, target).predict(X) if law else target
+        found = _make_rules(recipe, max_rules=_MOST_RULES)
+        found.fit(X.iloc[rows], left[rows], anfisregressor__groups=groups[rows])
+        if law is None and rows.size == len(X):
+            return found
+        structure = {"partition": found[-1].model_}
+    rules = _make_rules(recipe, **structure)
+    # In every round the same rules begin: looked for once, in what the law leaves.
+    whole = rules if law is None else ResidualRegressor(law, rules, n_rounds=ROUNDS)
+    return whole.fit(X, target)
 
 
-def _shared_rows(X, groups):
-    """Rows in the range that two groups or more reach, of every input; all rows where few are.
-
-    What a model makes of other rows while their group is held out is its tangent, and no figure of
-    a calibration is of such rows: they shall not choose its terms.
-    """
-    by_group = X.groupby(groups)
-    if by_group.ngroups < _FEWEST_GROUPS:
-        return np.arange(len(X))
-    low, high = np.sort(by_group.min(), axis=0)[1], np.sort(by_group.max(), axis=0)[-2]
-    rows = np.flatnonzero(((low <= X) & (high >= X)).all(axis=1))
-    return rows if 2 * rows.size >= len(X) else np.arange(len(X))
-
-
-def _make_rules(recipe, terms):
-    """A scaler and rules, of a grid of given numbers of terms or such as the recipe looks for."""
-    structure: dict[str, Any] = {"partition": "grid", "max_rules": _MOST_RULES}
-    if isinstance(terms, tuple):
-        structure = {"n_mfs": list(terms)}
+def _make_rules(recipe, **structure):
+    """A scaler and rules, of a given structure or such as is looked for."""
     rules = ANFISRegressor(**structure, simplicity=0.0, out_of_bounds=recipe.outside)
     return make_pipeline(StandardScaler(), rules)
 
@@ -303,7 +281,7 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
         folds.append((rows, test))
         # The final fit warns of the same.
         with warnings.catch_warnings(action="ignore"):
-            model, _ = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
+            model = fit_model(X.iloc[rows], target[rows], groups[rows], recipe)
             predicted[test] = model.predict(X.iloc[test])
             inside[test] = ask(model, "in_bounds", X.iloc[test])
         models.append(model)
@@ -317,14 +295,14 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
 
 
 def _fit(X, target, groups, recipe, tell):
-    """The model of all rows, its terms, and what warnings said."""
+    """The model of all rows, and what warnings said."""
     tell(f"fitting to {len(X):,} rows")
     with warnings.catch_warnings(record=True, action="always") as caught:
         # Trial fits warn of rows that they have not seen; the final fit is asked of none.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
-        estimator, terms = fit_model(X, target, groups, recipe)
-    tell(f"terms {','.join(map(str, terms))}")
-    return estimator, terms, sorted({str(warning.message) for warning in caught})
+        estimator = fit_model(X, target, groups, recipe)
+    tell(f"{counted(rules_of(estimator)[-1].n_rules_, 'rule')}")
+    return estimator, sorted({str(warning.message) for warning in caught})
 
 
 def _to_write(recipe, verdict, simpler):

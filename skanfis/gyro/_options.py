@@ -93,7 +93,7 @@ def make_parser():
     group = parser.add_argument_group("the model")
     told = "all that the log has; time, since power-on, with three runs or more"
     add("--inputs", told, nargs="+", choices=INPUTS)
-    told = "fuzzy terms per input, such as 2,1,3; 'search' (default) grows them on held-out groups"
+    told = "fuzzy terms per input, such as 2,1,3; 'search' (default) finds rules by held-out groups"
     add("--terms", told, type=_terms, default="search")
     told = "fit the arcsine law of open-loop fiber-optic gyros first; rules learn what it leaves"
     add("--physics", told, action="store_true")

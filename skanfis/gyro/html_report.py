@@ -11,6 +11,7 @@ import sklearn
 
 from .. import __version__
 from ..inspection.labels import printable
+from ..inspection.text import counted
 from ..policies import SILENT, policy_in_words
 from ._columns import RATE_UNITS, SIGNALS
 from ._headline import (
@@ -297,11 +298,11 @@ def _written(results):
         formula = Block("open", rules_text(calibration), "What to compute")
         return "What is written", [Block("text", text), formula, _on_board(calibration)]
     against = against_reading(calibration)
-    n_rules, terms = calibration.rules[-1].n_rules_, " × ".join(map(str, calibration.terms))
+    n_rules = counted(calibration.rules[-1].n_rules_, "rule")
     fit = "Nothing measured here speaks against reading the rules one by one."
     return "The rules", [
         Block("pictures", list(results.memberships())),
-        Block("details", rules_text(calibration), f"All rules as text ({n_rules}, terms {terms})"),
+        Block("details", rules_text(calibration), f"All rules as text ({n_rules})"),
         _on_board(calibration),
         Block("heading", "Can the rules be read?"),
         *([Block("warn", sentence) for sentence in against] or [Block("text", fit)]),

@@ -3,12 +3,12 @@
 from itertools import islice
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from skanfis.gyro import _calibration, _simpler
-from skanfis.gyro._calibration import Recipe, _shared_rows, fit_model
+from skanfis.gyro._calibration import Recipe, fit_model
 from skanfis.gyro._headline import errors_and_verdict, formula_of, headline
+from skanfis.gyro.compose import rules_of
 
 from .planted import NOISE, calibrated, evaluated, log_of
 
@@ -147,26 +147,12 @@ def test_what_a_fold_holds_out_has_no_say_in_its_model(monkeypatch):
 
 
 @pytest.mark.floors
-def test_terms_are_for_what_the_law_leaves():
+def test_rules_are_for_what_the_law_leaves():
     log = log_of(law)
     X, rate = log[["temperature", "output"]], log["rate"].to_numpy()
     groups = log["run"].astype(str).to_numpy()
     recipe = Recipe(tuple(X), physics=True)
-    assert fit_model(X, rate, groups, recipe)[1] == (1, 1)
+    assert rules_of(fit_model(X, rate, groups, recipe))[-1].n_rules_ == 1
     # An amplitude that is curved in temperature.
     curved = X.assign(output=X["output"] * (1 - 2e-5 * (X["temperature"] - 25.0) ** 2))
-    assert fit_model(curved, rate, groups, recipe)[1] == (1, 1)
-
-
-def test_rows_that_one_group_alone_reaches_do_not_choose_terms():
-    # Four groups, each of eleven temperatures; the first begins 2 lower, the last ends 3 higher.
-    heat = np.linspace([-2.0, 0.0, 0.0, 0.0], [10.0, 10.0, 10.0, 13.0], 11, axis=1).ravel()
-    X, groups = pd.DataFrame({"temperature": heat, "output": 1.0}), np.repeat(list("abcd"), 11)
-    found = _shared_rows(X, groups)
-    np.testing.assert_array_equal(found, np.flatnonzero((heat >= 0.0) & (heat <= 10.0)))
-    assert 0 < len(X) - found.size < 10
-    # Of three groups, and where most rows would go, all stay.
-    assert _shared_rows(X[:33], groups[:33]).size == 33
-    far, other = (np.repeat(places, 11) for places in ([0.0, 1, 2, 3], [1.0, 0, 3, 2]))
-    apart = X.assign(temperature=heat + 100.0 * far, output=other)
-    assert _shared_rows(apart, groups).size == len(X)
+    assert rules_of(fit_model(curved, rate, groups, recipe))[-1].n_rules_ == 1
