@@ -33,18 +33,21 @@ def headline(calibration, unit):
         name: f"{three_digits(RATE_UNITS[unit] * error)} {unit}"
         for name, error in verdict.rms.items()
     }
+    name, hint = verdict.recommended, ""
+    if name == verdict.model:
+        simpler = [each for each in verdict.rms if each not in (NOTHING, verdict.model)]
+        name = min(simpler, key=verdict.rms.get)
+    if "law" in name and not calibration.recipe.physics:
+        hint = " Rules can learn what the law leaves: --physics."
     if verdict.recommended == verdict.model:
-        simpler = [name for name in verdict.rms if name not in (NOTHING, verdict.model)]
-        best = min(simpler, key=verdict.rms.get)
-        gain = verdict.gains[best]
+        gain = verdict.gains[name]
         factor, low, high = map(three_digits, (gain.factor, gain.low, gain.high))
         return "The fuzzy rules are worth it", (
             f"They leave {left[verdict.model]} RMS of {left[NOTHING]} on the held-out rows in "
-            f"range; the best of what is simpler, {ARTICLES[best]}, leaves {left[best]} on the "
+            f"range; the best of what is simpler, {ARTICLES[name]}, leaves {left[name]} on the "
             f"same rows. Over the {groups} that is {factor} times as much in the geometric mean "
-            f"(95 % interval {low} to {high})."
+            f"(95 % interval {low} to {high}).{hint}"
         )
-    name = verdict.recommended
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
@@ -71,7 +74,7 @@ def headline(calibration, unit):
         )
     return title, (
         f"{what} {left[name]} RMS on the held-out rows in range; the fuzzy rules leave "
-        f"{left[verdict.model]} on the same rows. {why}"
+        f"{left[verdict.model]} on the same rows. {why}{hint}"
     )
 
 

@@ -41,6 +41,7 @@ def test_the_planted_truth_is_recommended(truth):
     verdict = calibration.verdict
     assert verdict.recommended == truth, verdict
     title, sentence = headline(calibration, "deg/s")
+    assert sentence.endswith("--physics.") == (truth == "arcsine law")
     if truth == "this model":
         assert title == "The fuzzy rules are worth it"
         return
