@@ -231,6 +231,8 @@ def test_structure_that_is_chosen_by_itself(name):
         *({"n_mfs": 2, "mf": mf} for mf in sorted(MEMBERSHIPS)[::2]),
         *({"partition": KMEANS, "mf": mf} for mf in sorted(MEMBERSHIPS)[1::2]),
         *({"n_mfs": 2, "solver": solver} for solver in sorted(SOLVERS)),
+        # Training starts with rows on the corners of terms.
+        {"n_mfs": 3, "mf": "triangular"},
     ],
     ids=str,
 )
