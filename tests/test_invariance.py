@@ -20,7 +20,8 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_mackey_glass
 from skanfis.learning import SOLVERS, VariableProjection
 from skanfis.membership import MEMBERSHIPS
-from skanfis.search import representative_rows
+from skanfis.search import representative_rows, start
+from skanfis.search.sample import search_sample
 
 from .quick import of_given_stiffness
 
@@ -156,6 +157,20 @@ def test_order_of_the_inputs_of_a_grid(name):
     case.assert_same(case.fit(case.X[:, order], case.y, n_mfs=n_mfs).predict(case.X[:, order]))
 
 
+@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"max_rules": 3}], ids=str)
+def test_order_of_inputs_and_outputs_where_rows_stand_for_many(settings, monkeypatch):
+    # As beyond 1,000 rows, and 20,000: on 40 of 120.
+    monkeypatch.setattr(start, "FEWEST_ROWS", 40)
+    monkeypatch.setattr(representative_rows, "__defaults__", (40,))
+    monkeypatch.setattr(search_sample, "__defaults__", (40,))
+    X, y = gyro()
+    Y = np.column_stack([y, np.roll(y, 1) - 1e-6 * X[:, 2]])
+    model = ANFISRegressor(**settings)
+    plain, other = model.fit(X, Y).predict(X), model.fit(X[:, [2, 0, 1]], Y[:, ::-1])
+    found = other.predict(X[:, [2, 0, 1]])[:, ::-1]
+    assert_allclose(found, plain, rtol=0, atol=TOLERANCE * np.ptp(y))
+
+
 def test_whole_weights_are_repeated_rows_in_any_order(case):
     weight = np.random.default_rng(2).integers(1, 5, len(case.y))
     weighted = case.fit(case.X, case.y, weight)
@@ -231,6 +246,8 @@ def test_structure_that_is_chosen_by_itself(name):
         *({"n_mfs": 2, "mf": mf} for mf in sorted(MEMBERSHIPS)[::2]),
         *({"partition": KMEANS, "mf": mf} for mf in sorted(MEMBERSHIPS)[1::2]),
         *({"n_mfs": 2, "solver": solver} for solver in sorted(SOLVERS)),
+        # Training starts with rows on the corners of terms.
+        {"n_mfs": 3, "mf": "triangular"},
     ],
     ids=str,
 )

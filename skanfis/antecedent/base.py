@@ -21,6 +21,9 @@ import numpy as np
 
 from ..membership import Membership
 
+# To either side of a row on a corner of a term, standardised: far beyond rounding.
+_ASIDE = 1e-8
+
 
 @dataclass(frozen=True, eq=False)
 class TermGroup:
@@ -188,6 +191,13 @@ class Antecedent(ABC):
         """Log mu, and per group its derivatives (n_parameters, n_terms of the group, n_rows)."""
         found = [g.family.log_value_and_gradient(Z[g.inputs], g.theta) for g in self.groups]
         return _stack([value for value, _ in found], Z), [gradient for _, gradient in found]
+
+    def log_memberships_and_mean_gradient(self, Z):
+        """The same, but on a corner the mean of both sides: rounding would choose one of them."""
+        if not any(group.family.has_corners for group in self.groups):
+            return self.log_memberships_and_gradient(Z)
+        sides = [self.log_memberships_and_gradient(Z + aside)[1] for aside in (-_ASIDE, _ASIDE)]
+        return self.log_memberships(Z), [0.5 * (a + b) for a, b in zip(*sides, strict=True)]
 
     def strengths_and_shares(self, Z):
         """Normalised firing strengths w (n_rules, n_rows), and the shares that they factor into."""

@@ -37,6 +37,11 @@ def fingerprint(columns):
     return numbers
 
 
+def place_in_sample(Z, target):
+    """One number per row [z, y] to draw it by, the same wherever its columns stand."""
+    return fingerprint(np.concatenate([np.sort(Z, axis=0), np.sort(target, axis=0)]))
+
+
 @dataclass(frozen=True, eq=False)
 class Scale:
     """z = (x - offset) / scale, per column; the range is that of the rows with weight."""
@@ -147,14 +152,8 @@ class StandardisedData:
     @classmethod
     def of(cls, X, y, sample_weight=None, groups=None):
         """Rows with the scales found from the data; every weight must be positive."""
-        return cls(
-            X,
-            y,
-            sample_weight,
-            column_statistics(X, sample_weight),
-            column_statistics(y, sample_weight),
-            groups,
-        )
+        inputs, targets = (column_statistics(part, sample_weight) for part in (X, y))
+        return cls(X, y, sample_weight, inputs, targets, groups)
 
     def part(self, indices):
         """Some of the rows, on the same scales."""
@@ -176,9 +175,7 @@ class StandardisedData:
     @property
     def total_weight(self):
         """Their sum."""
-        if self.sample_weight is None:
-            return float(self.n_rows)
-        return float(np.sum(self.sample_weight))
+        return float(np.sum(self.weights))
 
     def chunks(self, block_rows):
         """Units of parallel work: lists of slices of at most ``block_rows`` rows."""
@@ -215,12 +212,11 @@ class StandardisedData:
         inputs = (self.X[part] - self.inputs.offset) / self.inputs.scale
         return np.hstack([inputs, (self.y[part] - self.targets.offset) / self.targets.scale])
 
-    def fingerprints(self, of_inputs=False):
-        """One number for every row, the same where rows, or their inputs alone, are equal."""
+    def numbers(self, of_block):
+        """One number for every row, which a function makes of Z and the target of a block."""
         numbers = np.empty(self.n_rows)
         for part in row_blocks(self.n_rows, BLOCK_ROWS):
-            Z, target, _ = self.read(part)
-            numbers[part] = fingerprint(Z if of_inputs else np.concatenate([Z, target]))
+            numbers[part] = of_block(*self.read(part)[:2])
         return numbers
 
     def read(self, part):

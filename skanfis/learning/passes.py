@@ -85,7 +85,7 @@ class SecondPass:
         by_rule = design.by_rule(self.coefficients)
         basis_rows = design.basis(Z)
         weighted_basis = basis_rows if weight is None else basis_rows * weight
-        log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
+        log_mu, gradients = antecedent.log_memberships_and_mean_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
         columns = (strengths[:, None] * weighted_basis).reshape(-1, Z.shape[1])  # Phi' S
         for k in range(len(target)):
@@ -161,7 +161,7 @@ class JointPass:
         design, antecedent, agreement = self.design, self.antecedent, self.agreement
         by_rule = design.by_rule(self.coefficients)
         basis_rows = design.basis(Z)
-        log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
+        log_mu, gradients = antecedent.log_memberships_and_mean_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
         weight = np.ones(Z.shape[1]) if weight is None else weight
         masses += strengths @ weight

@@ -1,12 +1,12 @@
 r"""A sample of many rows that can be drawn anywhere: the same whatever their order and their parts.
 
-Every distinct row [z, y] draws a number from 0 to 1 out of its own fingerprint, and the rows of the
+Every distinct row [z, y] draws a number from 0 to 1 out of its own values, and the rows of the
 smallest numbers are the sample, each with the weight of all its repeats (a bottom-k sketch: Cohen
 and Kaplan 2007). Samples of parts merge into the sample of the whole, exactly: a row that is among
 the k smallest of all is so in every part that has it. No row is drawn twice, and nothing is random:
-the same rows give the same sample, on one machine or on many.
+the same rows give the same sample, on one machine or on many, wherever their columns stand.
 
-The number is the fractional part of a multiple of the fingerprint, which is continuous in the row:
+The number is the fractional part of a multiple of ``place_in_sample``, continuous in the row:
 rounding errors of the standardisation move it by about 1e-11, and with it no row past another.
 """
 
@@ -16,13 +16,13 @@ from functools import partial
 import numpy as np
 
 from ..blocks import BLOCK_ROWS, row_blocks
-from .data import StandardisedData, fingerprint
+from .data import StandardisedData, fingerprint, place_in_sample
 
 # Beyond so many rows the premises are found on a sample of so many of them. At the minimum of a
 # sample of m rows, q parameters cost a part q / m of the error's square: for 18 of them and 20,000
 # rows a thousandth, before all rows have their say.
 MANY_ROWS, SAMPLE_ROWS = 100_000, 20_000
-# So many turns of the wheel per unit of the fingerprint; times a power of two nothing is rounded.
+# So many turns of the wheel per unit of the place; times a power of two nothing is rounded.
 _TURNS = 8192.0
 # More are drawn than are wanted, so that enough come: the standard deviation is below one percent.
 _MARGIN = 1.25
@@ -57,8 +57,7 @@ def _draw(rows, most, limit):
         found.append(_of_block(rows, part, limit))
         n_found += len(found[-1][0])
         if n_found > 2 * most:
-            found = [_smallest(*found, most=most)]
-            n_found = len(found[0][0])
+            found, n_found = [_smallest(*found, most=most)], most
     return _smallest(*found, most=most)
 
 
@@ -78,7 +77,7 @@ def _smallest(*parts, most):
 def _of_block(rows, part, limit):
     Z, target, weight = rows.read(part)
     prints = fingerprint(np.concatenate([Z, target]))
-    numbers = (_TURNS * prints) % 1.0
+    numbers = (_TURNS * place_in_sample(Z, target)) % 1.0
     kept = np.flatnonzero(numbers < limit)
     return [
         np.asarray(rows.X[part], dtype=float)[kept],

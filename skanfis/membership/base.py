@@ -49,6 +49,8 @@ class Membership(ABC):
     parameters: ClassVar[tuple[Parameter, ...]]
     # mu(x) in the parameters' names, as texts print it; not printed where it is empty.
     formula: ClassVar[str] = ""
+    # Whether its slope jumps anywhere.
+    has_corners: ClassVar[bool] = False
 
     @staticmethod
     @abstractmethod

@@ -101,6 +101,7 @@ class Triangular(_TwoSided):
     name = "triangular"
     parameters = _TwoSided.parameters[:3]
     profile = LinearProfile
+    has_corners = True
     formula = LinearProfile.formula + _TO_POINT
 
 
@@ -109,6 +110,7 @@ class Trapezoidal(_TwoSided):
 
     name = "trapezoidal"
     profile = LinearProfile
+    has_corners = True
     formula = LinearProfile.formula + _TO_PLATEAU
 
 

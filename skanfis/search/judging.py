@@ -24,9 +24,9 @@ def dealt_rows(rows: StandardisedData) -> StandardisedData:
     """Distinct rows in an order that is random and depends on their values alone."""
     sample = search_sample(rows)
     # What is constant, and in which column a value stands, are no part of it.
-    values = np.sort(sample.X[:, ~rows.inputs.is_constant], axis=1)
-    columns = np.round(np.hstack([values[:, ::-1], sample.y[:, ::-1]]), DIGITS)
-    order = np.lexsort(columns.T)
+    parts = sample.X[:, ~rows.inputs.is_constant], sample.y
+    values = np.hstack([np.sort(part, axis=1)[:, ::-1] for part in parts])
+    order = np.lexsort(np.round(values, DIGITS).T)
     return sample.part(order[np.random.default_rng(0).permutation(order.size)])
 
 

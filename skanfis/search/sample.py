@@ -8,8 +8,7 @@ apart: calibration tables repeat their inputs, and each repeat is information on
 
 import numpy as np
 
-from ..blocks import BLOCK_ROWS, row_blocks
-from ..learning.data import Scale, StandardisedData, fingerprint
+from ..learning.data import Scale, StandardisedData, fingerprint, place_in_sample
 from ..learning.sampling import SAMPLE_ROWS
 
 # Of standardised rows, digits that rounding leaves alone where units change.
@@ -18,41 +17,33 @@ DIGITS = 9
 
 def n_distinct_inputs(rows: StandardisedData, enough: int) -> int:
     """How many different inputs the rows have, counted up to ``enough``."""
-    inputs = np.empty(0)
-    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
-        inputs = np.union1d(inputs, fingerprint(rows.read(part)[0]))
-        if inputs.size >= enough:
-            return enough
-    return inputs.size
+    return min(np.unique(rows.numbers(lambda Z, _: fingerprint(Z))).size, enough)
 
 
 def effective_weight(rows: StandardisedData):
     """Rows by weight: their sum, or as many as their spread leaves, whichever are more."""
     if not isinstance(rows, StandardisedData):
         return rows.total_weight  # on a cluster, where no squares are summed
-    if rows.sample_weight is None:
-        return float(rows.n_rows)
     # By the largest: squares of tiny weights would vanish.
-    largest = float(np.max(rows.sample_weight))
-    share = rows.sample_weight / largest
+    largest = float(np.max(rows.weights))
+    share = rows.weights / largest
     return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
 
 
 def counting_weight(rows: StandardisedData):
     """The weights of a search sample in rows, of which the sum is :func:`effective_weight`."""
-    weight = rows.sample_weight
-    assert weight is not None
-    return weight * (effective_weight(rows) / weight.sum())
+    return rows.weights * (effective_weight(rows) / rows.total_weight)
 
 
 def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
     """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
 
-    Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
-    Neither the order of the rows nor whether one is repeated or weighted makes any difference.
+    Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by ``place_in_sample``.
+    Neither the order of the rows, nor that of the columns, nor whether a row is repeated or
+    weighted makes any difference.
     """
-    numbers = rows.fingerprints()
-    order = np.argsort(numbers, kind="stable")
+    numbers = rows.numbers(lambda *block: fingerprint(np.concatenate(block)))
+    order = np.lexsort([numbers, rows.numbers(place_in_sample)])
     first = np.flatnonzero(np.diff(numbers[order], prepend=-np.inf))
     distinct, weight = order[first], np.add.reduceat(rows.weights[order], first)
     if distinct.size > most:

@@ -9,7 +9,7 @@ from sklearn.model_selection import GroupShuffleSplit
 
 from ..blocks import BLOCK_ROWS, row_blocks
 from ..consequent import basis, rule_outputs
-from ..learning.data import StandardisedData
+from ..learning.data import StandardisedData, place_in_sample
 from ..options import EarlyStopping
 
 
@@ -92,7 +92,7 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
     what = f"{rows.n_rows} rows"
     groups = rows.groups
     if groups is None:
-        groups = rows.fingerprints(of_inputs=True)
+        groups = rows.numbers(lambda Z, _: place_in_sample(Z, Z[:0]))
     else:
         what += f" in {np.unique(groups).size} groups"
     splitter = GroupShuffleSplit(1, test_size=validation_fraction, random_state=seed)

@@ -21,11 +21,12 @@ class TestDealtRows:
     def test_their_order_is_of_what_the_rows_say(self, rng):
         """In other units and another order, with columns in another order and a constant one."""
         X, y = measured(rng)
+        y = np.hstack([y, X[:, :1] ** 2])
         plain = dealt(X, y)
         other = np.insert(1e3 * X[::-1, [2, 0, 1]] + 7.0, 0, 4.0, axis=1)
-        found = dealt(other, 1e-6 * y[::-1] - 5.0)
+        found = dealt(other, 1e-6 * y[::-1, ::-1] - 5.0)
         assert_allclose(found.X[:, [2, 3, 1]], plain.X, atol=1e-9)
-        assert_allclose(found.y, plain.y, atol=1e-9)
+        assert_allclose(found.y[:, ::-1], plain.y, atol=1e-9)
 
     def test_weights_are_repeats(self, rng):
         X, y = measured(rng)

@@ -185,7 +185,7 @@ def test_best_parameters_are_restored(weighted_and_two):
     if weighted_and_two:
         y = np.column_stack([y, X[:, 1]])
         weight = np.random.default_rng(1).uniform(0.5, 2.0, 150)
-    model = ANFISRegressor(n_mfs=6, **LOOSE).fit(X, y, sample_weight=weight)
+    model = ANFISRegressor(n_mfs=5, **LOOSE).fit(X, y, sample_weight=weight)
     weight = np.ones(150) if weight is None else weight
     seed = int(np.random.default_rng(0).integers(2**31 - 1))
     kept, held = hold_out(StandardisedData.of(X, y, weight), 0.1, seed)
