@@ -65,8 +65,9 @@ def checked_targets(caller, y, sample_weight, groups):
     if sample_weight is not None:
         sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
         positive_weights(sample_weight, len(targets))
-    numbers = None if groups is None else group_numbers(groups)
-    if numbers is not None and numbers.max() == 0:
+    numbers = None if groups is None else group_numbers(groups, len(targets))
+    has_weight = slice(None) if sample_weight is None else sample_weight > 0.0
+    if numbers is not None and np.ptp(numbers[has_weight]) == 0:
         raise ValueError("groups has a single group; at least 2 are needed to hold one out.")
     return targets, sample_weight, numbers
 

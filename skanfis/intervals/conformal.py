@@ -146,7 +146,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             If the data are not finite, ``cv`` does not hold out every row once and groups as a
             whole, there is one group, or groups with "loo"; if the regressor has no deviation.
         """
-        X, y, sample_weight, groups = indexable(X, y, sample_weight, groups)
+        X, y, sample_weight = indexable(X, y, sample_weight)
         targets, weight, numbers = _scores.checked_targets(
             type(self).__name__, y, sample_weight, groups
         )
@@ -154,7 +154,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             raise ValueError("method='loo' leaves out rows, not groups: use 'folds' or 'split'.")
         regressor = self._regressor()
         data = _scores.TrainingSet(
-            X, y, targets, _scores.fit_params(self, regressor, sample_weight, groups)
+            X, y, targets, _scores.fit_params(self, regressor, sample_weight, numbers)
         )
         least = _scores.least_deviations(targets) if self.scaled else None
         held_out, estimators = np.arange(len(targets)), []

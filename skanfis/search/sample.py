@@ -50,10 +50,12 @@ def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
 
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
     Neither the order of the rows nor whether one is repeated or weighted makes any difference.
+    What two groups have in common is a row of each.
     """
-    numbers = rows.fingerprints()
-    order = np.argsort(numbers, kind="stable")
-    first = np.flatnonzero(np.diff(numbers[order], prepend=-np.inf))
+    groups = np.zeros(rows.n_rows) if rows.groups is None else rows.groups
+    keys = np.stack([groups, rows.fingerprints()])
+    order = np.lexsort(keys)
+    first = np.flatnonzero(np.diff(keys[:, order], prepend=-np.inf).any(axis=0))
     distinct, weight = order[first], np.add.reduceat(rows.weights[order], first)
     if distinct.size > most:
         upto = np.cumsum(weight)
