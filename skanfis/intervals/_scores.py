@@ -52,10 +52,10 @@ class TrainingSet:
         return clone(regressor).fit(X, y, **params)
 
 
-def checked_targets(caller, y, sample_weight, groups):
+def checked_targets(y, sample_weight, groups):
     """Targets as an array, positive weights or None, numbers of groups or None."""
     if y is None:
-        raise ValueError(f"{caller} requires y to be passed, but the target y is None.")
+        raise ValueError("ConformalRegressor requires y to be passed, but the target y is None.")
     with named_refusals(y=y):
         targets = check_array(
             y, ensure_2d=False, dtype=np.float64, ensure_all_finite=False, input_name="y"

@@ -46,11 +46,10 @@ def counting_weight(rows: StandardisedData):
 
 
 def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
-    """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
+    """Distinct rows [z, y] of each group, standardised, their weights and places; in lexical order.
 
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by their fingerprints.
     Neither the order of the rows nor whether one is repeated or weighted makes any difference.
-    What two groups have in common is a row of each.
     """
     groups = np.zeros(rows.n_rows) if rows.groups is None else rows.groups
     keys = np.stack([groups, rows.fingerprints()])
@@ -96,5 +95,4 @@ def search_sample(rows: StandardisedData, most=SAMPLE_ROWS):
     table, weight, indices = representative_rows(rows, most)
     n_inputs = rows.X.shape[1]
     X, y = table[:, :n_inputs], table[:, n_inputs:]
-    groups = None if rows.groups is None else rows.groups[indices]
-    return StandardisedData(X, y, weight, unit_scale(X), unit_scale(y), groups)
+    return StandardisedData(X, y, weight, unit_scale(X), unit_scale(y), rows.part(indices).groups)
