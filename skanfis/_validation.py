@@ -150,7 +150,7 @@ def _columns(table):
     return [(f"x{j}", array[:, j]) for j in range(array.shape[1])] if array.ndim == 2 else []
 
 
-def group_numbers(groups, n_rows=None):
+def group_numbers(groups, n_rows):
     """The groups of rows as numbers; ValueError where one is missing, or they are of two kinds."""
     groups = np.asarray(groups, dtype=object) if isinstance(groups, list) else np.asarray(groups)
     if groups.ndim == 2 and groups.shape[1] == 1:
@@ -160,7 +160,7 @@ def group_numbers(groups, n_rows=None):
             f"groups must have one entry per row; it has {groups.ndim} dimensions, of shape "
             f"{groups.shape}. Make one label of several, such as 'device 1, run 2'."
         )
-    if n_rows is not None and len(groups) != n_rows:
+    if len(groups) != n_rows:
         raise ValueError(
             f"groups has {len(groups)} entries for {n_rows} rows of X: give every row its label."
         )

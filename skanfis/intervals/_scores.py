@@ -52,10 +52,10 @@ class TrainingSet:
         return clone(regressor).fit(X, y, **params)
 
 
-def checked_targets(caller, y, sample_weight, groups):
+def checked_targets(y, sample_weight, groups):
     """Targets as an array, positive weights or None, numbers of groups or None."""
     if y is None:
-        raise ValueError(f"{caller} requires y to be passed, but the target y is None.")
+        raise ValueError("ConformalRegressor requires y to be passed, but the target y is None.")
     with named_refusals(y=y):
         targets = check_array(
             y, ensure_2d=False, dtype=np.float64, ensure_all_finite=False, input_name="y"
@@ -65,8 +65,9 @@ def checked_targets(caller, y, sample_weight, groups):
     if sample_weight is not None:
         sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
         positive_weights(sample_weight, len(targets))
-    numbers = None if groups is None else group_numbers(groups)
-    if numbers is not None and numbers.max() == 0:
+    numbers = None if groups is None else group_numbers(groups, len(targets))
+    has_weight = slice(None) if sample_weight is None else sample_weight > 0.0
+    if numbers is not None and np.ptp(numbers[has_weight]) == 0:
         raise ValueError("groups has a single group; at least 2 are needed to hold one out.")
     return targets, sample_weight, numbers
 

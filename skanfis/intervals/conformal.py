@@ -138,24 +138,21 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             Zero or positive: those of the regressor's ``fit``, and of the scores.
         groups : array-like of shape (n_samples,), default=None
             Run, device or day of each row: whole groups are held out, and intervals are for rows of
-            a new group. Passed to the regressor's ``fit`` if that takes groups.
+            a new group. Passed, as numbers, to the regressor's ``fit`` if that takes groups.
 
         Raises
         ------
         ValueError
             If the data are not finite, ``cv`` does not hold out every row once and groups as a
-            whole, there is one group, or groups with "loo"; if the regressor has no deviation.
+            whole, one group alone has weight, or "loo" has groups; if there is no deviation.
         """
-        X, y, sample_weight, groups = indexable(X, y, sample_weight, groups)
-        targets, weight, numbers = _scores.checked_targets(
-            type(self).__name__, y, sample_weight, groups
-        )
+        X, y, sample_weight = indexable(X, y, sample_weight)
+        targets, weight, numbers = _scores.checked_targets(y, sample_weight, groups)
         if numbers is not None and self.method == "loo":
             raise ValueError("method='loo' leaves out rows, not groups: use 'folds' or 'split'.")
         regressor = self._regressor()
-        data = _scores.TrainingSet(
-            X, y, targets, _scores.fit_params(self, regressor, sample_weight, groups)
-        )
+        params = _scores.fit_params(self, regressor, sample_weight, numbers)
+        data = _scores.TrainingSet(X, y, targets, params)
         least = _scores.least_deviations(targets) if self.scaled else None
         held_out, estimators = np.arange(len(targets)), []
         seed = 0 if self.random_state is None else self.random_state

@@ -15,6 +15,7 @@ from functools import partial
 
 import numpy as np
 
+from .._validation import group_numbers
 from ..blocks import BLOCK_ROWS, row_blocks
 from .data import StandardisedData, fingerprint, place_in_sample
 
@@ -41,8 +42,9 @@ def with_sample(rows, most=None):
         drawn = rows.reduce(partial(_draw, most=most, limit=limit), partial(_smallest, most=most))
         if len(drawn[0]) == most:
             break
-    X, y, weight, _, _, *groups = drawn
+    X, y, weight, _, _, *labels = drawn
     weight = None if (weight == 1.0).all() else weight
+    groups = [group_numbers(own, len(X)) for own in labels]
     sample = StandardisedData(X, y, weight, rows.inputs, rows.targets, *groups)
     return replace(rows, sample=sample)
 

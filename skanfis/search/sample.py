@@ -42,15 +42,17 @@ def counting_weight(rows: StandardisedData):
 
 
 def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
-    """Distinct rows of [z, y], standardised, their weights, and where they are; in lexical order.
+    """Distinct rows [z, y] of each group, standardised, their weights and places; in lexical order.
 
     Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by ``place_in_sample``.
     Neither the order of the rows, nor that of the columns, nor whether a row is repeated or
     weighted makes any difference.
     """
+    groups = np.zeros(rows.n_rows) if rows.groups is None else rows.groups
     numbers = rows.numbers(lambda *block: fingerprint(np.concatenate(block)))
-    order = np.lexsort([numbers, rows.numbers(place_in_sample)])
-    first = np.flatnonzero(np.diff(numbers[order], prepend=-np.inf))
+    keys = np.stack([groups, numbers, rows.numbers(place_in_sample)])
+    order = np.lexsort(keys)
+    first = np.flatnonzero(np.diff(keys[:2, order], prepend=-np.inf).any(axis=0))
     distinct, weight = order[first], np.add.reduceat(rows.weights[order], first)
     if distinct.size > most:
         upto = np.cumsum(weight)
@@ -91,5 +93,4 @@ def search_sample(rows: StandardisedData, most=SAMPLE_ROWS):
     table, weight, indices = representative_rows(rows, most)
     n_inputs = rows.X.shape[1]
     X, y = table[:, :n_inputs], table[:, n_inputs:]
-    groups = None if rows.groups is None else rows.groups[indices]
-    return StandardisedData(X, y, weight, unit_scale(X), unit_scale(y), groups)
+    return StandardisedData(X, y, weight, unit_scale(X), unit_scale(y), rows.part(indices).groups)

@@ -104,8 +104,8 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
         raise ValueError(
             f"early_stopping with validation_fraction={validation_fraction} leaves "
             f"{training.size} rows to train on and {validation.size} to hold out, of {what}: "
-            "at least 2 of each are needed. Use EarlyStopping(validation_fraction=...), or "
-            "early_stopping=False."
+            "at least 2 of each are needed. Use EarlyStopping(validation_fraction=...), more rows "
+            "or groups, or early_stopping=False."
         )
     return training, validation
 

@@ -82,7 +82,8 @@ def test_search_by_groups_with_weights_is_that_of_one_process(few_are_many, monk
     monkeypatch.setattr(sampling, "SAMPLE_ROWS", 150)
     X, y = data(2 * N_ROWS)
     g = np.random.default_rng(1)
-    weight, groups = g.integers(0, 3, len(y)).astype(float), g.integers(0, 3, len(y))
+    weight = g.integers(0, 3, len(y)).astype(float)
+    groups = np.array(["cold", "hot", "room"])[g.integers(0, 3, len(y))]
     whole = (X[:, :1], np.column_stack([y, X[:, 0] ** 2]), weight, groups)
     single = ANFISRegressor(partition="grid").fit(*whole)
     found = DaskANFISRegressor(partition="grid").fit(*cut(2345, *whole))

@@ -3,6 +3,7 @@
 import warnings
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn import config_context
@@ -219,7 +220,7 @@ def test_groups_and_weights_reach_a_regressor_in_a_pipeline(rng):
         rules = quick(**SHORT).set_fit_request(sample_weight=True, groups=True)
         scaler = StandardScaler().set_fit_request(sample_weight=True)
         model = ConformalRegressor(make_pipeline(scaler, rules), cv=5)
-        model.fit(X, y, sample_weight=weight, groups=run)
+        model.fit(X, y, sample_weight=weight, groups=pd.array(run, dtype=str))
     folds = list(GroupKFold(5).split(X, y, run))
     for estimator, (train, _) in zip(model.estimators_, folds, strict=True):
         alone = StandardScaler().fit(X[train], sample_weight=weight[train])
@@ -241,6 +242,12 @@ class NeverFitted(BayesianRidge):
         ("needs 9 rows held out or more; there are 6, enough for", {"method": "split"}, {}),
         ("needs 9 groups or more; there are 8", {}, {"groups": np.arange(24) // 3}),
         ("single group", {}, {"groups": np.zeros(24)}),
+        (
+            "single group",
+            {},
+            {"groups": np.arange(24) // 12, "sample_weight": np.repeat([0, 1], 12)},
+        ),
+        ("groups has 23 entries for 24 rows", {}, {"groups": np.zeros(23)}),
         ("leaves out rows, not groups", {"method": "loo"}, {"groups": np.arange(24)}),
         ("nothing of its noise.* another", {"method": "loo", "estimator": BayesianRidge()}, {}),
         ("not have: use scaled=False", {"estimator": LinearRegression()}, {}),

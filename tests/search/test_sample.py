@@ -94,3 +94,9 @@ class TestCounts:
         sample = search_sample(rows, 60)
         assert sample.n_rows == 60
         assert_array_equal(np.hstack([sample.X, sample.y]), rows.table(sample.groups))
+        # What two runs have in common is a row of each, whichever comes first.
+        run = np.repeat([0, 1], 250)
+        every = np.column_stack([np.tile(X[:250], (2, 1)), np.tile(y[:250], (2, 1)), run])
+        for one in (every, every[::-1]):
+            found = search_sample(StandardisedData.of(one[:, :2], one[:, 2:3], groups=one[:, 3]))
+            assert_array_equal(found.groups, np.tile([0, 1], 250))
