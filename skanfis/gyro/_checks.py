@@ -200,7 +200,7 @@ def check_at_rest(log, unit):
                 f"spans {low:.4g} to {high:.4g} deg/s: no bias does, the gyro was not at rest.",
                 "output",
             )
-    runs = log["run"] if "run" in log else np.zeros(len(log))
+    runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log))
     steps = log["output"].groupby(runs).diff().dropna().abs().to_numpy()
     if not steps.any():
         return
