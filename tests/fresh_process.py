@@ -19,7 +19,11 @@ import numpy as np
 
 def in_a_fresh_process(folder):
     """Run this file in a process of its own."""
-    environment = os.environ | {"MPLBACKEND": "nonsense"}
+    import skanfis
+
+    # The package under test, whichever is installed.
+    package = str(Path(skanfis.__file__).parents[1])
+    environment = os.environ | {"MPLBACKEND": "nonsense", "PYTHONPATH": package}
     done = subprocess.run(
         [sys.executable, __file__, str(folder)],
         env=environment,
