@@ -65,7 +65,7 @@ new = run.isin(by_temperature[1:-1:3])
 anfis = ANFISRegressor(simplicity=0).fit(X[~new], error[~new], groups=run[~new])
 readable = ANFISRegressor(n_mfs=[1, 2, 5], agreement=1e-3).fit(X[~new], error[~new])
 (chosen,) = [one for one in anfis.structures_ if one["chosen"]]
-print(f"{chosen['structure']}: {anfis.n_rules_} rules")
+print(f"{chosen['structure']}; to be read: {readable.n_rules_} rules")
 
 # %%
 # What it is worth

@@ -6,10 +6,13 @@ A standard deviation that comes with the fit, intervals that are measured on row
 runs have to be held out whole. :doc:`/how_sure` says what each of them promises, and what not.
 """
 
+import warnings
+
 import matplotlib.pyplot as plt
 import numpy as np
 
 from skanfis import ANFISRegressor
+from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.intervals import ConformalRegressor
 
 # %%
@@ -37,8 +40,9 @@ rules = ANFISRegressor(n_mfs=6)
 model = rules.fit(x[:, None], y)
 sure = ConformalRegressor(rules).fit(x[:, None], y)
 line = np.linspace(-1.5, 10.5, 481)
-mean, std = model.predict(line[:, None], return_std=True)
-lower, upper = sure.predict_interval(line[:, None], coverage=0.9)
+with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
+    mean, std = model.predict(line[:, None], return_std=True)
+    lower, upper = sure.predict_interval(line[:, None], coverage=0.9)
 
 figure, panel = plt.subplots(figsize=(7, 4), layout="constrained")
 panel.fill_between(line, lower, upper, color="tab:blue", alpha=0.15, label="90 % interval")
@@ -72,7 +76,8 @@ rules = ANFISRegressor(n_mfs=[6, 2])
 coverages = {}
 for label, groups in (("by row", None), ("by run", run[known])):
     sure = ConformalRegressor(rules, cv=12).fit(X[known], error[known], groups=groups)
-    lower, upper = sure.predict_interval(X[~known], coverage=0.9)
+    with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
+        lower, upper = sure.predict_interval(X[~known], coverage=0.9)
     inside = (lower <= error[~known]) & (error[~known] <= upper)
     coverages[label] = [inside[run[~known] == r].mean() for r in range(12, 60)]
 

@@ -121,7 +121,8 @@ ResponseSurfaceDisplay.from_estimator(model, X.iloc[::5])
 rates = np.linspace(X["rate"].min(), X["rate"].max(), 201)
 told = explain(model, pd.DataFrame({"temperature": 40.0, "rate": rates}))
 parts = told.pivot(index="row", columns="rule", values="contribution").set_index(rates)
-parts.plot(xlabel="rate [°/s]", ylabel="contribution [°/s]")
+axes = parts.plot(xlabel="rate [°/s]", ylabel="contribution [°/s]")
+axes.legend(loc="lower left", ncols=2, title="rule")
 
 # %%
 # Training

@@ -106,7 +106,7 @@ print(model[-1].readability_)
 # The rules
 # ---------
 #
-# In the names and units of the table: the encoder is folded in, ``maker_Bohm`` is 1 or 0.
+# In the names and units of the table: the encoder is folded in.
 
 print(export_text(model, max_shown=4, show_terms=False))
 

@@ -73,8 +73,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     simplicity : float, default=0.05
         Part of the error, from 0 to 1, that is given up for a model that is read sooner; of weak
         signals at most ``(1 + simplicity)**2 - 1`` of the variance explained. Of candidates within,
-        the one of the smallest reading cost is taken; what is left goes into ``agreement``, of
-        given rules too. 0: the best. R2 alone always picks 0 in GridSearchCV (:doc:`/choosing`).
+        the one of the smallest reading cost is taken; half of what is left goes into ``agreement``.
+        Given rules lose slopes, and agree, by the same. 0: the best. R2 alone always picks 0 in
+        GridSearchCV (:doc:`/choosing`).
     max_rules : int, default=None
         Most rules that the search may take. ValueError where given rules are more.
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"

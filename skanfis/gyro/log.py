@@ -49,8 +49,8 @@ def read_log(
     Parameters
     ----------
     paths : str, path, or sequence of these
-        Text files with a header line, or Parquet files (with pyarrow). Encoding, separator and
-        decimal sign of a text are found out.
+        Text files with a header line, whose encoding, separator and decimal sign are found out;
+        or files of MATLAB, Excel or Parquet (:doc:`/gyro_command`).
     columns : dict of str to str, default=None
         Names in the file by part ("time", "temperature", "output", "rate", "run", "device"), where
         they differ from it; blanks around names, and capitals, do not matter.
