@@ -57,6 +57,7 @@ class Plan:
     weights: dict[str, Any]  # of the penalty, those that are given, of ``evidence.FREE``
     seed: int  # of clusterings that have none of their own
     max_rules: int | None
+    premises_move: bool  # whether what is trained afterwards moves them
     held: Held | None = None
     n_all: float = np.nan  # rows by weight that the final model will be trained on
 
@@ -210,6 +211,8 @@ class Trials:
 
     def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE, begun=None):
         free, weight = self.plan.free, effective_weight(problem.rows)
+        if turns and not self.plan.premises_move:
+            turns, first_steps = 0, ARRIVING
         premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
         return tune(problem, premise, free, weight, turns, first_steps, begun)
 
