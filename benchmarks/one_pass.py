@@ -32,7 +32,7 @@ def make_problem():
     y *= X[:, 1:2]
     rows = StandardisedData.of(X, y)
     antecedent = grid_antecedent([Gaussian] * 3, [3, 3, 3], Spacing(rows))
-    return SeparableProblem(rows, antecedent, order=1, penalty=Penalty(alpha=1e-12, slope=1e-12))
+    return SeparableProblem(rows, antecedent, Penalty(alpha=1e-12, slope=1e-12))
 
 
 def bare_products(problem):

@@ -95,7 +95,8 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, 
     else:
         thetas = [Gaussian.start(np.linspace(-1, 1, m), np.full(m, 1.0), 0.5) for m in (3, 2)]
         antecedent = GridAntecedent.build([Gaussian] * 2, [0, 1], thetas)
-    problem = SeparableProblem(rows, antecedent, order, PENALTY, consequent_inputs=inputs)
+    used = np.arange(2 * order) if inputs is None else inputs
+    problem = SeparableProblem(rows, antecedent, PENALTY, consequent_inputs=used)
     premise = Premise.of(antecedent, *rows.inputs.box)
     moved = np.clip(0.1 * rng.normal(size=premise.size), premise.lower, premise.upper)
     evaluation = problem.evaluate(premise.parameters(moved))
@@ -246,7 +247,7 @@ def test_noise_of_hubers_loss_is_his_second_proposal(monkeypatch, block_bytes):
     left = g.uniform(0.2, 1.0, 250)
     rows = replace(given, sample_weight=given.sample_weight * left)
     antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
-    problem = SeparableProblem(rows, antecedent, 1, PENALTY)
+    problem = SeparableProblem(rows, antecedent, PENALTY)
     evaluation = problem.evaluate(antecedent.parameters)
     dense = oracles.DenseProblem(rows, antecedent, 1, PENALTY)
     r = dense.y - dense.design(antecedent.parameters) @ evaluation.coefficients

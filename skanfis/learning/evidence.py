@@ -94,7 +94,7 @@ class Laplace:
         These and ``trace_after`` take as long as all the rest, and are seldom asked of the last of
         several posteriors.
         """
-        return self._held(self.prior, float(self.curvature.size))
+        return self._traces(self.prior, float(self.curvature.size))
 
     @cached_property
     def trace_after(self):
@@ -102,9 +102,9 @@ class Laplace:
         stiffness = self.penalty.stiffness
         # Without stiffness nothing is held, not even where there is no curvature either.
         held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
-        return self._held(self.factor, held)
+        return self._traces(self.factor, held)
 
-    def _held(self, factor, by_stiffness):
+    def _traces(self, factor, by_stiffness):
         found = self.line.weights(self.penalty)
         found[_AGREEMENT] *= factor.trace(self.disagreement)
         found[_OTHERS] *= self.line.traces(factor)
@@ -210,10 +210,10 @@ def least_weights(posterior: Laplace, n_distinct):
     """
     least = _LEAST if n_distinct < ROWS_EACH * posterior.n_columns else 0.0
     if posterior.line.n_rules == 1:
-        return Penalty(least, least, least)
+        return Penalty(agreement=least, alpha=least, slope=least)
     noise = posterior.noise_variance / posterior.n_rows
     agreement = max(least, posterior.n_columns * noise / _FAR**2)
-    return Penalty(agreement, max(least, noise / _FAR**2), least)
+    return Penalty(agreement=agreement, alpha=max(least, noise / _FAR**2), slope=least)
 
 
 def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):

@@ -30,17 +30,17 @@ def dealt_rows(rows: StandardisedData) -> StandardisedData:
     return sample.part(order[np.random.default_rng(0).permutation(order.size)])
 
 
-def has_groups(rows: StandardisedData):
-    """Whether the rows are of several groups: a single one says nothing."""
-    return rows.groups is not None and np.unique(rows.groups).size > 1
+def n_groups(rows: StandardisedData) -> int:
+    """Number of groups; one where none are given, for a single group says as little."""
+    return 1 if rows.groups is None else np.unique(rows.groups).size
 
 
 def folds(rows: StandardisedData):
     """Positions of the other rows and of its own, of every fold; whole groups, if there are any."""
-    every, n_folds = np.arange(rows.n_rows), min(FOLDS, rows.n_rows)
-    if has_groups(rows):
-        n_folds = min(FOLDS, np.unique(rows.groups).size)
+    if n_groups(rows) > 1:
+        n_folds = min(FOLDS, n_groups(rows))
         return list(GroupKFold(n_folds).split(rows.X, groups=rows.groups))
+    every, n_folds = np.arange(rows.n_rows), min(FOLDS, rows.n_rows)
     return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
 
 
@@ -50,7 +50,7 @@ def judging_folds(rows: StandardisedData):
     if n_rows == 1:
         return [(every, every)]
     found = folds(rows)
-    if not has_groups(rows):
+    if n_groups(rows) == 1:
         if n_rows >= FOLDS * _ENOUGH:
             found = [(every[1::2], every[::2])]
         found = found[: int(np.ceil(len(found) * _ENOUGH / n_rows))]

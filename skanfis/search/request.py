@@ -59,7 +59,7 @@ class StructureRequest(Plan):
             return (self.partition,)
         left_out = ["tree"] if any(family is not Gaussian for family in self.families) else []
         if self.held is not None:
-            # An order of scattered rules all over the range binds hard.
+            # Scattered rules fire all over the range: to be in order everywhere binds them hard.
             left_out.append("scattered")
         return [kind for kind in KINDS if kind not in left_out]
 

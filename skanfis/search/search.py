@@ -15,7 +15,7 @@ from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_EACH
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
-from .judging import dealt_rows, has_groups, judging_folds
+from .judging import dealt_rows, judging_folds, n_groups
 from .start import Start, started
 from .trials import Plan, Trials
 from .tuning import cost_of
@@ -39,7 +39,7 @@ class StructureSearch:
         self.folds = [Trials(sample.part(grow), plan, is_wide) for grow, _ in found]
         self.rest = [sample.part(judge) for _, judge in found]
         # Half of many rows is enough to grow on; one group, where the others judge, is not.
-        is_half = len(found) == 1 and not has_groups(sample)
+        is_half = len(found) == 1 and n_groups(sample) == 1
         self.trials = self.folds[0] if is_half else Trials(sample, plan, is_wide)
         self.judges = Judges.of(self.rest)
         self.judged: list[Judged] = []

@@ -82,7 +82,7 @@ def started(tuned: Tuned, plan: Plan, room: float, candidates, is_unbounded=Fals
 def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simplicity) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows."""
     sample, free, inputs = search_sample(rows, FEWEST_ROWS), plan.free, plan.consequent_inputs
-    problem = SeparableProblem(sample, antecedent, plan.order, plan.first, consequent_inputs=inputs)
+    problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box
     premise, is_unbounded = Premise.of(antecedent, low, high), False
     turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)

@@ -69,7 +69,7 @@ class Tuned:
 
     @cached_property
     def solved(self):
-        """The evaluation at the weights found, where those it was made at are others."""
+        """The evaluation, solved again at the weights found."""
         return self.problem.solved_again(self.evaluation)
 
     @property

@@ -38,7 +38,7 @@ def planted(rng, n_rows=600, noise=0.1):
 
 def posterior_of(X, y, antecedent=TREE, penalty=PENALTY):
     rows = StandardisedData.of(X, y.reshape(len(X), -1))
-    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    problem = SeparableProblem(rows, antecedent, penalty)
     evaluation = problem.evaluate(antecedent.parameters)
     return problem, evaluation, laplace_at(problem, evaluation, penalty)
 

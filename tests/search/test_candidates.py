@@ -25,7 +25,7 @@ def sample_of(X, y, weight=None):
 
 def solved(rows, antecedent):
     """Rules with their consequents, before their premises move."""
-    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     premise = Premise.of(antecedent, *rows.inputs.box)
     return tuning.tune(problem, premise, ["slope"], rows.sample_weight.sum(), turns=0)
 

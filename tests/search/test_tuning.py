@@ -19,7 +19,7 @@ def problem_of(X, y, count):
     """A problem with so many terms on every input, and its premise."""
     rows, n_inputs = StandardisedData.of(X, y), X.shape[1]
     antecedent = grid_antecedent(n_inputs * [Gaussian], n_inputs * [count], Spacing(rows))
-    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     return problem, Premise.of(antecedent, *rows.inputs.box)
 
 
