@@ -223,7 +223,8 @@ class _Fit:
         marginals = input_marginals(rows, run.evaluation.antecedent)
         support = replace(model.support, marginals=marginals)
         model = replace(model, posterior=posterior, support=support)
-        distance = extrapolation_distance(model, rows)
+        told = rows if weights is None else reweighted(rows, weights)
+        distance = extrapolation_distance(model, told)
         model = self._answering(replace(model, rows_extrapolation=distance))
         if weights is not None:
             every = np.full(len(self.data.X), np.nan)
