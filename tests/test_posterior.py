@@ -47,7 +47,11 @@ def dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=0):
     The joint precision is J' J of every residual that the cost is made of, by complex steps, and
     inverted whole; the noise is what the residual leaves after the trace of the smoother.
     """
-    antecedent, order, inputs = problem.antecedent, problem.order, problem.consequent_inputs
+    antecedent, order, inputs = (
+        problem.antecedent,
+        int(problem.n_basis > 1),
+        problem.consequent_inputs,
+    )
     dense = oracles.DenseProblem(problem.rows, antecedent, order, PENALTY, inputs)
     theta, beta = evaluation.antecedent.parameters, evaluation.coefficients[:, 0]
     n, p = problem.rows.n_rows, beta.size
@@ -117,7 +121,7 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, 
 
 def model_of(problem, evaluation, posterior):
     """A model in raw units, its box wide."""
-    rows, used, order = problem.rows, problem.consequent_inputs, problem.order
+    rows, used, order = problem.rows, problem.consequent_inputs, int(problem.n_basis > 1)
     raw = evaluation.antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
     return replace(
         ANFISRegressor(n_mfs=1, max_iter=0).fit(rows.X, rows.y).model_,

@@ -72,7 +72,7 @@ def kept(problem, evaluation, order):
     """A frozen model whose rules are in order."""
     inputs, targets = problem.rows.inputs, problem.rows.targets
     held = problem.local.to_global(in_order(problem, evaluation, order)[:, None])
-    coefficients = in_user_units(held, inputs, targets, np.arange(2), problem.order)
+    coefficients = in_user_units(held, inputs, targets, np.arange(2), int(problem.n_basis > 1))
     antecedent = evaluation.antecedent.change_units(inputs.offset, inputs.scale)
     return TSKModel(
         antecedent=antecedent,

@@ -153,4 +153,4 @@ class TestFit:
         residual = (y - model.fit(X, y).predict(X)) / y.std()
         # Descents keep the point of the least cost, which need not be the last.
         assert np.isclose(np.mean(residual**2), model.loss_curve_, rtol=1e-9, atol=0.0).any()
-        assert model.model_.common_slopes.any() == (solver == "varpro")
+        assert model.model_.common_slopes.any() == (solver in ("varpro", "lse"))
