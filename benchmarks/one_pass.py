@@ -14,7 +14,7 @@ from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, grid_antecedent
+from skanfis.search.grid import Spacing, grid_antecedent
 
 from .report import Measure, Results, Row, Table
 from .timing import side_by_side

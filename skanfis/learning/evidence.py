@@ -44,7 +44,7 @@ _LIKENESS = 1.0 / np.log(3.0) ** 2
 # and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
 # count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
 # noise is fitted.
-ROWS_EACH = 2
+ROWS_PER_CONSEQUENT = 2
 # With fewer, no weight is less than this.
 _LEAST = 1e-6
 # Most of a target lies within so many standard deviations of its mean.
@@ -208,7 +208,7 @@ def least_weights(posterior: Laplace, n_distinct):
     that passes through every row explains them without noise, and rounding errors grow by 1 / alpha
     along what the data leave open: there the weights are never next to nothing.
     """
-    least = _LEAST if n_distinct < ROWS_EACH * posterior.n_columns else 0.0
+    least = _LEAST if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns else 0.0
     if posterior.line.n_rules == 1:
         return Penalty(agreement=least, alpha=least, slope=least)
     noise = posterior.noise_variance / posterior.n_rows
@@ -234,7 +234,7 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = _log_ratio(determined, cost)
     slopes, components = line.kinds == "slope", line.kinds == "alpha"
-    if n_distinct < ROWS_EACH * posterior.n_columns:
+    if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns:
         step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])

@@ -195,15 +195,12 @@ class SeparableProblem:
     def evaluate(self, parameters, reference=None):
         """Cost and coefficients at ``parameters``; ``reference`` coefficients on [1, z]."""
         antecedent = self.antecedent.with_parameters(parameters)
-        if reference is not None:
-            gram, slope, square = self._first_pass(antecedent, reference)
-        else:
-            reference = np.zeros((self.n_columns, self.n_outputs))
-            known = self._sums_at_start
-            if known is None or not np.array_equal(parameters, self.antecedent.parameters):
-                known = self._first_pass(antecedent, reference)
-            gram, slope, square = known
-            slope = slope.copy()  # it is changed below
+        known = None
+        if reference is None:
+            known, reference = self._sums_at_start, np.zeros((self.n_columns, self.n_outputs))
+        if known is None or not np.array_equal(parameters, self.antecedent.parameters):
+            known = self._first_pass(antecedent, reference)
+        gram, slope, square = known
         masses = rule_masses(gram, antecedent.n_rules)
         disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
         penalty = self.penalty_matrix(disagreement)
@@ -212,7 +209,7 @@ class SeparableProblem:
         penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
         pull = penalty @ reference_local
-        slope = self.local.transform_rows(slope) - pull
+        slope = self.local.transform_rows(slope.copy()) - pull
         change = factor.solve(slope)
         cost = 0.5 * float(square.sum() + np.vdot(reference_local, pull) - np.vdot(slope, change))
         solved = reference_local + change

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..learning.data import StandardisedData
-from ..learning.evidence import ROWS_EACH
+from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, judging_folds, n_groups
@@ -35,13 +35,13 @@ class StructureSearch:
         sample = dealt_rows(rows)
         found = judging_folds(sample)
         n_basis = 1 + plan.consequent_inputs.size
-        is_wide = sample.n_rows < ROWS_EACH * _FEW_RULES * n_basis
+        is_wide = sample.n_rows < ROWS_PER_CONSEQUENT * _FEW_RULES * n_basis
         self.folds = [Trials(sample.part(grow), plan, is_wide) for grow, _ in found]
-        self.rest = [sample.part(judge) for _, judge in found]
+        self.left_out = [sample.part(judge) for _, judge in found]
         # Half of many rows is enough to grow on; one group, where the others judge, is not.
         is_half = len(found) == 1 and n_groups(sample) == 1
         self.trials = self.folds[0] if is_half else Trials(sample, plan, is_wide)
-        self.judges = Judges.of(self.rest)
+        self.judges = Judges.of(self.left_out)
         self.judged: list[Judged] = []
 
     def run(self, kinds: Sequence[str]) -> Start:
@@ -116,8 +116,8 @@ class StructureSearch:
     def _squares(self, in_folds, held):
         """Squared errors on the rows that judge, as of a training on all rows."""
         squares = [
-            fold.squared_errors(fold.tuned(one), rest, held)
-            for fold, one, rest in zip(self.folds, in_folds, self.rest, strict=True)
+            fold.squared_errors(fold.tuned(one), rows, held)
+            for fold, one, rows in zip(self.folds, in_folds, self.left_out, strict=True)
         ]
         factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
         return factor * np.concatenate(squares)
@@ -125,9 +125,9 @@ class StructureSearch:
     def _variance(self):
         """Squared error of the mean on the rows that judge."""
         squares = []
-        for fold, rest in zip(self.folds, self.rest, strict=True):
+        for fold, rows in zip(self.folds, self.left_out, strict=True):
             mean = np.average(fold.rows.y, axis=0, weights=fold.rows.sample_weight)
-            squares.append(np.sum((rest.y - mean) ** 2, axis=1))
+            squares.append(np.sum((rows.y - mean) ** 2, axis=1))
         return self.judges.mean(np.concatenate(squares))
 
     def _report(self, found):

@@ -12,7 +12,7 @@ import numpy as np
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TreeAntecedent
 from ..consequent import MANY_COLUMNS
 from ..learning.data import StandardisedData
-from ..learning.evidence import ROWS_EACH
+from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
@@ -20,7 +20,7 @@ from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
 from .sample import effective_weight, search_sample
-from .trials import FEWEST_ROWS, Plan
+from .trials import FEWEST_SEEN, Plan
 from .tuning import (
     ARRIVING,
     FIRST_STEPS,
@@ -81,14 +81,14 @@ def started(tuned: Tuned, plan: Plan, room: float, candidates, is_unbounded=Fals
 
 def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simplicity) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows."""
-    sample, free, inputs = search_sample(rows, FEWEST_ROWS), plan.free, plan.consequent_inputs
+    sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box
     premise, is_unbounded = Premise.of(antecedent, low, high), False
     turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)
     best = tune(problem, premise, free, n_sample, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
-    has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
+    has_rows = sample.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
     if is_bounded and has_rows and problem.n_columns <= MANY_COLUMNS:
         unbounded = Premise.of(antecedent, low, high, is_unbounded=True)

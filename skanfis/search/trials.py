@@ -29,11 +29,10 @@ from .splits import best_splits
 from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters, and at least.
-_ROWS_EACH, FEWEST_ROWS = 40, 1000
+_ROWS_PER_PARAMETER, FEWEST_SEEN = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
-# Of one pass over a training's rows, the solution included, which takes as many for n parameters as
-# 10 n rows do.
+# Operations of a pass over a training's rows; solving for n parameters takes those of 10 n rows.
 _MOST_OPERATIONS, _ROWS_OF_SOLUTION = 1e9, 10.0
 # Inputs, or splits, of the largest scores (``TermScores``, ``splits``) that are tried.
 _TRIED = 4
@@ -113,8 +112,8 @@ class Trials:
 
     def rows_for(self, candidate):
         """As many as its parameters need, by powers of two: most candidates see the same."""
-        needed = max(_ROWS_EACH * self.n_parameters(candidate), FEWEST_ROWS)
-        n_rows = FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / FEWEST_ROWS)))
+        needed = max(_ROWS_PER_PARAMETER * self.n_parameters(candidate), FEWEST_SEEN)
+        n_rows = FEWEST_SEEN * 2 ** int(np.ceil(np.log2(needed / FEWEST_SEEN)))
         part = self.rows.part(slice(n_rows))
         return replace(part, inputs=unit_scale(part.X))
 

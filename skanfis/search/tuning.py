@@ -113,7 +113,7 @@ def tune(
 
     The weights start at those of the problem's penalty and take ``first_steps`` before the premises
     move, in so many ``turns`` at most; with 0 these stay where they are. ``n_rows`` are rows by
-    weight; ``begun`` is where no turn, or the first ``FEW_TURNS``, have ended before.
+    weight; ``begun`` is a training to go on from, which has taken no turn or ``FEW_TURNS``.
     """
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:

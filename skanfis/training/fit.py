@@ -103,7 +103,7 @@ class _Fit:
         if rows.sample is not None:
             start = self.request.for_all(start, rows.sample, rows)
         if not self.solver.goes_on_from_tuning:
-            # Nor do descents keep slopes in common: every rule has its own.
+            # Descents begin afresh, and with slopes of its own for every rule.
             penalty = replace(start.penalty, common=(), absent=())
             start = replace(start, displacement=None, penalty=penalty)
         if self.printer is not None:

@@ -75,7 +75,7 @@ def robust_start(rows):
     if (weights == 1.0).all():
         return rows, weights
     # A square with the square of its weight is at most that of a row at the ten deviations.
-    targets = column_statistics(rows.y, reweighted(rows, weights**2).sample_weight)
+    targets = column_statistics(rows.y, rows.weights * weights**2)
     return replace(rows, targets=targets), weights
 
 
