@@ -72,7 +72,8 @@ class RowSums:
             Z, target, weight = rows.read(part)
             strengths, shares = antecedent.strengths_and_shares(raw)
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
-            marks = fingerprint(np.vstack([numbers, rows.y[part].T]))
+            # In any units of the target: by its digits and its exponent.
+            marks = fingerprint(np.vstack([numbers, *np.frexp(rows.y[part].T)]))
             distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(slope)]
             every = basis(Z)
             block = RuleRows.of(raw, every, strengths, weight, numbers, own, centers)
