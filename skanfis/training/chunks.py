@@ -207,7 +207,7 @@ class _ProblemOfSums(SeparableProblem):
 def inputs_with_slopes(model: TSKModel, inputs):
     """Those by which a model has slopes, or may yet: nothing is known of what has not changed."""
     assert model.target is not None
-    if (model.target.minimum == model.target.maximum).all():
+    if not model.order or (model.target.minimum == model.target.maximum).all():
         return inputs
     has_slope = model.coefficients[:, 1:].any(axis=(0, 2)) | (model.minimum == model.maximum)
     return inputs[has_slope[inputs]]

@@ -399,3 +399,12 @@ def test_rows_that_differ_by_their_target_alone_are_distinct_in_any_unit(rng):
     found, small = (chunk(premises).partial_fit(table, y * unit) for unit in (1.0, 1e-20))
     assert found.alpha_ == small.alpha_
     np.testing.assert_allclose(small.predict(table) * 1e20, found.predict(table), rtol=LAST_DIGIT)
+
+
+def test_constants_are_learnt_from_the_first_chunk_on():
+    model = quick(3, order=0).partial_fit(X[:200], Y[:200])
+    np.testing.assert_array_equal(
+        model.predict(X), quick(3, order=0).fit(X[:200], Y[:200]).predict(X)
+    )
+    before = np.mean((model.predict(X) - Y) ** 2)
+    assert np.mean((model.partial_fit(X[200:], Y[200:]).predict(X) - Y) ** 2) < before
