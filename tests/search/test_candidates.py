@@ -12,8 +12,9 @@ from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, tuning
+from skanfis.search import tuning
 from skanfis.search.candidates import Candidate, TermScores, rule_base
+from skanfis.search.grid import Spacing
 from skanfis.search.sample import search_sample
 
 pytestmark = pytest.mark.theory

@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, grid_antecedent, start
+from skanfis.search import start
+from skanfis.search.grid import Spacing, grid_antecedent
 from skanfis.search.judging import dealt_rows
 from skanfis.search.trials import Trials
 

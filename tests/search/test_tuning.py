@@ -12,7 +12,8 @@ from skanfis.learning.evidence import FREE
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, grid_antecedent, tuning
+from skanfis.search import tuning
+from skanfis.search.grid import Spacing, grid_antecedent
 
 
 def problem_of(X, y, count):
