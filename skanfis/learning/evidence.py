@@ -124,8 +124,7 @@ class Laplace:
     @property
     def prior_precision(self):
         """N kappa / sigma^2, in units of what is expected of it."""
-        ratio = self.n_rows / self.noise_variance * self.penalty.stiffness
-        return ratio * PRIOR_DISPLACEMENT**2
+        return self.n_rows / self.noise_variance * self.penalty.stiffness * PRIOR_DISPLACEMENT**2
 
     @property
     def minus_twice_log(self):

@@ -95,7 +95,8 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_unbounded = freed, True
-    room, sparse = 1.0, [with_sparse_slopes(best, free, worth) for worth in SLOPE_WORTHS]
+    room, worths = 1.0, SLOPE_WORTHS if turns else ()
+    sparse = [with_sparse_slopes(best, free, worth) for worth in worths]
     error = min(one.expected_error for one in (best, *sparse))
     if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))
