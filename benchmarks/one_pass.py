@@ -14,7 +14,7 @@ from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, grid_antecedent
+from skanfis.search.grid import Spacing, grid_antecedent
 
 from .report import Measure, Results, Row, Table
 from .timing import side_by_side
@@ -32,7 +32,7 @@ def make_problem():
     y *= X[:, 1:2]
     rows = StandardisedData.of(X, y)
     antecedent = grid_antecedent([Gaussian] * 3, [3, 3, 3], Spacing(rows))
-    return SeparableProblem(rows, antecedent, order=1, penalty=Penalty(alpha=1e-12, slope=1e-12))
+    return SeparableProblem(rows, antecedent, Penalty(alpha=1e-12, slope=1e-12))
 
 
 def bare_products(problem):

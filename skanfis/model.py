@@ -311,7 +311,8 @@ class TSKModel:
         return self._by_block(X, of_block, 1, n_distances)[:, 0]
 
     def _why_no_posterior(self):
-        n_parameters = self.coefficients[:, :, 0].size + self.antecedent.parameters.size
+        n_basis = 1 + np.count_nonzero(self.coefficients[:, 1:].any(axis=(0, 2)))
+        n_parameters = self.n_rules * n_basis + self.antecedent.parameters.size
         if n_parameters > MOST_PARAMETERS:
             return (
                 f"The model has {n_parameters} parameters; beyond {MOST_PARAMETERS} there is no "

@@ -3,7 +3,7 @@
 from .antecedent import Antecedent
 
 # What a text does not say of the truth of a condition.
-NEXT_TO_NOTHING = 0.01
+UNSAID = 0.01
 
 
 def reading_cost(antecedent: Antecedent, n_slopes: int, n_outputs: int = 1) -> int:
@@ -14,5 +14,5 @@ def reading_cost(antecedent: Antecedent, n_slopes: int, n_outputs: int = 1) -> i
     common once (``n_slopes`` is of all rules). "No change with x", in place of such a one, counts
     as a slope. How many rows a rule stands for, its share, its error and its number do not count.
     """
-    n_conditions = int((antecedent.without_implied(NEXT_TO_NOTHING).rule_terms >= 0).sum())
+    n_conditions = int((antecedent.without_implied(UNSAID).rule_terms >= 0).sum())
     return n_conditions + n_outputs * (antecedent.n_rules + n_slopes)

@@ -336,6 +336,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         """
         context = None
         if hasattr(self, "_skl_callbacks"):
+            # How many runs Huber's loss takes is not known before.
             most = max(self.max_iter, 1) if self.loss == "squared_error" else None
             context = self._init_callback_context(max_subtasks=most)
         before = self.__dict__.copy()
@@ -567,33 +568,30 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         data = self._check_training_data(X, y, sample_weight, None, is_chunk=True)
         n_rows = data.X.shape[0]
         weight = chunk_checks.faded_weights(data.sample_weight, n_rows, forgetting)
-        rows = (data.X, data.y, weight)
+        rows, is_solved = (data.X, data.y, weight), False
         if before is None:
-            base, own, is_fitted = self._begin_chunks(X, y, data, weight)
-            self._sums = RowSums.of(base, own, *rows)
+            is_solved = self._begin_chunks(X, y, data, weight)
         else:
-            is_fitted = False
             chunk_checks.check_outputs(before.base, data.output_names)
             if n_rows == 0:
                 return
             latest = RowSums.of(before.base, before.consequent_inputs, *rows)
             self._sums = before.faded(forgetting**n_rows).plus(latest)
-        if is_fitted and not self._sums.targets.is_constant.all():
-            # What this fit has found holds for further rows too, as a prior of fixed strength.
-            self._first_weights = fitted_weights(self, self._sums)
-        elif not is_fitted:
+        if not is_solved:
             self._solve_chunks()
             self.readability_ = readability_of_rows(self.model_, *rows)
         self.n_samples_seen_ = getattr(self, "n_samples_seen_", 0) + n_rows
 
     def _begin_chunks(self, X, y, data, weight):
-        """Premises of a first chunk, inputs of consequents, and whether the rows were fitted."""
+        """Fix the premises, and sum over a first chunk; whether it is fitted, and so solved for."""
         request = structure_request(self, data.input_names)
         own = request.consequent_inputs
         after_fit = hasattr(self, "model_")
         is_imported = isinstance(request.partition, TSKModel) and not solver_of(self).moves_premises
         is_fitted = not (after_fit or is_imported)
         chunk_checks.check_begin(self, data.X.shape[0], finds_structure=is_fitted)
+        self.stiffness_, self.structures_ = 0.0, []
+        self.robust_weights_ = self.validation_loss_curve_ = self.constraints_ = None
         if is_fitted:
             self.fit(X, y, data.over_all(weight, 0.0))
             own = inputs_with_slopes(self.model_, own)
@@ -609,11 +607,13 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             )
         else:
             self.model_ = chunk_checks.named_premises(request.partition, data)
-        if not is_fitted:
-            self.stiffness_, self.structures_ = 0.0, []
-            self.robust_weights_ = self.validation_loss_curve_ = self.constraints_ = None
         self._chunk_settings = chunk_checks.structure_settings(self)
-        return replace(self.model_, posterior=None), own, is_fitted
+        base = replace(self.model_, posterior=None)
+        self._sums = RowSums.of(base, own, data.X, data.y, weight)
+        if is_fitted and not self._sums.targets.is_constant.all():
+            # What this fit has found holds for further rows too, as a prior of fixed strength.
+            self._first_weights = fitted_weights(self, self._sums)
+        return is_fitted
 
     def _solve_chunks(self):
         """The model of all rows so far."""

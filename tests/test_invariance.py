@@ -160,7 +160,7 @@ def test_order_of_the_inputs_of_a_grid(name):
 @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"max_rules": 3}], ids=str)
 def test_order_of_inputs_and_outputs_where_rows_stand_for_many(settings, monkeypatch):
     # As beyond 1,000 rows, and 20,000: on 40 of 120.
-    monkeypatch.setattr(start, "FEWEST_ROWS", 40)
+    monkeypatch.setattr(start, "FEWEST_SEEN", 40)
     monkeypatch.setattr(representative_rows, "__defaults__", (40,))
     monkeypatch.setattr(search_sample, "__defaults__", (40,))
     X, y = gyro()

@@ -47,7 +47,11 @@ def dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=0):
     The joint precision is J' J of every residual that the cost is made of, by complex steps, and
     inverted whole; the noise is what the residual leaves after the trace of the smoother.
     """
-    antecedent, order, inputs = problem.antecedent, problem.order, problem.consequent_inputs
+    antecedent, order, inputs = (
+        problem.antecedent,
+        int(problem.n_basis > 1),
+        problem.consequent_inputs,
+    )
     dense = oracles.DenseProblem(problem.rows, antecedent, order, PENALTY, inputs)
     theta, beta = evaluation.antecedent.parameters, evaluation.coefficients[:, 0]
     n, p = problem.rows.n_rows, beta.size
@@ -95,7 +99,8 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, 
     else:
         thetas = [Gaussian.start(np.linspace(-1, 1, m), np.full(m, 1.0), 0.5) for m in (3, 2)]
         antecedent = GridAntecedent.build([Gaussian] * 2, [0, 1], thetas)
-    problem = SeparableProblem(rows, antecedent, order, PENALTY, consequent_inputs=inputs)
+    used = np.arange(2 * order) if inputs is None else inputs
+    problem = SeparableProblem(rows, antecedent, PENALTY, consequent_inputs=used)
     premise = Premise.of(antecedent, *rows.inputs.box)
     moved = np.clip(0.1 * rng.normal(size=premise.size), premise.lower, premise.upper)
     evaluation = problem.evaluate(premise.parameters(moved))
@@ -116,7 +121,7 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, 
 
 def model_of(problem, evaluation, posterior):
     """A model in raw units, its box wide."""
-    rows, used, order = problem.rows, problem.consequent_inputs, problem.order
+    rows, used, order = problem.rows, problem.consequent_inputs, int(problem.n_basis > 1)
     raw = evaluation.antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
     return replace(
         ANFISRegressor(n_mfs=1, max_iter=0).fit(rows.X, rows.y).model_,
@@ -246,7 +251,7 @@ def test_noise_of_hubers_loss_is_his_second_proposal(monkeypatch, block_bytes):
     left = g.uniform(0.2, 1.0, 250)
     rows = replace(given, sample_weight=given.sample_weight * left)
     antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2])
-    problem = SeparableProblem(rows, antecedent, 1, PENALTY)
+    problem = SeparableProblem(rows, antecedent, PENALTY)
     evaluation = problem.evaluate(antecedent.parameters)
     dense = oracles.DenseProblem(rows, antecedent, 1, PENALTY)
     r = dense.y - dense.design(antecedent.parameters) @ evaluation.coefficients

@@ -217,7 +217,7 @@ class Antecedent(ABC):
 
         None where strengths are no products of functions of one input each.
         """
-        del Z
+        return None
 
     @abstractmethod
     def normalise(self, log_mu):

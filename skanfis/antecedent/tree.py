@@ -26,8 +26,7 @@ from .rule_table import RuleTableAntecedent
 LEAST_WIDTH = 0.1 / np.log(9.0)
 # Where a product of two sides is looked at, in widths from either cut.
 _AROUND = np.linspace(-6.0, 6.0, 49)
-# Of two values: in lengths of its width, each is so far from the cut that its side is one to the
-# last bit.
+# Between two values a cut stands so many widths from either: its sides are one to the last bit.
 CRISP = 40.0
 
 

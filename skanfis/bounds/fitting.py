@@ -361,7 +361,7 @@ class _ConstrainedFit:
     def _with(self, local, targets):
         """The model of local consequents of some targets."""
         problem, inputs = self.problem, self.problem.rows.inputs
-        design = problem.consequent_inputs, problem.order
+        design = problem.consequent_inputs, self.model.order
         common = problem.penalty.common, self.model.rule_weights
         coefficients = problem.local.to_global(local)
         return replace(

@@ -23,7 +23,7 @@ from ..export.columns import Level
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..policies import MOST_DIGITS
-from ..reading_cost import NEXT_TO_NOTHING
+from ..reading_cost import UNSAID
 
 # Digits of the noise's deviation to which numbers are written.
 PRECISION = 2
@@ -174,7 +174,7 @@ def _written_terms(model, digits):
         start += group.n_terms
     written = replace(antecedent, groups=tuple(groups))
     if digits < MOST_DIGITS:
-        written = written.without_implied(NEXT_TO_NOTHING)
+        written = written.without_implied(UNSAID)
     return replace(model, antecedent=written, term_names=tuple(names)), says_where
 
 

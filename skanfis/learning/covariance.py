@@ -59,10 +59,8 @@ def posterior_of(
     half /= np.sqrt(n_rows)
     if len(half) < n_columns:
         half, cross = _squared(half, cross)
-    premises = (
-        premises * (shared / np.sqrt(n_rows)) * parameter_units(antecedent, rows.inputs.scale)
-    )
-    scale = rows.targets.scale
+    units, scale = parameter_units(antecedent, rows.inputs.scale), rows.targets.scale
+    premises = premises * (shared / np.sqrt(n_rows)) * units
     cross = cross * (shared * scale)[:, None, None]
     return Posterior(noise * scale, problem.consequent_inputs, half, premises, cross)
 

@@ -44,7 +44,7 @@ _LIKENESS = 1.0 / np.log(3.0) ** 2
 # and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
 # count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
 # noise is fitted.
-ROWS_EACH = 2
+ROWS_PER_CONSEQUENT = 2
 # With fewer, no weight is less than this.
 _LEAST = 1e-6
 # Most of a target lies within so many standard deviations of its mean.
@@ -94,7 +94,7 @@ class Laplace:
         These and ``trace_after`` take as long as all the rest, and are seldom asked of the last of
         several posteriors.
         """
-        return self._held(self.prior, float(self.curvature.size))
+        return self._traces(self.prior, float(self.curvature.size))
 
     @cached_property
     def trace_after(self):
@@ -102,9 +102,9 @@ class Laplace:
         stiffness = self.penalty.stiffness
         # Without stiffness nothing is held, not even where there is no curvature either.
         held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
-        return self._held(self.factor, held)
+        return self._traces(self.factor, held)
 
-    def _held(self, factor, by_stiffness):
+    def _traces(self, factor, by_stiffness):
         found = self.line.weights(self.penalty)
         found[_AGREEMENT] *= factor.trace(self.disagreement)
         found[_OTHERS] *= self.line.traces(factor)
@@ -124,8 +124,7 @@ class Laplace:
     @property
     def prior_precision(self):
         """N kappa / sigma^2, in units of what is expected of it."""
-        ratio = self.n_rows / self.noise_variance * self.penalty.stiffness
-        return ratio * PRIOR_DISPLACEMENT**2
+        return self.n_rows / self.noise_variance * self.penalty.stiffness * PRIOR_DISPLACEMENT**2
 
     @property
     def minus_twice_log(self):
@@ -208,12 +207,12 @@ def least_weights(posterior: Laplace, n_distinct):
     that passes through every row explains them without noise, and rounding errors grow by 1 / alpha
     along what the data leave open: there the weights are never next to nothing.
     """
-    least = _LEAST if n_distinct < ROWS_EACH * posterior.n_columns else 0.0
+    least = _LEAST if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns else 0.0
     if posterior.line.n_rules == 1:
-        return Penalty(least, least, least)
+        return Penalty(agreement=least, alpha=least, slope=least)
     noise = posterior.noise_variance / posterior.n_rows
     agreement = max(least, posterior.n_columns * noise / _FAR**2)
-    return Penalty(agreement, max(least, noise / _FAR**2), least)
+    return Penalty(agreement=agreement, alpha=max(least, noise / _FAR**2), slope=least)
 
 
 def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
@@ -234,7 +233,7 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = _log_ratio(determined, cost)
     slopes, components = line.kinds == "slope", line.kinds == "alpha"
-    if n_distinct < ROWS_EACH * posterior.n_columns:
+    if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns:
         step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])

@@ -63,9 +63,10 @@ class NormalEquations:
     free: np.ndarray | None  # what these are made of, see ``CommonLine.free``
 
     def with_penalty(self, penalty, error, free):
-        """The same with another penalty, which takes on the factor's shift; no pass over the rows.
+        """The same with another penalty, the change of the coefficients, and the new squared error.
 
-        And the change of the coefficients, and the mean squared error, which is ``error`` here.
+        ``error`` is the one of here. No pass over the rows is taken; the factor's shift is added to
+        ``penalty`` itself.
         """
         factor = NormalFactor(self.gram + penalty, free)
         penalty.flat[:: penalty.shape[0] + 1] += factor.shift
@@ -97,23 +98,21 @@ class SeparableProblem:
 
     ``antecedent`` is the rule base at the start, which freezes the consequents' local basis;
     ``map_ordered`` is ``map``, or what spreads chunks over workers, with results in order;
-    ``consequent_inputs`` are the inputs that the consequents are linear in, if not all are.
+    ``consequent_inputs`` are the inputs that the consequents are linear in: all, unless given.
     """
 
     def __init__(
         self,
         rows: StandardisedData,
         antecedent: Antecedent,
-        order: int,
         penalty: Penalty,
         map_ordered: Callable[[Callable, Iterable], Iterable] = map,
         consequent_inputs: np.ndarray | None = None,
     ):
-        self.rows, self.antecedent, self.order = rows, antecedent, order
+        self.rows, self.antecedent = rows, antecedent
         self.penalty, self.map_ordered = penalty, map_ordered
         every_input = np.arange(rows.X.shape[1])
-        given = every_input if consequent_inputs is None else consequent_inputs
-        self.consequent_inputs = given if order == 1 else every_input[:0]
+        self.consequent_inputs = every_input if consequent_inputs is None else consequent_inputs
         self.n_basis = 1 + self.consequent_inputs.size
         self.n_columns = antecedent.n_rules * self.n_basis
         self.n_outputs = rows.y.shape[1]
@@ -196,15 +195,12 @@ class SeparableProblem:
     def evaluate(self, parameters, reference=None):
         """Cost and coefficients at ``parameters``; ``reference`` coefficients on [1, z]."""
         antecedent = self.antecedent.with_parameters(parameters)
-        if reference is not None:
-            gram, slope, square = self._first_pass(antecedent, reference)
-        else:
-            reference = np.zeros((self.n_columns, self.n_outputs))
-            known = self._sums_at_start
-            if known is None or not np.array_equal(parameters, self.antecedent.parameters):
-                known = self._first_pass(antecedent, reference)
-            gram, slope, square = known
-            slope = slope.copy()  # it is changed below
+        known = None
+        if reference is None:
+            known, reference = self._sums_at_start, np.zeros((self.n_columns, self.n_outputs))
+        if known is None or not np.array_equal(parameters, self.antecedent.parameters):
+            known = self._first_pass(antecedent, reference)
+        gram, slope, square = known
         masses = rule_masses(gram, antecedent.n_rules)
         disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
         penalty = self.penalty_matrix(disagreement)
@@ -213,7 +209,7 @@ class SeparableProblem:
         penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
         pull = penalty @ reference_local
-        slope = self.local.transform_rows(slope) - pull
+        slope = self.local.transform_rows(slope.copy()) - pull
         change = factor.solve(slope)
         cost = 0.5 * float(square.sum() + np.vdot(reference_local, pull) - np.vdot(slope, change))
         solved = reference_local + change

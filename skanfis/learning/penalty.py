@@ -39,8 +39,8 @@ class Penalty:
     alpha: float = 0.0  # pull of each rule to the common line, the mean of all components
     slope: float = 0.0  # rho, on the slopes of the common line, their mean
     stiffness: float = 0.0  # kappa, on the displacements of the premises
-    # Of each component of the departures in alphas, and of the slope by each input in rhos; one
-    # where there is none. Those of some rows hold for others, where other inputs are constant.
+    # Weight of each component of the departures, in units of alpha, and of the slope by each input,
+    # in units of rho; one where none is named, as of inputs that were constant on the rows then.
     pulls: dict[tuple[int, ...], float] = field(default_factory=dict)
     slope_pulls: dict[int, float] = field(default_factory=dict)
     # Inputs, and the rules that have one slope by each.

@@ -61,7 +61,7 @@ class Premise:
                 least = np.log(antecedent.least_width) - raw[first]
                 lower[first] = np.minimum(np.maximum(lower[first], least), 0.0)
                 upper[first] = 0.0
-                # What is as narrow as may be is so but for rounding; what is crisp is half of it.
+                # A crisp cut, at most half as wide as the least, stays; half-way is far from both.
                 is_crisp = widths < 0.75 * antecedent.least_width
                 for still in (locations[is_crisp], first[is_crisp]):
                     lower[still] = upper[still] = 0.0

@@ -155,6 +155,7 @@ class LeastSquares(Solver):
     """
 
     moves_premises: ClassVar[bool] = False
+    goes_on_from_tuning: ClassVar[bool] = True
 
     def solve(
         self, problem, premise, *, max_iter, stiffness=0.0, start=None, on_iteration=None

@@ -43,8 +43,8 @@ def trust_region_step(gradient, hessian, radius, damping=0.0):
     size = np.linalg.norm(slope)
     if size == 0.0:
         return np.zeros_like(gradient)
-    # A damping of |g| / radius alone bounds the step's length, and no smaller one than what the
-    # largest curvature leaves of it can be needed.
+    # A step is no shorter than |g| over the largest curvature with what is added to it: less than
+    # this cannot keep it within the radius.
     values = np.maximum(values, 0.0)
     values += damping + _SMALLEST_CURVATURE * max(values[-1], np.finfo(float).tiny)
     values += max(size / radius - values[-1], 0.0)

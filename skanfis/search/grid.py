@@ -22,10 +22,10 @@ OVERLAP = 0.6
 # The outermost terms stand where this part of the rows lies beyond: a stray row is none to name a
 # term after, and a term at the very edge would be half empty.
 _EDGE = 0.02
-# Neighbouring gaps differ by this factor at most; ``premise`` allows them a little more.
+# Neighbouring gaps differ by this factor at most; ``ordered_terms`` allows them a little more.
 _RATIO = 1.8
 # Of a term's distances to its neighbours the nearer one counts by this part of its logarithm: where
-# an overlap of 0.6 at even distances stands between the least and the most of ``premise``.
+# an overlap of 0.6 at even distances stands between the least and the most of ``ordered_terms``.
 _NEARER = 1.0 / 6.0
 
 

@@ -30,25 +30,27 @@ def dealt_rows(rows: StandardisedData) -> StandardisedData:
     return sample.part(order[np.random.default_rng(0).permutation(order.size)])
 
 
+def n_groups(rows: StandardisedData) -> int:
+    """Number of groups; one where none are given, for a single group says as little."""
+    return 1 if rows.groups is None else np.unique(rows.groups).size
+
+
 def folds(rows: StandardisedData):
     """Positions of the other rows and of its own, of every fold; whole groups, if there are any."""
-    every, n_folds, groups = np.arange(rows.n_rows), min(FOLDS, rows.n_rows), rows.groups
-    if groups is not None and np.unique(groups).size > 1:
-        n_folds = min(FOLDS, np.unique(groups).size)
-        return list(GroupKFold(n_folds).split(rows.X, groups=groups))
+    if n_groups(rows) > 1:
+        n_folds = min(FOLDS, n_groups(rows))
+        return list(GroupKFold(n_folds).split(rows.X, groups=rows.groups))
+    every, n_folds = np.arange(rows.n_rows), min(FOLDS, rows.n_rows)
     return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
 
 
-def splits(rows: StandardisedData):
-    """Positions to grow on and positions to judge on, of every fold that is needed.
-
-    Where there is but one, what is grown for it serves as the sequence of all rows.
-    """
+def judging_folds(rows: StandardisedData):
+    """Positions to grow on and positions to judge on, of every fold that is needed."""
     n_rows, every = rows.n_rows, np.arange(rows.n_rows)
     if n_rows == 1:
         return [(every, every)]
     found = folds(rows)
-    if rows.groups is None or np.unique(rows.groups).size == 1:
+    if n_groups(rows) == 1:
         if n_rows >= FOLDS * _ENOUGH:
             found = [(every[1::2], every[::2])]
         found = found[: int(np.ceil(len(found) * _ENOUGH / n_rows))]

@@ -22,7 +22,7 @@ _LEAST_PENALTY = 0.01
 
 def lasso_inputs(rows: StandardisedData, inputs):
     """Those of some inputs by which the lasso has slopes, for any output."""
-    if rows.n_rows < FOLDS:
+    if rows.n_rows < FOLDS or not inputs.size:
         return inputs
     X, weight, has_slope = rows.X[:, inputs], rows.weights, np.zeros(inputs.size, dtype=bool)
     parts = folds(rows)

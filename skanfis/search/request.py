@@ -36,7 +36,6 @@ class StructureRequest(Plan):
 
     n_mfs: Any
     partition: Any  # as given; a model in place of the estimator that holds it
-    premises_move: bool  # whether what is trained afterwards moves them
     names: Sequence[str]  # of the inputs
     simplicity: float  # what may be given up for a model that costs less to read
 
@@ -60,14 +59,17 @@ class StructureRequest(Plan):
             return (self.partition,)
         left_out = ["tree"] if any(family is not Gaussian for family in self.families) else []
         if self.held is not None:
-            # An order of scattered rules all over the range binds hard.
+            # Scattered rules fire all over the range: to be in order everywhere binds them hard.
             left_out.append("scattered")
         return [kind for kind in KINDS if kind not in left_out]
 
     def _plan(self, rows):
         """The same for these rows: what never changes has no terms."""
         varying = self.premise_inputs[~rows.inputs.is_constant[self.premise_inputs]]
-        return replace(self, premise_inputs=varying, n_all=effective_weight(rows))
+        # Premises that stay pay nothing for moving.
+        weights = self.weights if self.premises_move else {"stiffness": 0.0} | self.weights
+        n_all = effective_weight(rows)
+        return replace(self, premise_inputs=varying, weights=weights, n_all=n_all)
 
     def _antecedent(self, rows):
         """The rules that were asked for."""
@@ -81,8 +83,7 @@ class StructureRequest(Plan):
 
     def _tuned(self, antecedent, rows):
         self._warn_if_underdetermined(antecedent.n_rules, rows)
-        plan = self._plan(rows)
-        return tuned_start(antecedent, rows, plan, self.premises_move, self.simplicity)
+        return tuned_start(antecedent, rows, self._plan(rows), self.simplicity)
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
         """A start found on a sample, with the weights that were not given those of all rows."""

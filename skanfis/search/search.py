@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from ..learning.data import StandardisedData
-from ..learning.evidence import ROWS_EACH
+from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
-from .judging import dealt_rows, splits
+from .judging import dealt_rows, judging_folds, n_groups
 from .start import Start, started
 from .trials import Plan, Trials
 from .tuning import cost_of
@@ -33,25 +33,28 @@ class StructureSearch:
     def __init__(self, rows: StandardisedData, plan: Plan, simplicity: float):
         self.plan, self.simplicity = plan, simplicity
         sample = dealt_rows(rows)
-        found = splits(sample)
+        found = judging_folds(sample)
         n_basis = 1 + plan.consequent_inputs.size
-        is_wide = sample.n_rows < ROWS_EACH * _FEW_RULES * n_basis
+        is_wide = sample.n_rows < ROWS_PER_CONSEQUENT * _FEW_RULES * n_basis
         self.folds = [Trials(sample.part(grow), plan, is_wide) for grow, _ in found]
-        self.rest = [sample.part(judge) for _, judge in found]
-        self.trials = self.folds[0] if len(found) == 1 else Trials(sample, plan, is_wide)
-        self.judges = Judges.of(self.rest)
+        self.left_out = [sample.part(judge) for _, judge in found]
+        # Half of many rows is enough to grow on; one group, where the others judge, is not.
+        is_half = len(found) == 1 and n_groups(sample) == 1
+        self.trials = self.folds[0] if is_half else Trials(sample, plan, is_wide)
+        self.judges = Judges.of(self.left_out)
         self.judged: list[Judged] = []
 
     def run(self, kinds: Sequence[str]) -> Start:
         """A start from the structure that is chosen."""
-        lines, n_slopes = [self.trials.one_rule], self.trials.slope_inputs.size
-        if n_slopes < self.plan.consequent_inputs.size:
-            lines.append(replace(lines[0], has_all_slopes=True))
-        for line in lines:
-            one_rule = self._judge(line, [line] * len(self.folds))
-            # Where the lasso keeps no input, the mean is to be compared, and nothing more.
-            for kind in kinds if n_slopes or line is lines[-1] else ():
-                self._grow(kind, one_rule)
+        first, n_slopes = self.trials.one_rule, self.trials.slope_inputs.size
+        is_part = n_slopes < self.plan.consequent_inputs.size
+        for has_all in (False, True) if is_part else (False,):
+            candidate = replace(first, has_all_slopes=has_all)
+            one_rule = self._judge(candidate, [candidate] * len(self.folds))
+            # Where the lasso keeps no input, its one rule is the mean, which is compared alone.
+            if n_slopes or has_all or not is_part:
+                for kind in kinds:
+                    self._grow(kind, one_rule)
         best = best_of(self.judged, self.judges)
         variance = self._variance()
         most = tolerated(best.squared_error, variance, self.simplicity)
@@ -61,8 +64,8 @@ class StructureSearch:
         found = chosen(within(self.judged, best, most), variance)
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
-        left = most / error if error > 0.0 else 1.0
-        return started(self.trials.tuned(found.candidate), self.plan, left, self._report(found))
+        room = most / error if error > 0.0 else 1.0
+        return started(self.trials.tuned(found.candidate), self.plan, room, self._report(found))
 
     def _grow(self, kind, one_rule):
         """Judge a kind from small to large, some steps further than the best.
@@ -113,8 +116,8 @@ class StructureSearch:
     def _squares(self, in_folds, held):
         """Squared errors on the rows that judge, as of a training on all rows."""
         squares = [
-            fold.squared_errors(fold.tuned(one), rest, held)
-            for fold, one, rest in zip(self.folds, in_folds, self.rest, strict=True)
+            fold.squared_errors(fold.tuned(one), rows, held)
+            for fold, one, rows in zip(self.folds, in_folds, self.left_out, strict=True)
         ]
         factor = self.folds[0].with_more_rows(self.folds[0].tuned(in_folds[0]))
         return factor * np.concatenate(squares)
@@ -122,9 +125,9 @@ class StructureSearch:
     def _variance(self):
         """Squared error of the mean on the rows that judge."""
         squares = []
-        for fold, rest in zip(self.folds, self.rest, strict=True):
+        for fold, rows in zip(self.folds, self.left_out, strict=True):
             mean = np.average(fold.rows.y, axis=0, weights=fold.rows.sample_weight)
-            squares.append(np.sum((rest.y - mean) ** 2, axis=1))
+            squares.append(np.sum((rows.y - mean) ** 2, axis=1))
         return self.judges.mean(np.concatenate(squares))
 
     def _report(self, found):

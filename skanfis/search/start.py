@@ -5,14 +5,14 @@ that are given the weights are found in the same way, on a sample. Terms in orde
 bounds, as in classic ANFIS, where that leaves less than nine tenths of the expected squared error.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TreeAntecedent
 from ..consequent import MANY_COLUMNS
 from ..learning.data import StandardisedData
-from ..learning.evidence import ROWS_EACH
+from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
@@ -20,7 +20,7 @@ from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
 from .sample import effective_weight, search_sample
-from .trials import FEWEST_ROWS, Plan
+from .trials import FEWEST_SEEN, Plan
 from .tuning import (
     ARRIVING,
     FIRST_STEPS,
@@ -55,15 +55,17 @@ class Start:
     term_names: tuple[str, ...] = ()  # where they are given with the rules
 
 
-def started(tuned: Tuned, plan: Plan, left: float, candidates, is_unbounded=False) -> Start:
+def started(tuned: Tuned, plan: Plan, room: float, candidates, is_unbounded=False) -> Start:
     """A start from a training, with the agreement that the tolerance leaves room for.
 
-    ``left`` is the factor by which the squared error may still rise. Its root is used up: on new
+    ``room`` is the factor by which the squared error may still rise. Its root is used up: on new
     rows agreement costs more than the rows that are trained on let see.
     """
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
     premise = Premise.of(problem.antecedent, *problem.rows.inputs.box, is_unbounded)
-    agreeing = with_most_agreement(tuned, premise, plan.free, np.sqrt(left))
+    # Where premises stay, none make room for more.
+    room = np.sqrt(room) if plan.premises_move else 1.0
+    agreeing = with_most_agreement(tuned, premise, plan.free, room)
     is_raised = agreeing is not tuned
     return Start(
         problem.antecedent,
@@ -77,34 +79,31 @@ def started(tuned: Tuned, plan: Plan, left: float, candidates, is_unbounded=Fals
     )
 
 
-def tuned_start(
-    antecedent: Antecedent, rows: StandardisedData, plan: Plan, premises_move, simplicity
-) -> Start:
+def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simplicity) -> Start:
     """A start from rules that are given, with the weights that are not given found on the rows."""
-    if not premises_move:
-        plan = replace(plan, weights={"stiffness": 0.0} | plan.weights)
-    sample, free, inputs = search_sample(rows, FEWEST_ROWS), plan.free, plan.consequent_inputs
-    problem = SeparableProblem(sample, antecedent, plan.order, plan.first, consequent_inputs=inputs)
+    sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
+    problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box
     premise, is_unbounded = Premise.of(antecedent, low, high), False
-    turns, steps = (MOST_TURNS, FIRST_STEPS) if premises_move and free else (0, ARRIVING)
+    turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)
     best = tune(problem, premise, free, n_sample, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
-    has_rows = sample.n_rows >= ROWS_EACH * problem.n_columns
+    has_rows = sample.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
     if is_bounded and has_rows and problem.n_columns <= MANY_COLUMNS:
         unbounded = Premise.of(antecedent, low, high, is_unbounded=True)
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_unbounded = freed, True
-    left, sparse = 1.0, [with_sparse_slopes(best, free, worth) for worth in SLOPE_WORTHS]
+    room, worths = 1.0, SLOPE_WORTHS if turns else ()
+    sparse = [with_sparse_slopes(best, free, worth) for worth in worths]
     error = min(one.expected_error for one in (best, *sparse))
     if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))
         most = tolerated(error, variance, simplicity)
         best = next(one for one in (*sparse[::-1], best) if one.expected_error <= most)
-        left = most / best.expected_error
-    return started(best, plan, left, [_as_given(best)], is_unbounded)
+        room = most / best.expected_error
+    return started(best, plan, room, [_as_given(best)], is_unbounded)
 
 
 def _as_given(tuned: Tuned):

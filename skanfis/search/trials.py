@@ -29,10 +29,10 @@ from .splits import best_splits
 from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters, and at least.
-_ROWS_EACH, FEWEST_ROWS = 40, 1000
+_ROWS_PER_PARAMETER, FEWEST_SEEN = 40, 1000
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
-# Of a pass over the rows of a training, with the solution: of n parameters as many as of 10 n rows.
+# Operations of a pass over a training's rows; solving for n parameters takes those of 10 n rows.
 _MOST_OPERATIONS, _ROWS_OF_SOLUTION = 1e9, 10.0
 # Inputs, or splits, of the largest scores (``TermScores``, ``splits``) that are tried.
 _TRIED = 4
@@ -57,6 +57,7 @@ class Plan:
     weights: dict[str, Any]  # of the penalty, those that are given, of ``evidence.FREE``
     seed: int  # of clusterings that have none of their own
     max_rules: int | None
+    premises_move: bool  # whether what is trained afterwards moves them
     held: Held | None = None
     n_all: float = np.nan  # rows by weight that the final model will be trained on
 
@@ -86,8 +87,8 @@ class Trials:
         # A bell around one of two values is a little true of the other; a tree's cut is not.
         self.bell_inputs = [int(j) for j in plan.premise_inputs if self.spacing.n_values(j) > 2]
         self.one_rule = Candidate((1,) * rows.X.shape[1])
-        self._found: dict[Candidate, Tuned] = {}
-        self._begun: dict[Candidate, Tuned] = {}
+        self._begun: dict[Candidate, Tuned] = {}  # trained as far as tells what they promise
+        self._found: dict[Candidate, Tuned] = {}  # and to the end
 
     def _significant_inputs(self, candidate, scores):
         """Inputs for terms of scattered rules: of scores beyond chance; for the first rules one.
@@ -111,8 +112,8 @@ class Trials:
 
     def rows_for(self, candidate):
         """As many as its parameters need, by powers of two: most candidates see the same."""
-        needed = max(_ROWS_EACH * self.n_parameters(candidate), FEWEST_ROWS)
-        n_rows = FEWEST_ROWS * 2 ** int(np.ceil(np.log2(needed / FEWEST_ROWS)))
+        needed = max(_ROWS_PER_PARAMETER * self.n_parameters(candidate), FEWEST_SEEN)
+        n_rows = FEWEST_SEEN * 2 ** int(np.ceil(np.log2(needed / FEWEST_SEEN)))
         part = self.rows.part(slice(n_rows))
         return replace(part, inputs=unit_scale(part.X))
 
@@ -148,7 +149,7 @@ class Trials:
             return []
         return [anew, replace(anew, is_grown=True)] if candidate.n_clusters else [anew]
 
-    def _slope_inputs(self, candidate):
+    def _inputs_with_slopes(self, candidate):
         """Inputs that the consequents of a candidate are linear in."""
         return self.plan.consequent_inputs if candidate.has_all_slopes else self.slope_inputs
 
@@ -159,7 +160,7 @@ class Trials:
 
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""
-        n_basis = 1 + self._slope_inputs(candidate).size
+        n_basis = 1 + self._inputs_with_slopes(candidate).size
         return candidate.n_rules * n_basis + 2 * candidate.n_terms
 
     def _is_small(self, candidate):
@@ -205,11 +206,13 @@ class Trials:
         plan, rows = self.plan, self.rows_for(candidate)
         penalty = plan.first if smaller is None else smaller.penalty
         antecedent = rule_base(candidate, rows, plan.families, self.spacing, plan.seed, smaller)
-        inputs = self._slope_inputs(candidate)
-        return SeparableProblem(rows, antecedent, plan.order, penalty, consequent_inputs=inputs)
+        inputs = self._inputs_with_slopes(candidate)
+        return SeparableProblem(rows, antecedent, penalty, consequent_inputs=inputs)
 
     def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE, begun=None):
         free, weight = self.plan.free, effective_weight(problem.rows)
+        if turns and not self.plan.premises_move:
+            turns, first_steps = 0, ARRIVING
         premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
         return tune(problem, premise, free, weight, turns, first_steps, begun)
 

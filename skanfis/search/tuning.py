@@ -69,7 +69,7 @@ class Tuned:
 
     @cached_property
     def solved(self):
-        """The evaluation at the weights found, where those it was made at are others."""
+        """The evaluation, solved again at the weights found."""
         return self.problem.solved_again(self.evaluation)
 
     @property
@@ -113,7 +113,7 @@ def tune(
 
     The weights start at those of the problem's penalty and take ``first_steps`` before the premises
     move, in so many ``turns`` at most; with 0 these stay where they are. ``n_rows`` are rows by
-    weight; ``begun`` is where no turn, or the first ``FEW_TURNS``, have ended before.
+    weight; ``begun`` is a training to go on from, which has taken no turn or ``FEW_TURNS``.
     """
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
@@ -193,7 +193,7 @@ def _improved(
     """The point after so many steps of the free weights, or when they stand still.
 
     Steps that are alike are taken on to where they lead, if the evidence rises there; the last is
-    always a plain one.
+    always a plain one. ``before`` is the penalty before the last step, if that was a plain one.
     """
     line = problem.common_line
     n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
@@ -209,12 +209,11 @@ def _improved(
         far = extrapolated(line, before, posterior.penalty, plain, free, least)
         if before is not None and is_settled(line, posterior.penalty, far):
             break
-        now, before = posterior, None
-        if left and far != plain:
-            posterior = posterior_at(far)
-        if posterior is now or posterior.minus_twice_log > now.minus_twice_log:
-            posterior = posterior_at(plain)
-            before = now.penalty
+        jumped = posterior_at(far) if left and far != plain else None
+        if jumped is None or jumped.minus_twice_log > posterior.minus_twice_log:
+            posterior, before = posterior_at(plain), posterior.penalty
+        else:
+            posterior, before = jumped, None
     return Tuned(problem.with_penalty(posterior.penalty), evaluation, x, posterior)
 
 
@@ -225,17 +224,17 @@ def cost_of(tuned: Tuned) -> int:
     return reading_cost(problem.antecedent, n_slopes, problem.n_outputs)
 
 
-def with_most_agreement(tuned: Tuned, premise: Premise, free, left: float) -> Tuned:
-    """The same with as much agreement as keeps the squared error within ``left`` of itself.
+def with_most_agreement(tuned: Tuned, premise: Premise, free, room: float) -> Tuned:
+    """The same with as much agreement as keeps the squared error within ``room`` times itself.
 
     The consequents alone tell how much that is at least; then the premises follow, which makes room
     for more, or for less.
     """
     is_known = np.isfinite(tuned.expected_error)
-    if "agreement" not in free or not tuned.displacement.size or left <= 1.0 or not is_known:
+    if "agreement" not in free or not tuned.displacement.size or room <= 1.0 or not is_known:
         return tuned
     others = [key for key in free if key != "agreement"]
-    most, best, agreement = left * tuned.expected_error, tuned, 0.0
+    most, best, agreement = room * tuned.expected_error, tuned, 0.0
     for _ in range(_MOST_RAISES):
         agreement = agreement or _most_agreement(best, most)
         if agreement < _LEAST_RAISE * best.penalty.agreement:

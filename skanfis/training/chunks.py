@@ -16,7 +16,7 @@ from ..consequent import LocalBasis, basis, in_user_units
 from ..learning import SolverResult
 from ..learning.covariance import posterior_of
 from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
-from ..learning.evidence import ROWS_EACH
+from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.gram import DesignMoments
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import CommonLine, Penalty
@@ -72,8 +72,9 @@ class RowSums:
             Z, target, weight = rows.read(part)
             strengths, shares = antecedent.strengths_and_shares(raw)
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
-            marks = fingerprint(np.vstack([numbers, rows.y[part].T]))
-            distinct = np.union1d(distinct, marks)[: ROWS_EACH * len(slope)]
+            # In any units of the target: by its digits and its exponent.
+            marks = fingerprint(np.vstack([numbers, *np.frexp(rows.y[part].T)]))
+            distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(slope)]
             every = basis(Z)
             block = RuleRows.of(raw, every, strengths, weight, numbers, own, centers)
             rules = rules.plus(block, rows.inputs)
@@ -123,7 +124,7 @@ class RowSums:
         one, two = self._on(inputs, targets), other._on(inputs, targets)
         names = (*_SUMS, "n_rows", "squared_weight")
         sums = {name: getattr(one, name) + getattr(two, name) for name in names}
-        distinct = np.union1d(one.distinct, two.distinct)[: ROWS_EACH * len(self.slope)]
+        distinct = np.union1d(one.distinct, two.distinct)[: ROWS_PER_CONSEQUENT * len(self.slope)]
         return replace(one, distinct=distinct, rules=one.rules.plus(two.rules, inputs), **sums)
 
     def _on(self, inputs: Scale, targets: Scale):
@@ -206,7 +207,7 @@ class _ProblemOfSums(SeparableProblem):
 def inputs_with_slopes(model: TSKModel, inputs):
     """Those by which a model has slopes, or may yet: nothing is known of what has not changed."""
     assert model.target is not None
-    if (model.target.minimum == model.target.maximum).all():
+    if not model.order or (model.target.minimum == model.target.maximum).all():
         return inputs
     has_slope = model.coefficients[:, 1:].any(axis=(0, 2)) | (model.minimum == model.maximum)
     return inputs[has_slope[inputs]]

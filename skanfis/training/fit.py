@@ -23,7 +23,7 @@ from ..inspection.anova import input_marginals
 from ..learning import LeastSquares, VariableProjection
 from ..learning.covariance import posterior_of
 from ..learning.data import StandardisedData
-from ..learning.objective import Evaluation, SeparableProblem
+from ..learning.objective import SeparableProblem
 from ..learning.premise import Premise
 from ..learning.sampling import is_many, with_sample
 from ..model import TSKModel
@@ -31,7 +31,7 @@ from ..options import EarlyStopping, Huber, policy_of
 from ..search import Start, StructureRequest, effective_weight, report_constant
 from .data import Fitted, SolverRun, ValidatedData
 from .freezing import as_given, extrapolation_distance, frozen_model
-from .robust import huber_weights, reweighted, robust_start, without_outliers, without_weight
+from .robust import huber_weights, reweighted, robust_start, silenced, without_outliers
 from .settings import solver_of
 from .watching import Callbacks, Printer, ValidationLoss, hold_out, watch_all
 
@@ -97,18 +97,13 @@ class _Fit:
             held=held_in_search(data.constraints),
         )
 
-    def model(self, start: Start, evaluation: Evaluation) -> tuple[TSKModel, list[dict]]:
-        """What was found on the rows as they are now, as a model, and its redundant rules."""
-        model, redundant = frozen_model(self.data, self.rows, self.request, start, evaluation)
-        return model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds)), redundant
-
     def start(self, rows: StandardisedData) -> Start:
         """Where a run begins: rules, weights of the penalty, and the premises so far."""
         start = self.request.start(rows.sample or rows)
         if rows.sample is not None:
             start = self.request.for_all(start, rows.sample, rows)
         if not self.solver.goes_on_from_tuning:
-            # Nor do descents keep slopes in common: every rule has its own.
+            # Descents begin afresh, and with slopes of its own for every rule.
             penalty = replace(start.penalty, common=(), absent=())
             start = replace(start, displacement=None, penalty=penalty)
         if self.printer is not None:
@@ -120,7 +115,7 @@ class _Fit:
         if rows.sample is None or not isinstance(self.solver, VariableProjection):
             return self._solved(rows, start, self.solver)
         thorough = clone(self.solver).set_params(tol=_THOROUGH * self.solver.tol)
-        # Iterations on a sample are not told.
+        # Who watches counts iterations on all rows.
         found = self._solved(rows.sample, start, thorough, is_watched=False)
         return self._solved(rows, replace(start, displacement=found.displacement), self.solver)
 
@@ -130,7 +125,6 @@ class _Fit:
         problem = SeparableProblem(
             rows.sample or rows,
             start.antecedent,
-            self.estimator.order,
             start.penalty,
             self.map_ordered,
             start.consequent_inputs,
@@ -142,7 +136,8 @@ class _Fit:
             validation = ValidationLoss(self.held_out, start.consequent_inputs, self.stopping)
 
         def tell_callbacks(n_iter, evaluation):
-            return self.callbacks.iteration(lambda: self.model(start, evaluation)[0])
+            now = self.data, self.rows, self.request, start, evaluation
+            return self.callbacks.iteration(lambda: self._answering(frozen_model(*now)[0]))
 
         watchers = [self.printer, self.callbacks and tell_callbacks] if is_watched else []
         displacement = start.displacement
@@ -177,7 +172,7 @@ class _Fit:
         rows, epsilon = self.rows, self.huber.epsilon
         start = self.start(without_outliers(rows, weights))
         # Those far off are not yet known for what they are: no rule is to go and meet them.
-        run = self.run(reweighted(rows, without_weight(weights)), start)
+        run = self.run(reweighted(rows, silenced(weights)), start)
         for _ in range(_MOST_TURNS):
             before = weights
             weights = huber_weights(run.problem, run.evaluation, epsilon, rows.weights)
@@ -205,8 +200,12 @@ class _Fit:
             ConvergenceWarning,
         )
 
+    def _answering(self, model):
+        """The model with the policy out of bounds that was asked for."""
+        return model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
+
     def frozen(self, run: SolverRun, weights: np.ndarray | None) -> Fitted:
-        """The model of a run, with its posterior and the range it may be followed to.
+        """The model of a run, its posterior, and how far its tangent may be followed.
 
         ``weights`` are those of Huber's loss.
         """
@@ -215,17 +214,18 @@ class _Fit:
         learnt = run.premise if self.solver.moves_premises else None
         n_rows = effective_weight(rows)
         if weights is not None:
-            # As many as of copies of the rows, each with the weight by Huber's loss.
+            # Kish's effective number of rows, by what Huber's loss leaves of the weight of each.
             share, square = (np.average(weights**k, weights=rows.weights) for k in (1, 2))
             n_rows *= share**2 / square
         posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
-        model, redundant = self.model(run.start, run.evaluation)
+        model, redundant = frozen_model(self.data, rows, self.request, run.start, run.evaluation)
         assert model.support is not None
         marginals = input_marginals(rows, run.evaluation.antecedent)
         support = replace(model.support, marginals=marginals)
         model = replace(model, posterior=posterior, support=support)
-        model = replace(model, rows_extrapolation=extrapolation_distance(model, rows))
-        model = model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
+        told = rows if weights is None else reweighted(rows, weights)
+        distance = extrapolation_distance(model, told)
+        model = self._answering(replace(model, rows_extrapolation=distance))
         if weights is not None:
             every = np.full(len(self.data.X), np.nan)
             every[self.trained_on] = weights
@@ -233,7 +233,7 @@ class _Fit:
         return Fitted(model, run.result, run.start, redundant, weights, run.validation_losses)
 
     def constrained(self, fitted, run, weights):
-        """A model next to it that keeps what is known, its result, and a report."""
+        """The same with the nearest consequents that keep what is known, and a report."""
         evaluation, constraints = run.evaluation, self.data.constraints
         if evaluation.normal is None:
             # Found by descent: the consequents are solved for first.

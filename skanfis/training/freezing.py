@@ -33,7 +33,8 @@ from .pruning import redundant_rules
 _DISTANCES = (MAX_EXTRAPOLATION, 1.0, 2.0, 5.0, 20.0, FARTHEST)
 # Less of the squared error is more than chance: with a half in place of a quarter, one fit in
 # twenty is 4 % worse on rows beyond the range, with a quarter none.
-_DECISIVE, _QUARTILE = 0.25, 0.25
+_DECISIVE = 0.25
+_QUARTILE = 0.25  # at which the box is taken to end
 # More rows tell nothing new.
 _MOST_ROWS = 2000
 

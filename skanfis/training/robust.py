@@ -74,7 +74,8 @@ def robust_start(rows):
     weights = np.maximum(np.round(weights, _DIGITS), 10.0**-_DIGITS)
     if (weights == 1.0).all():
         return rows, weights
-    targets = column_statistics(rows.y, reweighted(rows, weights**2).sample_weight)
+    # A square with the square of its weight is at most that of a row at the ten deviations.
+    targets = column_statistics(rows.y, rows.weights * weights**2)
     return replace(rows, targets=targets), weights
 
 
@@ -115,6 +116,6 @@ def without_outliers(rows, weights):
     return rows.part(kept) if 2.0 * rows.weights[kept].sum() >= rows.weights.sum() else rows
 
 
-def without_weight(weights):
-    """The weights with those of rows that have less than half next to nothing."""
+def silenced(weights):
+    """The weights, but next to nothing for rows that have less than half of theirs."""
     return np.where(weights < _OUTLIER, np.finfo(float).eps, weights)

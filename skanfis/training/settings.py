@@ -27,9 +27,9 @@ def given_weights(estimator):
 
 def structure_request(estimator, names, sample_weight=None):
     """What training starts from, with all names of columns and families resolved."""
-    start = _imported(estimator, names, sample_weight)
+    partition = _partition(estimator, names, sample_weight)
     is_default = isinstance(estimator.mf, str) and estimator.mf == "gaussian"
-    if isinstance(start, str) and start == "tree" and not is_default:
+    if isinstance(partition, str) and partition == "tree" and not is_default:
         raise ValueError(
             f"mf={estimator.mf!r} means nothing to partition='tree', whose rules are sides of "
             "cuts: leave mf at 'gaussian', its default, or use another partition."
@@ -44,7 +44,7 @@ def structure_request(estimator, names, sample_weight=None):
     state = estimator.random_state
     return StructureRequest(
         n_mfs=estimator.n_mfs,
-        partition=start,
+        partition=partition,
         families=membership_families(estimator.mf, names),
         order=estimator.order,
         premise_inputs=feature_indices(estimator.premise_features, names, "premise_features"),
@@ -58,7 +58,7 @@ def structure_request(estimator, names, sample_weight=None):
     )
 
 
-def _imported(estimator, names, sample_weight):
+def _partition(estimator, names, sample_weight):
     """``partition``, with the model in place of the estimator that holds it."""
     given = estimator.partition
     if isinstance(given, type):

@@ -92,6 +92,7 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
     what = f"{rows.n_rows} rows"
     groups = rows.groups
     if groups is None:
+        # By the inputs alone, wherever their columns stand.
         groups = rows.numbers(lambda Z, _: place_in_sample(Z, Z[:0]))
     else:
         what += f" in {np.unique(groups).size} groups"

@@ -63,7 +63,7 @@ def test_gradient_and_gauss_newton_by_cuts_and_widths(agreement, order, n_output
     rows = oracles.bumpy_rows(rng, 250, 2, n_outputs, weighted=True)
     start = tree(5, inputs=(0, 1))
     penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-2)
-    problem = SeparableProblem(rows, start, order, penalty)
+    problem = SeparableProblem(rows, start, penalty, consequent_inputs=np.arange(2 * order))
     dense = oracles.DenseProblem(rows, start, order, penalty)
     premise = Premise.of(start, *oracles.box(rows))
     assert premise.size == 8

@@ -55,7 +55,8 @@ def problem_of(antecedent, rng, order=1, n_inputs=2, alpha=1e-3):
     X = rng.uniform(-1.5, 1.5, (40, n_inputs)) * [1.0, 20.0] + [0.0, 500.0]
     y = rng.normal(size=(40, 1)) * 7.0 + 30.0
     rows = StandardisedData.of(X, y, None)
-    return SeparableProblem(rows, antecedent, order, Penalty(alpha=alpha, slope=alpha))
+    penalty, inputs = Penalty(alpha=alpha, slope=alpha), np.arange(order * n_inputs)
+    return SeparableProblem(rows, antecedent, penalty, consequent_inputs=inputs)
 
 
 def in_order(problem, evaluation, order):
@@ -71,7 +72,7 @@ def kept(problem, evaluation, order):
     """A frozen model whose rules are in order."""
     inputs, targets = problem.rows.inputs, problem.rows.targets
     held = problem.local.to_global(in_order(problem, evaluation, order)[:, None])
-    coefficients = in_user_units(held, inputs, targets, np.arange(2), problem.order)
+    coefficients = in_user_units(held, inputs, targets, np.arange(2), int(problem.n_basis > 1))
     antecedent = evaluation.antecedent.change_units(inputs.offset, inputs.scale)
     return TSKModel(
         antecedent=antecedent,

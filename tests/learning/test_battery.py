@@ -39,7 +39,7 @@ class Recording:
 
 
 def solve(name, rows, premise, alpha=1e-8, **settings):
-    problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=alpha, slope=alpha))
+    problem = SeparableProblem(rows, premise.antecedent, Penalty(alpha=alpha, slope=alpha))
     solver = SOLVERS[name]()
     own = {key: settings.pop(key) for key in ("tol", "step_size") if key in settings}
     if "tol" in solver.get_params():
@@ -66,7 +66,7 @@ def test_at_the_truth_there_is_nothing_to_gain(name, kind):
 @every_solver
 def test_loss_curve_begins_at_the_start(name, rng):
     rows, premise = noisy()
-    problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=1e-8, slope=1e-8))
+    problem = SeparableProblem(rows, premise.antecedent, Penalty(alpha=1e-8, slope=1e-8))
     for start in (None, 0.1 * rng.normal(size=premise.size)):
         result = solve(name, rows, premise, start=start)
         at = np.zeros(premise.size) if start is None else start

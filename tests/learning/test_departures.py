@@ -31,7 +31,7 @@ def test_cost_and_solution_with_a_pull_for_every_part_are_those_of_the_dense_pro
     antecedent, used = build(rng), np.array(inputs, dtype=int)
     rows = oracles.bumpy_rows(rng, 80, 3, 2, True)
     plain = Penalty(agreement=0.01, alpha=0.02, slope=0.1)
-    problem = SeparableProblem(rows, antecedent, order, plain, consequent_inputs=used)
+    problem = SeparableProblem(rows, antecedent, plain, consequent_inputs=used)
     components = problem.common_line.components
     pulls = {one: 10.0 ** rng.uniform(-2.0, 2.0) for one in components}
     slope_pulls = {j: 10.0 ** rng.uniform(-2.0, 2.0) for j in inputs}

@@ -103,7 +103,7 @@ def two_bells(rows, alpha=0.0):
     low, high = oracles.box(rows)
     n_inputs = low.size
     antecedent = oracles.even_grid([Bell] * n_inputs, [2] * n_inputs, low, high, 0.5)
-    problem = SeparableProblem(rows, antecedent, 1, Penalty(alpha=alpha, slope=alpha))
+    problem = SeparableProblem(rows, antecedent, Penalty(alpha=alpha, slope=alpha))
     return problem, Premise.of(antecedent, low, high, is_unbounded=True)
 
 
@@ -195,7 +195,7 @@ class TestEnd:
     def solve(self, max_iter, **settings):
         rows, premise, *_ = planted("grid", 0, displaced=0.5, noise=0.1)
         penalty = Penalty(alpha=1e-8, slope=1e-8)
-        problem = SeparableProblem(rows, premise.antecedent, 1, penalty)
+        problem = SeparableProblem(rows, premise.antecedent, penalty)
         return Hybrid(tol=0.0, **settings).solve(problem, premise, max_iter=max_iter)
 
     def test_error_goal_ends_it(self):
@@ -220,7 +220,7 @@ class TestEnd:
 def test_step_is_along_the_gradient_by_natural_premises_and_consequents():
     rows, premise, *_ = planted("bells", 0, displaced=0.5, noise=0.1, n_outputs=2)
     antecedent, penalty = premise.antecedent, Penalty(agreement=0.1, alpha=1e-4, slope=1e-3)
-    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    problem = SeparableProblem(rows, antecedent, penalty)
     dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
     seen = []
     solver = GradientDescent(tol=0.0)

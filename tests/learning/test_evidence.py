@@ -52,9 +52,14 @@ def laplace_at(problem, evaluation, penalty, **premises):
     )
 
 
+def problem_of(rows, antecedent, order):
+    inputs = np.arange(order * rows.X.shape[1])
+    return SeparableProblem(rows, antecedent, FIRST, consequent_inputs=inputs)
+
+
 def posterior(rows, antecedent, order, penalty):
     """The posterior at the start, from an evaluation at weights of its own."""
-    problem = SeparableProblem(rows, antecedent, order, FIRST)
+    problem = problem_of(rows, antecedent, order)
     return laplace_at(problem, problem.evaluate(antecedent.parameters), penalty)
 
 
@@ -147,7 +152,7 @@ class TestAtGivenPremises:
         """To the last constant, so that rule bases of any size and order can be compared."""
         n_inputs, build = KINDS[kind]
         rows, antecedent = oracles.bumpy_rows(rng, 20, n_inputs, n_outputs), build(rng)
-        line = SeparableProblem(rows, antecedent, order, FIRST).common_line
+        line = problem_of(rows, antecedent, order).common_line
         for plain in PENALTIES:
             # And with a pull for every component.
             for penalty in (plain, with_pulls(plain, line, rng)):
@@ -176,7 +181,7 @@ def at_fixed_premises(seed):
         antecedent = oracles.random_grid(g, [Gaussian] * 2, [2, 2 + seed % 2])
     else:
         antecedent = oracles.random_scattered(g, Gaussian, 5, [0, 1])
-    problem = SeparableProblem(rows, antecedent, 0 if seed % 7 == 0 else 1, FIRST)
+    problem = problem_of(rows, antecedent, 0 if seed % 7 == 0 else 1)
     evaluation = problem.evaluate(antecedent.parameters)
 
     def at(penalty, **premises):
@@ -258,7 +263,7 @@ STEPS = np.array([-0.01, 0.0, 0.01])
 @pytest.mark.parametrize("ratio", [0.55, 0.7])
 def test_logarithms_that_shrink_by_one_factor_are_taken_to_their_limit(ratio):
     rows = oracles.bumpy_rows(np.random.default_rng(0), 20, 1)
-    line = SeparableProblem(rows, ONE_RULE, 1, FIRST).common_line
+    line = SeparableProblem(rows, ONE_RULE, FIRST).common_line
     agreements = 0.05 * 0.02 ** (ratio ** np.arange(3))
     three = [Penalty(agreement=float(one), alpha=1.0, slope=1.0) for one in agreements]
     found = extrapolated(line, *three, ("agreement", "alpha"), SMALLEST)
@@ -282,7 +287,7 @@ class OneWidth:
 
     def laplace(self, penalty):
         """By the module: with the curvature of Gauss and Newton, and with the cost's own."""
-        problem = SeparableProblem(self.rows, self.antecedent, 1, penalty)
+        problem = SeparableProblem(self.rows, self.antecedent, penalty)
 
         def cost(x):
             evaluation = problem.evaluate(self.premise.parameters(x * self.unit))

@@ -72,8 +72,9 @@ class Case:
 
     def __init__(self, antecedent, order, rows, penalty=PLAIN, **settings):
         self.rows, self.order, self.penalty = rows, order, penalty
-        self.problem = SeparableProblem(rows, antecedent, order, penalty, **settings)
         consequent_inputs = settings.get("consequent_inputs")
+        settings.setdefault("consequent_inputs", np.arange(order * rows.X.shape[1]))
+        self.problem = SeparableProblem(rows, antecedent, penalty, **settings)
         self.dense = oracles.DenseProblem(rows, antecedent, order, penalty, consequent_inputs)
         g = np.random.default_rng(5)
         self.point = antecedent.parameters + 0.2 * g.normal(size=antecedent.parameters.size)
@@ -213,7 +214,7 @@ def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
     y = (y - y.mean()) / y.std()
     noise = 1e-9 * rng.normal(size=(400, 1))
     data = StandardisedData.of(X, y + noise)
-    problem = SeparableProblem(data, antecedent, 1, Penalty())
+    problem = SeparableProblem(data, antecedent, Penalty())
     blind = problem.evaluate(antecedent.parameters)
     seeing = problem.evaluate(antecedent.parameters, blind.coefficients)
     residual = noise - phi @ np.linalg.lstsq(phi, noise, rcond=None)[0]
@@ -228,7 +229,7 @@ def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs
     rows = oracles.bumpy_rows(rng, 40, 2, n_outputs, weighted)
     penalty = Penalty(agreement=0.3, alpha=1e-2, slope=0.1)
     antecedent = oracles.random_grid(rng, [Gaussian] * 2, [2, 2])
-    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    problem = SeparableProblem(rows, antecedent, penalty)
     evaluation = problem.evaluate(antecedent.parameters)
     dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
     phi, total = dense.design(antecedent.parameters), 0.0

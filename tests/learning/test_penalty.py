@@ -23,7 +23,8 @@ def dense_and_solved(kind, order, penalty, n_outputs=2):
     g = np.random.default_rng(3)
     antecedent = BUILD[kind](g)
     rows = oracles.bumpy_rows(g, 200, 2, n_outputs, weighted=True)
-    found = SeparableProblem(rows, antecedent, order, penalty).evaluate(antecedent.parameters)
+    problem = SeparableProblem(rows, antecedent, penalty, consequent_inputs=np.arange(2 * order))
+    found = problem.evaluate(antecedent.parameters)
     dense = oracles.DenseProblem(rows, antecedent, order, penalty)
     return dense, found.coefficients.reshape(dense.n_rules, len(dense.basis), -1)
 

@@ -38,7 +38,7 @@ def planted(rng, n_rows=600, noise=0.1):
 
 def posterior_of(X, y, antecedent=TREE, penalty=PENALTY):
     rows = StandardisedData.of(X, y.reshape(len(X), -1))
-    problem = SeparableProblem(rows, antecedent, 1, penalty)
+    problem = SeparableProblem(rows, antecedent, penalty)
     evaluation = problem.evaluate(antecedent.parameters)
     return problem, evaluation, laplace_at(problem, evaluation, penalty)
 
@@ -153,4 +153,4 @@ class TestFit:
         residual = (y - model.fit(X, y).predict(X)) / y.std()
         # Descents keep the point of the least cost, which need not be the last.
         assert np.isclose(np.mean(residual**2), model.loss_curve_, rtol=1e-9, atol=0.0).any()
-        assert model.model_.common_slopes.any() == (solver == "varpro")
+        assert model.model_.common_slopes.any() == (solver in ("varpro", "lse"))

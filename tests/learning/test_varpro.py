@@ -204,7 +204,7 @@ def assert_is_as_planted(rows, premise, truth, beta, evaluation):
 
 
 def solve(rows, premise, alpha=1e-8, **settings):
-    problem = SeparableProblem(rows, premise.antecedent, 1, Penalty(alpha=alpha, slope=alpha))
+    problem = SeparableProblem(rows, premise.antecedent, Penalty(alpha=alpha, slope=alpha))
     return problem, varpro(problem, premise, **({"max_iter": 200, "tol": 1e-6} | settings))
 
 

@@ -12,8 +12,9 @@ from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, tuning
+from skanfis.search import tuning
 from skanfis.search.candidates import Candidate, TermScores, rule_base
+from skanfis.search.grid import Spacing
 from skanfis.search.sample import search_sample
 
 pytestmark = pytest.mark.theory
@@ -25,7 +26,7 @@ def sample_of(X, y, weight=None):
 
 def solved(rows, antecedent):
     """Rules with their consequents, before their premises move."""
-    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     premise = Premise.of(antecedent, *rows.inputs.box)
     return tuning.tune(problem, premise, ["slope"], rows.sample_weight.sum(), turns=0)
 

@@ -9,7 +9,7 @@ from skanfis import ANFISRegressor
 from skanfis.antecedent import ScatteredAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
-from skanfis.search import clustered_antecedent
+from skanfis.search.clusters import clustered_antecedent
 
 from .. import oracles
 

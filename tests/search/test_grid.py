@@ -6,8 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import Gaussian, Triangular
-from skanfis.search import Spacing, grid_antecedent
-from skanfis.search.grid import _EDGE, OVERLAP
+from skanfis.search.grid import _EDGE, OVERLAP, Spacing, grid_antecedent
 
 N_ROWS = 1001
 

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.learning.data import StandardisedData
-from skanfis.search.judging import dealt_rows, splits
+from skanfis.search.judging import dealt_rows, judging_folds
 
 
 def measured(rng, n_rows=60):
@@ -69,7 +69,7 @@ class TestSplits:
     @pytest.mark.parametrize("n_rows", [2, 4, 37, 150, 400, 999, 1000, 3001])
     def test_each_row_is_left_out_once_or_two_hundred_are(self, rng, n_rows):
         rows = dealt(*measured(rng, n_rows))
-        folds = splits(rows)
+        folds = judging_folds(rows)
         parts = [left_out(rows, grow) for grow, _ in folds]
         left = np.concatenate(parts)
         assert np.unique(left).size == left.size >= min(n_rows, 200)
@@ -82,7 +82,7 @@ class TestSplits:
     def test_groups_are_left_out_whole(self, rng, n_groups, n_folds):
         X, y = measured(rng, 3000)
         rows = dealt(X, y, groups=rng.integers(0, n_groups, 3000))
-        folds = splits(rows)
+        folds = judging_folds(rows)
         assert len(folds) == n_folds
         left = [left_out(rows, grow) for grow, _ in folds]
         assert_array_equal(np.sort(np.concatenate(left)), np.arange(3000))
@@ -95,13 +95,15 @@ class TestSplits:
         X, y = measured(rng, 500)
         X[:, 0] = groups = np.arange(500) % 5
         rows = dealt(X, y, groups=groups)
-        folds = splits(rows)
+        folds = judging_folds(rows)
         assert len(folds) == 3
         assert_array_equal(np.unique(rows.groups[np.concatenate([j for _, j in folds])]), [1, 2, 3])
         # Of three runs most rows are at an end: the search cannot do without.
         rows = dealt(X[groups < 3], y[groups < 3], groups=groups[groups < 3])
-        assert_array_equal(np.sort(np.concatenate([j for _, j in splits(rows)])), np.arange(300))
+        assert_array_equal(
+            np.sort(np.concatenate([j for _, j in judging_folds(rows)])), np.arange(300)
+        )
 
     def test_one_row_judges_itself(self, rng):
-        (fold,) = splits(dealt(*measured(rng)).part([0]))
+        (fold,) = judging_folds(dealt(*measured(rng)).part([0]))
         assert_array_equal(fold, [[0], [0]])

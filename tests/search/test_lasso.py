@@ -121,3 +121,9 @@ def test_a_column_that_has_not_yet_changed_may_gain_a_slope(rng):
         model = ANFISRegressor().partial_fit(X[:60], y[:60])
     model.partial_fit(X[60:], y[60:])
     assert_allclose(model.model_.coefficients[0, 1:3, 0], 1.0, atol=0.05)
+
+
+def test_constants_have_no_slopes_to_choose(rng):
+    """As few rows as there are folds."""
+    model = ANFISRegressor(order=0).fit(rng.normal(size=(5, 3)), np.arange(5.0))
+    assert model.model_.order == 0

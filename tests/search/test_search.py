@@ -13,8 +13,11 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_three_input
 from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
+from skanfis.search import tuning
 from skanfis.search.candidates import KINDS
-from skanfis.search.judging import dealt_rows, splits
+from skanfis.search.judging import dealt_rows, judging_folds
+from skanfis.search.search import StructureSearch
+from skanfis.training.settings import structure_request
 
 pytestmark = pytest.mark.theory
 
@@ -232,6 +235,16 @@ def test_a_product_beside_its_factors_is_no_reason_to_refuse_rules():
     assert np.sqrt(np.mean(errors**2)) < 1.5 * noise
 
 
+def test_every_row_is_searched_where_one_group_alone_is_judged(rng):
+    """A run at rest lies in the range of a ramp; the ramp is beyond that of the run at rest."""
+    X = inputs(rng, 110, 2)
+    X[50:] *= [0.0, 0.5]
+    rows = StandardisedData.of(X, X[:, :1], groups=np.repeat([0.0, 1.0], [50, 60]))
+    search = StructureSearch(rows, structure_request(ANFISRegressor(), ["a", "b"]), 0.05)
+    assert [fold.rows.n_rows for fold in search.folds] == [50]
+    assert search.trials.rows.n_rows == 110
+
+
 # ----------------------------------------------------------------------------- what is said of it
 
 
@@ -250,13 +263,21 @@ def test_expected_error_of_the_linear_model_is_that_of_its_folds(rng, n_groups):
     (told,) = [one for one in model.structures_ if one["structure"] == "one rule"]
     rows = dealt_rows(StandardisedData.of(X, y[:, None], groups=groups))
     Z, t, squares, weights = rows.X, rows.y[:, 0], [], []
-    for grow, rest in splits(rows):
+    for grow, rest in judging_folds(rows):
         plane = LinearRegression().fit(Z[grow], t[grow])
         squares.append((plane.predict(Z[rest]) - t[rest]) ** 2)
         weights.append(grow.size)
     factor = (1.0 + 4.0 / 80.0) / (1.0 + 4.0 / weights[0])
     error = np.sqrt(factor * np.mean(np.concatenate(squares)))
     assert_allclose(told["expected_error"], error, rtol=1e-3)
+
+
+@pytest.mark.parametrize("settings", [{"solver": "lse"}, {"max_iter": 0}])
+def test_where_premises_stay_the_search_moves_none(rng, monkeypatch, settings):
+    """And the model has the slopes of the structure that was judged, no more."""
+    monkeypatch.setattr(tuning, "varpro", None)  # so that no run of it ends well
+    model = ANFISRegressor(**settings).fit(*bumps(rng))
+    assert model.readability_.reading_cost == chosen(model)["reading_cost"]
 
 
 def test_candidates_are_listed_from_the_best(rng):

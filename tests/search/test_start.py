@@ -7,7 +7,8 @@ from numpy.testing import assert_allclose
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, grid_antecedent, start
+from skanfis.search import start
+from skanfis.search.grid import Spacing, grid_antecedent
 from skanfis.search.judging import dealt_rows
 from skanfis.search.trials import Trials
 
@@ -19,7 +20,7 @@ def of_grid(count, truth, rng, noise=0.0, n_rows=300, weights=(), simplicity=0.0
     rows = StandardisedData.of(x, truth(x) + noise * rng.normal(size=x.shape))
     antecedent = grid_antecedent([Gaussian], [count], Spacing(rows))
     plan = plan_of(1, float(n_rows), weights)
-    return rows, start.tuned_start(antecedent, rows, plan, True, simplicity)
+    return rows, start.tuned_start(antecedent, rows, plan, simplicity)
 
 
 def test_terms_have_no_bounds_where_data_are_next_to_exact(rng):

@@ -13,7 +13,7 @@ from skanfis.membership import Gaussian
 from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
-from skanfis.search.trials import _ROWS_EACH, FEWEST_ROWS, Trials
+from skanfis.search.trials import _ROWS_PER_PARAMETER, FEWEST_SEEN, Trials
 from skanfis.training.settings import structure_request
 
 from .. import oracles
@@ -221,12 +221,12 @@ class TestSequences:
 def test_a_candidate_sees_as_many_rows_as_its_parameters_need(rng):
     X, y = surface(rng, 9000, 2)
     trials = trials_of(X, y)
-    few = FEWEST_ROWS
+    few = FEWEST_SEEN
     for n_clusters, n_rows in ((0, few), (3, few), (12, 4000), (20, 8000), (90, 9000)):
         candidate = Candidate((1, 1), n_clusters, (0, 1) if n_clusters else ())
         assert trials.n_parameters(candidate) == max(n_clusters, 1) * 3 + 4 * n_clusters
         rows = trials.rows_for(candidate)
         assert rows.n_rows == n_rows
-        assert n_rows == 9000 or n_rows >= _ROWS_EACH * trials.n_parameters(candidate)
+        assert n_rows == 9000 or n_rows >= _ROWS_PER_PARAMETER * trials.n_parameters(candidate)
         assert_array_equal(rows.X, trials.rows.X[:n_rows])
         assert_array_equal(rows.inputs.box, [rows.X.min(axis=0), rows.X.max(axis=0)])

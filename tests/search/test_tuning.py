@@ -12,14 +12,15 @@ from skanfis.learning.evidence import FREE
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import Spacing, grid_antecedent, tuning
+from skanfis.search import tuning
+from skanfis.search.grid import Spacing, grid_antecedent
 
 
 def problem_of(X, y, count):
     """A problem with so many terms on every input, and its premise."""
     rows, n_inputs = StandardisedData.of(X, y), X.shape[1]
     antecedent = grid_antecedent(n_inputs * [Gaussian], n_inputs * [count], Spacing(rows))
-    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     return problem, Premise.of(antecedent, *rows.inputs.box)
 
 

@@ -86,7 +86,7 @@ def test_gradient_is_that_of_all_rows(agreement, rng):
     rows = with_sample(oracles.bumpy_rows(rng, 600, 2, 2, weighted=True), 150)
     antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 3])
     penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-3)
-    problem = SeparableProblem(rows.sample, antecedent, 1, penalty).on_all(rows)
+    problem = SeparableProblem(rows.sample, antecedent, penalty).on_all(rows)
     found = problem.linearise(problem.evaluate(antecedent.parameters))
     expected = oracles.central_difference(
         lambda theta: problem.evaluate(theta).cost, antecedent.parameters

@@ -390,3 +390,21 @@ def test_a_chunk_without_weight_in_any_form_changes_nothing(premises):
     before = model.predict(X)
     for nothing in (0.0, np.zeros(300), [0] * 300):
         assert np.array_equal(model.partial_fit(X, 1e9 * Y, nothing).predict(X), before)
+
+
+def test_rows_that_differ_by_their_target_alone_are_distinct_in_any_unit(rng):
+    table = np.repeat(rng.uniform(-1.0, 1.0, (12, 2)), 10, axis=0)
+    y = np.sin(3.0 * table[:, 0]) + 0.1 * rng.normal(size=120)
+    premises = quick(2, **GIVEN).fit(table, y)
+    found, small = (chunk(premises).partial_fit(table, y * unit) for unit in (1.0, 1e-20))
+    assert found.alpha_ == small.alpha_
+    np.testing.assert_allclose(small.predict(table) * 1e20, found.predict(table), rtol=LAST_DIGIT)
+
+
+def test_constants_are_learnt_from_the_first_chunk_on():
+    model = quick(3, order=0).partial_fit(X[:200], Y[:200])
+    np.testing.assert_array_equal(
+        model.predict(X), quick(3, order=0).fit(X[:200], Y[:200]).predict(X)
+    )
+    before = np.mean((model.predict(X) - Y) ** 2)
+    assert np.mean((model.partial_fit(X[200:], Y[200:]).predict(X) - Y) ** 2) < before

@@ -96,3 +96,12 @@ def test_what_is_left_has_no_posterior_until_it_is_fitted():
         given.predict(X, return_std=True)
     assert given.readability_.line in str(given.readability_)
     assert ANFISRegressor(partition=left).fit(X, Y).predict(X, return_std=True)[1].min() > 0.0
+
+
+def test_parameters_are_counted_by_the_inputs_that_have_slopes(rng):
+    """Of 36 rules with slopes by one of 60 inputs 72; the model keeps zeros by all others."""
+    X = rng.normal(size=(300, 60))
+    counts = [6, 6] + [1] * 58
+    model = ANFISRegressor(n_mfs=counts, consequent_features=[0], max_iter=0).fit(X, X[:, 0])
+    with pytest.raises(ValueError, match="that lost rules"):
+        model.without_rules([0]).standard_deviation(X)

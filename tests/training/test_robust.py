@@ -9,6 +9,7 @@ from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
 from skanfis.cluster import FuzzyCMeans
+from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.learning import VariableProjection
 from skanfis.options import EarlyStopping, Huber
 from skanfis.training import fit, robust
@@ -155,3 +156,14 @@ def test_of_many_rows_some_tell_the_first_weights(monkeypatch):
     order = np.random.default_rng(0).permutation(len(y))
     again = quick(n_mfs=[3, 1], loss="huber").fit(X[order], y[order])
     assert_allclose(again.predict(X), model.predict(X), rtol=0, atol=1e-9)
+
+
+def test_outliers_do_not_say_how_far_the_tangent_is_followed():
+    g = np.random.default_rng(0)
+    X, is_outlier = g.normal(size=(300, 2)), np.arange(300) % 30 == 0
+    y = X @ [2.0, -1.0] + 0.05 * g.normal(size=300)
+    model = ANFISRegressor(n_mfs=1, loss="huber")
+    for target in (y, y + 30.0 * is_outlier):
+        model.fit(X, target)
+        with pytest.warns(OutOfBoundsWarning):
+            assert_allclose(model.predict([[6.0, -6.0]]), 18.0, atol=0.2)

@@ -64,7 +64,7 @@ def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, conseque
     rows, used = oracles.bumpy_rows(rng, 200, 2, 2, weighted), np.array(consequent_inputs)
     antecedent = oracles.random_grid(rng, [Gaussian, Bell], [3, 2])
     penalty = Penalty(alpha=1e-3, slope=1e-3)
-    problem = SeparableProblem(rows, antecedent, 1, penalty, consequent_inputs=used)
+    problem = SeparableProblem(rows, antecedent, penalty, consequent_inputs=used)
     evaluation = problem.evaluate(antecedent.parameters)
     # On either side of the box of every input, and in it.
     low, high = rows.inputs.minimum, rows.inputs.maximum
