@@ -20,7 +20,7 @@ from ..learning.data import Scale
 from ..learning.objective import Evaluation
 from ..model import TSKModel
 from ..policies import SILENT
-from .certified import cuts_of, spread_points
+from .certified import spread_points, training_box
 from .constraints import Constraints
 from .construction import ONE_RULE, RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from .contradictions import contradicted
@@ -323,7 +323,7 @@ class _ConstrainedFit:
         bound_of = Enclosure(model, one.output, -one.sign).evaluate(one.input)
         until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
         most = int(_MOST_BOXES * self.part)
-        found = largest(bound_of, *ends, 0.0, most, cuts_of(model), until=until)
+        found = largest(bound_of, *ends, 0.0, most, training_box(model), until=until)
         self.n_boxes += found.n_boxes
         return found, until
 

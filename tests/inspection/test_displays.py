@@ -246,6 +246,7 @@ def test_a_title_names_a_few_of_the_inputs_that_are_held():
     held = {f"x{k}": 0.5 * k for k in range(9)}
     assert title_of(dict(list(held.items())[:2]), "pale") == "x0 = 0; x1 = 0.5; pale"
     assert title_of(held) == "x0 = 0; x1 = 0.5; x2 = 1; x3 = 1.5; 5 more inputs held"
+    assert title_of(dict(list(held.items())[:5])).endswith("x3 = 1.5; 1 more input held")
 
 
 @pytest.mark.parametrize(
