@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Boxes that are split at once; where there are fewer than the latter, they are split on, unseen.
+# Most boxes that are split in one round; and fewest that are evaluated in one, for arrays to be
+# worth their overhead: fewer are halved again first.
 _BATCH, _FEWEST = 1024, 64
 
 
@@ -37,7 +38,7 @@ class _Boxes(NamedTuple):
 
     @property
     def is_point(self):
-        """Which cannot be split any more."""
+        """Which boxes cannot be split any more."""
         least = 4.0 * np.spacing(np.maximum(np.abs(self.low), np.abs(self.high)))
         return (self.high - self.low <= least).all(axis=0)
 
@@ -71,8 +72,9 @@ def largest(
 ) -> Found:
     """Enclose the largest value that a function takes on a box.
 
-    ``evaluate`` is as ``Enclosure.values``. Bound and value may be ``tolerance`` apart, or both on
-    one side of ``until``; boxes are cut at ``cuts`` first. ``first`` is a point and its value.
+    ``evaluate`` is as ``Enclosure.values``. The search ends when bound and value are ``tolerance``
+    apart, or on one side of ``until``. Boxes are cut at ``cuts`` first. ``first`` is a point that
+    is known, and its value.
     """
     where, best = (low, -np.inf) if first is None else first
     lows, highs = low[:, None].astype(float), high[:, None].astype(float)

@@ -110,7 +110,7 @@ def test_what_is_in_order_rises(kind):
         assert (signs * slopes >= -1e-9).all()
         free = evaluation.coefficients.reshape(antecedent.n_rules, -1)
         ends = [end[: free.shape[1] - 1] for end in problem.rows.inputs.box]
-        falls += (held.left(free, *ends)[0] < 0.0).any()
+        falls += (held.margins(free, *ends)[0] < 0.0).any()
         for j in np.flatnonzero(signs):
             slope = partial(Enclosure(model, 0, -float(signs[j])).slope, j=int(j))
             until = 1e-9 * scale / model.spread[j]
