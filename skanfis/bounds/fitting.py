@@ -88,9 +88,9 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         names = ", ".join(one.name for one in fit.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
-        way = "one line" if ordered.is_line else "rules in order"
+        end = "one line" if ordered.is_line else "rules in order"
         warn_user(
-            f"To be certain of {names}, the rules were drawn {drawn:.0%} of the way to {way}, which "
+            f"To be certain of {names}, the rules were drawn {drawn:.0%} of the way to {end}: that "
             f"raises the training error by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or leave a "
             "constraint out.",
             ConstraintWarning,
