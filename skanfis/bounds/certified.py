@@ -20,8 +20,7 @@ from .terms import is_known, size
 
 # Points that are tried first: so many all over the box, and its corners if inputs are this few.
 _POINTS, _MOST_INPUTS_OF_CORNERS = 1024, 8
-# Beyond what the policy follows all slopes are zero: a strip this wide, as a part of the range,
-# stands for all that lies there.
+# Part of a range: a strip so wide stands for all beyond the policy's reach, where slopes are zero.
 _STRIP = 1e-3
 
 
@@ -92,8 +91,7 @@ def bounds(
 ) -> Bounds:
     """Enclose every prediction of a model over a box of inputs, provably.
 
-    The bounds hold for predictions as they are computed, rounding included; :doc:`/bounds` has the
-    proof.
+    The bounds hold for predictions as computed, rounding included; :doc:`/bounds` has the proof.
 
     Parameters
     ----------
@@ -101,8 +99,7 @@ def bounds(
         An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search around one.
     box : array-like of shape (n_inputs, 2) or dict, default=None
         Low and high of every input, in the units of X, or {name: (low, high)}; ends may be
-        infinite. Inputs that are not named have the range of the training data; so have all of
-        None.
+        infinite. Inputs not named, or all with None, have the range of the training data.
     tol : float, default=0.01
         How far bounds and values that were found may be apart, relative to the output's range.
     max_boxes : int, default=200_000

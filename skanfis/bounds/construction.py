@@ -59,10 +59,7 @@ class RuleOrder:
 
     @classmethod
     def of(cls, antecedent: Antecedent, signs, limits, slope_inputs):
-        """The order that signs and limits ask for; None where none is known that is enough.
-
-        ``slope_inputs`` are the inputs by which consequents have slopes.
-        """
+        """None where no order is known that is enough; consequents slope by ``slope_inputs``."""
         every = np.arange(antecedent.n_rules)
         nothing = np.full(every.size, -1)
         found = [_Pairs(every[:0], every[:0])]
@@ -90,8 +87,7 @@ class RuleOrder:
     def margins(self, rules, low, high):
         """By how much every inequality holds for rules a + b x on a box, and the rounding of that.
 
-        Then the inequality itself where it holds by least: factors of [a, b] of the rule above, and
-        of that below.
+        Then, where it holds by least, its factors of [a, b] of the rule above, and of that below.
         """
         pairs, columns = self.pairs, self.pairs.column
         rules = np.vstack([rules, np.zeros((1, rules.shape[1]))])

@@ -157,12 +157,9 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
         antecedent, to_rules = ONE_RULE, np.eye(problem.n_basis)
         equal = equal @ to_local
     local = np.empty_like(normal.coefficients)
+    limits = (np.stack([constraints.lower, constraints.upper]) - targets.offset) / targets.scale
     for k, signs in enumerate(constraints.signs):
-        limits = [
-            (limit[k] - targets.offset[k]) / targets.scale[k]
-            for limit in (constraints.lower, constraints.upper)
-        ]
-        order = RuleOrder.of(antecedent, signs, limits, slopes)
+        order = RuleOrder.of(antecedent, signs, limits[:, k], slopes)
         if order is None:
             raise InfeasibleError(False)
         local[:, k] = to_local @ nearest_in_order(
@@ -258,10 +255,7 @@ class _ConstrainedFit:
         return Kept(self.free, self._ended(local), coefficients, points)
 
     def drawn(self, ordered):
-        """The proven consequents nearest to the free fit, and how far they were drawn from it.
-
-        The way leads from consequents that keep all at points (0) to those in order (1).
-        """
+        """The nearest that is proven on the way from near the free fit, 0, to those in order, 1."""
         local, drawn = ordered.local, 1.0
         if not all(is_known(group.family) for group in self.free.antecedent.groups):
             return local, drawn

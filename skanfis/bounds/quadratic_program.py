@@ -64,8 +64,7 @@ def nearest_by_exchange(factor, start, equal, equal_to, at_least, least, violate
         more, least_of_more = violated(solved)
         if not len(more):
             return solved
-        # Those that do not hold it back are dropped, and found again if they are needed again. The
-        # distance grows in every round: it does not go in circles.
+        # Those that do not hold u back may be needed again: the distance grows, so it ends.
         kept = holds_back | (np.arange(len(least)) < n_given)
         at_least = np.vstack([at_least[kept], more])
         least = np.append(least[kept], least_of_more)

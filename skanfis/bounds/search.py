@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Most boxes that are split in one round; and fewest that are evaluated in one, for arrays to be
-# worth their overhead: fewer are halved again first.
+# Most boxes that are split in one round; fewest that are worth evaluating: fewer are split again.
 _BATCH, _FEWEST = 1024, 64
 
 
@@ -73,8 +72,8 @@ def largest(
     """Enclose the largest value that a function takes on a box.
 
     ``evaluate`` is as ``Enclosure.values``. The search ends when bound and value are ``tolerance``
-    apart, or on one side of ``until``. Boxes are cut at ``cuts`` first. ``first`` is a point that
-    is known, and its value.
+    apart, or on one side of ``until``. Boxes are cut at ``cuts`` first; ``first`` is a point, and
+    its value.
     """
     where, best = (low, -np.inf) if first is None else first
     lows, highs = low[:, None].astype(float), high[:, None].astype(float)

@@ -214,9 +214,7 @@ def _columns_after(label, step, columns):
 def _imputed(label, imputer, columns):
     """The columns, with what stands for missing values."""
     if imputer.add_indicator or not pd.isna(imputer.missing_values):
-        _refuse(
-            label, imputer, "only add_indicator=False and missing_values=nan leave numbers alone"
-        )
+        _refuse(label, imputer, "it needs add_indicator=False and missing_values=nan")
     if pd.isna(imputer.statistics_).any():
         _refuse(label, imputer, "it drops a column that has no values")
 

@@ -1,8 +1,8 @@
 r"""How far rows that a model has not seen lie from its predictions, and quantiles of that.
 
-Each of K units (rows, or groups of rows), and a new one, has the mass 1 / (K + 1). A group's mass is
-shared by its rows; the new unit's score counts as infinite. Intervals of a score cover with
-probability c if the rows with this score or less have the mass c.
+Each of K units (rows, or groups of rows), and a new one, has the mass 1 / (K + 1). The rows of a
+group share its mass; the new unit's score counts as infinite. Intervals of a score cover with
+probability c if the rows of this score or less have the mass c.
 """
 
 import inspect
