@@ -158,7 +158,9 @@ def _summary(results):
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
         _box(calibration, "It may be used from"),
-        Block("pictures", [results.pictures[_ON_FIRST_PAGE]]),
+        Block(
+            "pictures", [each for name, each in results.pictures.items() if name == _ON_FIRST_PAGE]
+        ),
     ]
     return "Summary", blocks
 

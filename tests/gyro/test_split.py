@@ -137,9 +137,9 @@ def test_asked_for_or_for_a_compensator_that_does_not_see_the_output(levels_and_
     ("kind", "message"),
     [
         ("device", "cannot hold out by device: the log has no column"),
-        ("run", r"cannot hold out by run: the log has 2 run\(s\), and at least 3"),
+        ("run", r"cannot hold out by run: the log has 2 runs; at least 3"),
         ("level", "cannot hold out by level: the log has no rate levels"),
-        ("auto", r"could not be checked: the log has 2 run\(s\), 0 rate levels"),
+        ("auto", r"could not be checked: the log has 2 runs, 0 rate levels"),
         ("auto", r"No column of the time was found, .* --columns time=NAME"),
     ],
 )

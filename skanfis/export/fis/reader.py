@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...model import TSKModel
-from ...naming import distinct as distinct  # the application may take it from export alone
+from ...naming import distinct
 from ..json_reader import rule_base
 from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
 from .functions import theta_of
