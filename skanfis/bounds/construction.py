@@ -6,10 +6,9 @@ for every such pair, with values f, slopes b by x_j and u = (x_j - middle) / wid
 
     f_above - f_below + width ((o + c e^u) b_above + (o + c e^-u) b_below) >= 0
 
-all over a box: linear in the consequents at every point, and least at a corner of all inputs but
-x_j, along which it is convex. docs/bounds.rst says why, which rules of a tree, of a grid and of
-scattered rules are pairs, and their middle, width, o and c. Of one line for all rules there are
-none.
+all over a box. This is linear in the consequents at every point, and least at a corner of all
+inputs but x_j, along which it is convex. docs/bounds.rst says why, which rules of a tree, a grid
+and scattered rules are pairs, and their middle, width, o and c. One line for all rules has none.
 
 To fall is the same with all signs reversed. A prediction is within limits where every rule is.
 """

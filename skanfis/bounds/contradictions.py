@@ -21,8 +21,7 @@ def contradicted(free, held, inequalities, fixed, rows, raised):
     """A sentence for every output whose constraints the data contradict.
 
     ``free`` and ``held`` are models in the user's units, ``fixed`` the fixed points and the outputs
-    there, ``rows`` X, y and their numbers, and ``raised`` the squared error of training over the
-    free fit's.
+    there, ``rows`` X, y and their numbers, ``raised`` the ratio of squared training errors.
     """
     if free.posterior is None or raised <= _WORTH_SAYING:
         return

@@ -1,9 +1,8 @@
 """Constraints on the outputs of a fit, kept for certain.
 
-Rules in order (``construction``) keep them by their own inequalities. Where that costs more than
-2 % of the error, the consequents are those on the way from there to the free fit that are as near
-to it as branch and bound can prove. Where no order is known, or none holds, the way begins at the
-best line for all rules.
+Rules in order (``construction``) keep them by inequalities of their own; where no order is known,
+or none holds, the best line for all rules does. If that raises the error by more than 2 %, the fit
+goes back towards the free one as far as branch and bound can prove that all are kept.
 """
 
 from contextlib import suppress

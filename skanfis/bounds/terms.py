@@ -2,12 +2,11 @@ r"""What terms can be on a box, for every family; shares of strengths, and means
 
 log mu rises up to the term's place and falls from there on. Slopes of log-concave families
 (Gaussians, sigmoids) fall; those of bells and of flanks with a foot are looked at piece by piece.
-Ranges are taken over a box wider by what rounding x and the term's numbers may amount to, and are
-then widened by rounding themselves: they hold of log mu as it is, and as it is computed.
+The box is first widened by what rounding x and the term's numbers may amount to, then the ranges by
+their own rounding: they hold of log mu as it is, and as it is computed.
 
 Strengths are products of shares, one of each factor: a softmax of sums l_k of log mu, enclosed from
-the ranges of all l_k. A mean sum_k nu_k v_k is bounded by weak duality; docs/bounds.rst has the
-formulas.
+the ranges of all l_k. Means sum_k nu_k v_k are bounded by weak duality: see docs/bounds.rst.
 """
 
 from dataclasses import dataclass, replace

@@ -160,8 +160,7 @@ def export_c_physics(
     Returns
     -------
     code : CCode
-        The text of both files, and the most that an evaluation takes; the one arcsine is not
-        counted.
+        The text of both files, and the most that an evaluation takes beside one arcsine.
 
     Raises
     ------

@@ -214,11 +214,10 @@ def allan_deviation(error, sampling_interval, run=None):
 
 
 def allan_figures(tau, deviation):
-    """Of each figure its value, NaN where the curve [s, deg/h] has none, and why it has none.
+    """The value of each figure, NaN where the curve [s, deg/h] has none, and why it has none.
 
     A slope is found where a line through three neighbouring points has it within 0.15; the lowest
-    such line counts, before the minimum and any rise for N and after the minimum for K. A minimum
-    at an end is none.
+    such line counts, before the minimum and any rise for N, after it for K. No end is a minimum.
     """
     if tau.size < _POINTS_PER_SLOPE:
         raise ValueError(f"The curve has {tau.size} points; at least {_POINTS_PER_SLOPE} needed.")

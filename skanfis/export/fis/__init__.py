@@ -41,8 +41,7 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
     """Write a trained model as a .fis file, for MATLAB, Octave or fuzzylite.
 
     The system is Sugeno's, with product as AND and weighted average; numbers have all their digits.
-    Outside the Range of the inputs, the box of the training data, other programs do as they like:
-    clamp the inputs.
+    Clamp the inputs to their Range, that of the training data: beyond it programs differ.
 
     Parameters
     ----------
