@@ -260,6 +260,17 @@ def position_of(entry, names):
     return None
 
 
+def checked_position(feature, names, what="input"):
+    """Position of an input or output that is given by name or position; ValueError for none."""
+    found = position_of(feature, names)
+    if found is None:
+        raise ValueError(
+            f"{feature!r} is no {what}: give a position from 0 to {len(names) - 1}, or one of "
+            f"{', '.join(map(repr, names))}."
+        )
+    return found
+
+
 def check_not_negative(sample_weight):
     """Raise ValueError that names the first row of negative weight, if there is one."""
     if np.any(sample_weight < 0):
