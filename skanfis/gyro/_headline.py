@@ -165,7 +165,7 @@ def of_rates(compensator, log, rates):
 def written_text(calibration):
     """What is written, and whether that is what is recommended."""
     asked = calibration.recipe.write != "recommended"
-    others = "as --write asks" if asked else "as recommended; --write names another"
+    others = "as --write asks" if asked else "as recommended; --write chooses another"
     return f"{ARTICLES.get(calibration.written, 'the fuzzy rules')}, {others}"
 
 

@@ -145,7 +145,7 @@ class Results:
 
     @cached_property
     def of_allan(self):
-        """Arguments of an AllanDisplay, or why there is none."""
+        """Arguments of an AllanDisplay, a dict; or a text, why there can be none."""
         if find_spec("allantools") is None:
             return "allantools is not installed (pip install allantools)"
         if self.time is None:

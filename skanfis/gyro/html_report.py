@@ -292,7 +292,7 @@ def _written(results):
     if not calibration.writes_model:
         text = (
             f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model. --write "
-            f"names another, with a report of its own: rules, {', '.join(NAMES)}."
+            f"chooses another, with a report of its own: rules, {', '.join(NAMES)}."
         )
         formula = Block("open", rules_text(calibration), "What to compute")
         return "What is written", [Block("text", text), formula, _on_board(calibration)]
