@@ -202,7 +202,7 @@ class ResponseSurfaceDisplay:
         check_count("grid_resolution", grid_resolution, 2)
         model, reader = fold_with_reader(estimator)
         points = None if X is None else reader(X)
-        if isinstance(features, str) or len(features) != 2:
+        if np.size(features) != 2:
             raise ValueError(f"features={features!r} must be two inputs.")
         if model.n_inputs == 1:
             raise ValueError(

@@ -243,7 +243,7 @@ class Study:
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}
         labels, inputs = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
         if sum(map(len, inputs)) != model.n_inputs:
-            raise ValueError("groups: one of them is called as a column that it does not have.")
+            raise ValueError("groups: a group may not have the name of a column outside of it.")
         is_shown = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
         blocks = _known(model, inputs, rows)
         return cls(model, k, labels, blocks, is_shown, rows, _anova(model, k, blocks))

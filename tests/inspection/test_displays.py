@@ -122,6 +122,7 @@ class TestSurface:
             ({"features": (0,)}, ValueError, "must be two inputs"),
             ({"features": (0, "pressure")}, ValueError, "'pressure' is no input: give a position"),
             ({"features": "rate"}, ValueError, "must be two inputs"),
+            ({"features": 1}, ValueError, "features=1 must be two inputs"),
             ({"output": 1}, ValueError, "1 is no output: give a position from 0 to 0, or one of"),
             ({"held": [1.0]}, TypeError, "held must be a dict"),
             ({"held": {"rate": np.nan}}, ValueError, "must be a number in the range of training"),

@@ -97,8 +97,8 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
         parse_fis(text)
     except ValueError as error:
         raise ValueError(
-            f"the model cannot be written such that it can be read: {error} Train on inputs and "
-            "targets in other units."
+            f"cannot write what read_fis would refuse: {error} Train on inputs and targets in "
+            "other units."
         ) from None
     if path is not None:
         Path(path).write_text(text, encoding="ascii", newline="\n")
