@@ -89,7 +89,8 @@ def group_by_rate_level(rate: ArrayLike) -> np.ndarray:
     """
     rate = check_column(rate, "rate")
     labels = level_numbers(np.abs(rate))
-    if labels is None:
+    # Many rates of a row or two each are no levels of a table either.
+    if labels is None or 1 + labels.max() >= max(_MOST_LEVELS, labels.size / 2):
         raise ValueError(
             f"rate has no levels: it changes continuously between {rate.min():g} and "
             f"{rate.max():g}. If a table went from level to level, leave out the rows in between, "

@@ -57,8 +57,11 @@ def test_one_level_is_a_level():
         np.random.default_rng(0).uniform(-100, 100, 500_000),
         100 * np.sin(np.arange(100_000) / 5000.0),
         np.random.default_rng(0).normal(size=100_000),
+        # Rows that are few: every one lies clear of the next.
+        100 * np.sin(np.arange(300) / 50.0),
+        np.linspace(-100.0, 100.0, 1000),
     ],
-    ids=["1500", "500000", "sine", "normal"],
+    ids=["1500", "500000", "sine", "normal", "short sine", "ramp"],
 )
 def test_a_rate_that_changes_continuously_has_no_levels(rate):
     with pytest.raises(ValueError, match=r"no levels: it changes continuously between -"):
