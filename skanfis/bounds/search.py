@@ -22,7 +22,7 @@ class Found:
 
 
 class _Boxes(NamedTuple):
-    """Boxes (n_inputs, n_boxes), their bounds, and what splitting along each input promises."""
+    """Boxes (n_inputs, n_boxes), their bounds, and how much is due to the width by each input."""
 
     low: np.ndarray
     high: np.ndarray
