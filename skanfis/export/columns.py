@@ -26,14 +26,14 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """An input z, with raw column ``source`` = offset + scale z, or output ``place`` of an encoder."""
+    """An input z: raw column ``source`` is offset + scale z, or z is an output of an encoder."""
 
     source: int
     name: str
     offset: float = 0.0
     scale: float = 1.0
     encode: Callable[..., np.ndarray] | None = None
-    place: int = -1
+    place: int = -1  # of the output
     level: Level | None = None  # that an encoder's output indicates
     fill: Any = None  # replaces missing values
     imputed: Callable[..., np.ndarray] | None = None  # the column as an imputer hands it on
