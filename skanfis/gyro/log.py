@@ -26,13 +26,13 @@ from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
 from .metrics import rows_by_run
 
-_ROWS = 100_000  # of a piece, which is all that is held of a file's texts
-# A rest without power is longer than what a logger drops, and than a few of its steps.
+_ROWS = 100_000  # rows of a piece: no more texts of a file are held at once
+# A gap between two runs is so long, and so many steps: longer than what a logger drops.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
 _FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
 _SHORTEST_RUN = 3  # rows, at the end of a file
-_BEGINNING = 0.1  # part of a run, where a clock is again that has been set anew
+_BEGINNING = 0.1  # a clock that goes back to this part of a run has begun anew
 
 
 def read_log(
