@@ -72,8 +72,7 @@ def largest(
     """Enclose the largest value that a function takes on a box.
 
     ``evaluate`` is as ``Enclosure.values``. The search ends when bound and value are ``tolerance``
-    apart, or on one side of ``until``. Boxes are cut at ``cuts`` first; ``first`` is a point, and
-    its value.
+    apart, or on one side of ``until``. It cuts at ``cuts`` first; ``first`` is a point, its value.
     """
     where, best = (low, -np.inf) if first is None else first
     lows, highs = low[:, None].astype(float), high[:, None].astype(float)

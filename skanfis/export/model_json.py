@@ -33,8 +33,8 @@ def export_json(
     path : str or path-like, default=None
         The file to write; None writes nothing.
     posterior : bool, default=False
-        Whether to write what ``predict(X, return_std=True)`` needs: for p consequent parameters
-        some p^2 / 2 numbers.
+        Whether to write what ``predict(X, return_std=True)`` needs: some p^2 / 2 numbers for p
+        consequent parameters.
 
     Returns
     -------

@@ -100,8 +100,7 @@ class Request:
 class Layout:
     """Places of the parts in a file, and their units there.
 
-    ``others`` are columns that would do as well, ``assumed`` parts whose units neither an option
-    nor a name tells.
+    ``others`` are columns that would do as well, ``assumed`` parts whose units nothing tells.
     """
 
     header: list

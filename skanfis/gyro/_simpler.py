@@ -19,8 +19,7 @@ from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from .compose import FrozenRules, Polynomial, ResidualRegressor, joined, law_and_rules
 from .physics import OpenLoopArcsineRegressor
 
-# How often law and rules are fitted in turn: a law that is fitted once would bend towards what dies
-# away after power-on.
+# Law and rules are fitted in turn: a law fitted once bends towards what dies away after power-on.
 ROUNDS = 2
 NOTHING = "no compensation"
 LAW_AND_LINE = "arcsine law and a line"

@@ -12,8 +12,7 @@ from .errors import UsageError
 
 _NO_TEMPERATURE = 500.0  # marks of no value, such as 9999, are beyond it in any unit
 _COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
-# A log that is never colder than the first, or reaches the second, may be in degF; beyond the third
-# it is.
+# A log that is always warmer, or reaches the second, may be in degF; one that reaches the third is.
 _WARM, _HOT, _HOTTEST = 30.0, 86.0, 130.0
 _SINCE_1970 = 9e8, 4.1e9  # s, of clocks that tell a date from 1998 to 2099
 _STEPS = 1e-4, 600.0  # s, from one row to the next

@@ -98,8 +98,7 @@ def export_c(
     Raises
     ------
     ValueError
-        If a parameter is none of the above, a step cannot be folded in, or "float" cannot hold a
-        number of the model.
+        If a parameter is none of the above, a step cannot be folded in, or "float" is too narrow.
 
     Examples
     --------
