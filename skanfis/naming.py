@@ -157,8 +157,8 @@ def given_term_names(model, names):
             )
         if len(given) != own.size:
             raise ValueError(
-                f"names: there are {len(given)} names for input {name!r}, which has {own.size} "
-                "terms. Give one name per term, or a dict from input to names."
+                f"names for input {name!r}: {len(given)} given for {own.size} terms. Give one name "
+                "per term, or a dict from input to names."
             )
         if len(set(given)) != len(given):
             raise ValueError(f"names for input {name!r} repeats a name: {list(given)!r}.")
