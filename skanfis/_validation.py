@@ -11,17 +11,16 @@ from sklearn import get_config
 
 from .blocks import LARGE_BLOCK_ROWS, row_blocks
 
-# Exponent of two up to which weights are taken as they are: products of two, and sums of as many
-# rows as there can be, stay within 2^1023.
-_FAR = 400
+# Largest exponent of two of weights that are left as they are: products of two, summed over as many
+# rows as there can be, stay below 2^1023.
+_LARGEST_EXPONENT = 400
 
 
 @contextmanager
 def named_refusals(**tables):
-    """Let scikit-learn check tables, given by what they are: X=..., y=...
+    """Let scikit-learn check tables, given by their roles: X=..., y=...
 
-    Text, times, sparse or lazy frames, masked values and two columns of one name are refused by the
-    column's name.
+    Text, times, sparse or lazy frames, masked values and two columns of one name are refused first.
     """
     refuse_lazy(**tables)
     for what, table in tables.items():
@@ -35,7 +34,7 @@ def named_refusals(**tables):
 
 
 def refuse_lazy(**tables):
-    """Raise TypeError where one of the tables, given by what they are, has no values yet."""
+    """Raise TypeError where one of the tables, given by their roles, has no values yet."""
     for what, table in tables.items():
         if type(table).__name__ == "LazyFrame":
             raise TypeError(
@@ -261,6 +260,17 @@ def position_of(entry, names):
     return None
 
 
+def checked_position(feature, names, what="input"):
+    """Position of an input or output that is given by name or position; ValueError for none."""
+    found = position_of(feature, names)
+    if found is None:
+        raise ValueError(
+            f"{feature!r} is no {what}: give a position from 0 to {len(names) - 1}, or one of "
+            f"{', '.join(map(repr, names))}."
+        )
+    return found
+
+
 def check_not_negative(sample_weight):
     """Raise ValueError that names the first row of negative weight, if there is one."""
     if np.any(sample_weight < 0):
@@ -288,9 +298,11 @@ def positive_weights(sample_weight, n_rows, least=2):
 
 
 def bearable_weights(sample_weight):
-    """Weights by a power of two where their sum would overflow, or their digits be lost."""
+    """The weights, scaled by a power of two where sums would overflow or lose digits."""
     exponent = int(np.frexp(np.max(sample_weight, initial=0.0))[1])
-    return np.ldexp(sample_weight, -exponent) if abs(exponent) > _FAR else sample_weight
+    return (
+        np.ldexp(sample_weight, -exponent) if abs(exponent) > _LARGEST_EXPONENT else sample_weight
+    )
 
 
 def warn_user(message, category):

@@ -40,8 +40,7 @@ from .support import RuleSupport
 
 __all__ = ["TSKModel"]
 
-# Of a variance, what rounding may leave.
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # of a variance, relative
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -63,22 +62,22 @@ class TSKModel:
     minimum, maximum : ndarray of shape (n_inputs,)
         The box of the training data.
     rule_weights : ndarray of shape (n_rules,)
-        Part of the training data's weight on which each rule fires; the sum is one.
+        Mean strength of each rule over the training rows, by their weights; the sum is one.
     rule_rows : ndarray of shape (n_rules,)
-        Number of training rows, by their weight, on which each rule is the strongest.
+        Number of training rows, by their weights, on which each rule is the strongest.
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
     max_extrapolation : float
         L of "linear", zero or positive. Where it is infinite, outputs are held within limits that
         were asked for, and no others.
     support, posterior, target : RuleSupport, Posterior, TargetRange or None
-        What coverage, deviations and the limits of outputs are made of, as far as there are data.
+        What coverage, deviations and limits of the outputs are computed from; None without data.
     term_names, output_names : tuple of str
         Where not given, see ``naming``.
     rows_extrapolation : float or None
-        L for which the outermost training rows speak, see ``training.freezing``.
+        The L that the outermost training rows support, see ``training.freezing``.
     tangent_at : ndarray of shape (n_inputs,) or None
-        Medians of the inputs that outputs are known to rise or fall with, NaN of others.
+        Medians of the inputs that an output must rise or fall with, NaN for the others.
     """
 
     antecedent: Antecedent
@@ -141,7 +140,7 @@ class TSKModel:
 
     @property
     def common_slopes(self) -> np.ndarray:
-        """Where a rule has the slope that most rules have in common, (n_rules, n_inputs)."""
+        """Where a rule has the slope, not zero, that most rules share, (n_rules, n_inputs)."""
         found = np.zeros((self.n_rules, self.n_inputs), dtype=bool)
         for j, slopes in enumerate(self.coefficients[:, 1:].transpose(1, 0, 2)):
             values, which, counts = np.unique(
@@ -154,23 +153,23 @@ class TSKModel:
 
     @property
     def rule_centers(self) -> np.ndarray:
-        """Mean of the training rows by each rule's strength, or of all, (n_rules, n_inputs)."""
+        """Mean of the training rows by each rule's strength, else of all, (n_rules, n_inputs)."""
         if self.support is None:
             return np.tile(self.reference, (self.n_rules, 1))
         return np.where(self.support.share[:, None] > 0.0, self.support.center, self.reference)
 
     @property
     def seen_values(self) -> list:
-        """Of every input, quantiles of the training rows and values next to its terms, if known."""
+        """For every input, quantiles of the training rows and the values next to its terms."""
         marginals = () if self.support is None else self.support.marginals
         scales = zip(self.reference, self.spread, marginals, strict=False)
         return [[offset + scale * z for z in values] for offset, scale, (_, *values) in scales]
 
     @property
     def two_valued(self) -> np.ndarray:
-        """Inputs that are 0 or 1 on all training rows, (n_inputs,).
+        """Whether an input is 0 or 1 on all training rows, (n_inputs,).
 
-        Nothing else from 0 to 1 spreads as far about its mean m, sqrt(m (1 - m)).
+        Only then is its variance m (1 - m), with m the mean: the largest of values from 0 to 1.
         """
         from_0_to_1 = (self.minimum == 0.0) & (self.maximum == 1.0)
         most = self.reference * (1.0 - self.reference)
@@ -178,7 +177,7 @@ class TSKModel:
 
     @property
     def output_limits(self) -> np.ndarray:
-        """Lowest and highest output that the model gives, (2, n_outputs); infinite if not held."""
+        """Limits that outputs are held within, low and high, (2, n_outputs); infinite if none."""
         if self.target is None:
             return np.full((2, self.n_outputs), [[-np.inf], [np.inf]])
         return self.target.limits(self.max_extrapolation, is_line=self.n_rules == 1)
@@ -257,7 +256,7 @@ class TSKModel:
             values, slopes = self._tangent(nearest)
             followed = self._followed(way) if self.out_of_bounds == "linear" else 0.0 * way
             outputs = self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
-            # How far the tangent may be from the prediction: what that leaves of it adds in full.
+            # The deviation is of the tangent: what the prediction leaves out of it counts in full.
             left = np.einsum("ji,joi->oi", way - followed, slopes)
             return np.vstack([outputs, np.hypot(posterior.tangent(self, nearest, way), left)])
 
@@ -276,7 +275,7 @@ class TSKModel:
         return self._slopes(X, self._linearised)
 
     def tangent_slopes(self, X) -> np.ndarray:
-        """Slopes that "linear" follows from the nearest point of the box, as :meth:`gradient`."""
+        """Slopes that "linear" follows from the nearest point of the box, shaped as a gradient."""
         return self._slopes(X, self._tangent)
 
     def _slopes(self, X, linearised):
@@ -370,15 +369,16 @@ class TSKModel:
 
     @property
     def told_extrapolation(self) -> float:
-        """L for which the outermost rows speak; as it is set where there are none."""
+        """The L that the outermost training rows support; ``max_extrapolation`` if not known."""
         told = self.rows_extrapolation
         return self.max_extrapolation if told is None else told
 
     @cached_property
     def _supported_extrapolation(self):
-        """How far the outermost rows and the noise speak for the tangent.
+        """The L of "auto": what the outermost rows support.
 
-        A line that goes on bends beyond them by no more than it leaves of the target.
+        For a line it is at least the target's deviation over the noise: over each deviation of an
+        input, the target is taken to bend by no more than the noise.
         """
         told, target, posterior = self.told_extrapolation, self.target, self.posterior
         is_told = self.rows_extrapolation not in (None, MAX_EXTRAPOLATION)
@@ -390,7 +390,7 @@ class TSKModel:
     def _by_block(self, X, of_block, n_columns, n_more=0):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).
 
-        It takes ``n_more`` values per row besides strengths and outputs.
+        The function needs memory for ``n_more`` values per row besides strengths and outputs.
         """
         n_rows = X.shape[0]
         values_per_row = self.n_rules * (2 + self.n_outputs) + 3 * self.antecedent.n_terms + n_more
@@ -405,7 +405,7 @@ class TSKModel:
 
     @property
     def _n_slopes(self):
-        """Values per row that slopes take."""
+        """Values per row that :meth:`_linearised` needs memory for."""
         return 2 * self.antecedent.parameters.size + self.n_inputs * self.n_outputs
 
     def _clip(self, Z):
@@ -431,7 +431,7 @@ class TSKModel:
 
     @cached_property
     def _limits_of_columns(self):
-        """The limits as columns, kept: for a single row they are a sixth of the work."""
+        """The limits as columns; cached, since they are a sixth of the work of a single row."""
         return self.output_limits[:, :, None]
 
     def _outputs(self, Z):
@@ -449,9 +449,9 @@ class TSKModel:
 
     @property
     def tangent_groups(self):
-        """Groups of inputs whose tangents are taken at one place, as masks; and that place.
+        """Groups of inputs whose slopes are taken at one point, as masks, and these points.
 
-        Each (n_groups, n_inputs); the place is NaN where an input keeps its own value.
+        Both are (n_groups, n_inputs); a point is NaN where an input keeps its own value.
         """
         if self.tangent_at is None:
             return np.ones((1, self.n_inputs), dtype=bool), np.full((1, self.n_inputs), np.nan)
@@ -460,7 +460,7 @@ class TSKModel:
         return own, np.where(own, np.nan, self.tangent_at)
 
     def _tangent(self, Z):
-        """As :meth:`_linearised`, of the tangents by which the model goes on."""
+        """As :meth:`_linearised`, with the slopes that "linear" follows."""
         values, slopes = self._linearised(Z)
         for own, at in zip(*self.tangent_groups, strict=True):
             if own.any() and np.isfinite(at).any():

@@ -1,8 +1,8 @@
 r"""What terms are called: linguistic names for a grid, places for rules with terms of their own.
 
 A Gaussian term at c of width h is "near c ± h". A side of a cut at c over a width h is
-"> c ± h log 9": so far from the cut it is 0.9 true. One that parts two values, with no row between,
-needs no width: "> c", or the value itself where they are 0 and 1.
+"> c ± h log 9": so far from the cut it is 0.9 true. A cut between the only two values of an input
+needs no width: its side is "> c", or the value itself where they are 0 and 1.
 """
 
 from collections import Counter
@@ -35,24 +35,24 @@ LINGUISTIC = {
     7: ("NL", "NM", "NS", "ZE", "PS", "PM", "PL"),
 }
 
-# Families whose terms of a rule's own are written out, with what stands before the place, and in
-# how many widths the length after it is given: a side of a cut is 0.9 true so far from it.
+# Families whose terms are called by place and length: what stands before the place, and the length
+# in widths of the term: so far from its place a side of a cut is 0.9 true.
 WRITTEN = {
     SigmoidRising: ("> ", np.log(9.0)),
     SigmoidFalling: ("< ", np.log(9.0)),
     Gaussian: ("near ", 1.0),
 }
-# Digits that are written of that length; what no more than so many tell apart is the same.
-_DIGITS_OF_LENGTH, _MOST_TO_TELL = 2, 9
-# As rounding leaves the cut between two values; and of a range, what no two places differ by.
+# Digits of the length that are written, and most of them if terms would have one name otherwise.
+_DIGITS_OF_LENGTH, _MOST_DIGITS_OF_LENGTH = 2, 9
+# Relative to the range: rounding of a cut between two values; places that are nearer are the same.
 _ROUNDING, _ALIKE = 1e-6, 1e-9
 
 
 def default_term_names(model, digits=_DIGITS_OF_LENGTH):
-    """Names: of a grid by the order of its terms; "0" and "1" of two, where an input is that.
+    """Names of all terms: of a grid by their order, or "0" and "1" where an input is no more.
 
     Of other rules "> 6.8 ± 0.3" and "near 21.3 ± 4.2", to so many digits of the length, or, of
-    families that do not say it, "near 21.3". Terms of an input that differ have different names.
+    families without one, "near 21.3". Terms of an input that differ have different names.
     """
     antecedent, minimum, maximum = model.antecedent, model.minimum, model.maximum
     inputs, places = antecedent.term_inputs, antecedent.term_places
@@ -77,16 +77,16 @@ def default_term_names(model, digits=_DIGITS_OF_LENGTH):
 
 
 def is_crisp(cut, width, low, high):
-    """Whether a cut parts the two values that an input has."""
+    """Whether a cut stands half-way between the ends of a range, too narrow to blur either."""
     size = high - low
     is_between = abs(2.0 * cut - low - high) <= _ROUNDING * size
     return is_between & (2.0 * CRISP * width <= (1.0 + _ROUNDING) * size)
 
 
 def _written(group, own, low, high, fewest):
-    """Terms of one input and one family: the place to the digits that matter over the length.
+    """Names of terms of one input and family, with the digits of the place that the length needs.
 
-    More tell those apart that would look the same; equal ones, of different rules, have one name.
+    Terms that would look the same have more digits; equal ones, of different rules, have one name.
     """
     sign, per_width = WRITTEN[group.family]
     places, log_widths = group.theta[:, own]
@@ -97,7 +97,7 @@ def _written(group, own, low, high, fewest):
     lengths = np.where(alone, 0.5 * (high - low), widths * per_width)
     terms = list(zip(places, lengths, alone, strict=True))
     names: dict[tuple, str] = {}
-    most = max(fewest, _MOST_TO_TELL)
+    most = max(fewest, _MOST_DIGITS_OF_LENGTH)
     for digits in range(fewest, most + 1):
         written = {term: sign + _with_length(*term, digits) for term in terms}
         taken = Counter(written.values())
@@ -121,7 +121,7 @@ def _with_length(place, length, alone, digits):
 
 
 def parameters_written(name, family, theta):
-    """Place and log width of a term that is called so; ``theta`` where the name does not say."""
+    """Place and log width that the name of a term says; ``theta`` where it does not."""
     _, *numbers = name.replace("±", "").split()
     if not numbers:
         return theta
@@ -157,8 +157,8 @@ def given_term_names(model, names):
             )
         if len(given) != own.size:
             raise ValueError(
-                f"names: there are {len(given)} names for input {name!r}, which has {own.size} "
-                "terms. Give one name per term, or a dict from input to names."
+                f"names for input {name!r}: {len(given)} given for {own.size} terms. Give one name "
+                "per term, or a dict from input to names."
             )
         if len(set(given)) != len(given):
             raise ValueError(f"names for input {name!r} repeats a name: {list(given)!r}.")
@@ -168,14 +168,14 @@ def given_term_names(model, names):
 
 
 def _near(places, size):
-    """Places in as few digits as tell them apart; equal ones, but for rounding, are numbered."""
+    """Names of places, in as few digits as tell them apart; equal places are numbered."""
     if 0.0 < size < np.inf:
         places = _ALIKE * size * np.round(places / (_ALIKE * size)) + 0.0
     return distinct(f"near {text}" for text in told_apart(places, _plain, 3))
 
 
 def distinct(names, numbered="{} ({})"):
-    """The names; one that was there before gets a number."""
+    """The names, all different: a number is added to one that is taken."""
     taken: dict[str, int] = {}
     found = []
     for name in names:

@@ -54,7 +54,7 @@ ALSO = {"export": [PUBLIC]}
 # The application takes public names only, but for these.
 ONLY = {
     "gyro": [
-        *(PUBLIC, "exceptions", "blocks", "policies", "options"),
+        *(PUBLIC, "exceptions", "blocks", "policies", "options", "naming"),
         *("search", "export", "bounds", "inspection", "datasets"),
     ]
 }

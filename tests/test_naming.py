@@ -93,7 +93,7 @@ def test_given_names_replace_the_default():
     ("names", "error", "message"),
     [
         ({"speed": ["a", "b"]}, ValueError, r"'speed', which is no input; .*'time'"),
-        (["a", "b", "c"], ValueError, r"3 names for input 'time', which has 2 terms"),
+        (["a", "b", "c"], ValueError, r"names for input 'time': 3 given for 2 terms"),
         ({"time": ["a", "a"]}, ValueError, r"'time' repeats a name"),
         ({"time": "ab"}, TypeError, r"'time' must be a sequence of non-empty str"),
         ({"time": ["a", ""]}, TypeError, r"'time' must be a sequence of non-empty str"),

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,10 @@ from .enclosure import Enclosure, reach_of
 from .search import largest
 from .terms import is_known, size
 
-# Rows that are looked at first: all corners, of so few inputs, and some between.
-_CORNERS, _POINTS = 8, 1024
-# Of slopes, the strip beyond the edge in which they are zero, as part of the range.
-_BEYOND = 1e-3
+# Points that are tried first: so many all over the box, and its corners if inputs are this few.
+_POINTS, _MOST_INPUTS_OF_CORNERS = 1024, 8
+# Part of a range: a strip so wide stands for all beyond the policy's reach, where slopes are zero.
+_STRIP = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -30,13 +31,14 @@ class Bounds:
     Parameters
     ----------
     lower, upper : ndarray of shape (n_outputs,)
-        Nothing in the box is below, or above.
+        Proven: no value in the box is below, or above.
     lowest, highest : ndarray of shape (n_outputs,)
-        Values that are taken in the box, next to these.
+        The lowest and highest values that were found in the box.
     at_lowest, at_highest : ndarray of shape (n_outputs, n_inputs)
+        Where they were found.
     box : ndarray of shape (n_inputs, 2)
     n_boxes : int
-        Boxes that were looked at.
+        Parts of the box that were looked at.
     converged : bool
         Whether ``tol`` was reached, for every output.
     input_names, output_names : tuple of str
@@ -66,10 +68,10 @@ class Bounds:
 
     @property
     def tightness(self) -> np.ndarray:
-        """The larger gap of either side, as part of ``highest - lowest``, (n_outputs,)."""
+        """The larger gap between bound and value, as part of ``highest - lowest``, (n_outputs,)."""
         gap = np.maximum(self.upper - self.highest, self.lowest - self.lower)
         with np.errstate(divide="ignore", invalid="ignore"):
-            # Where all is the same, the lowest is above the highest by rounding.
+            # Of a constant, rounding may leave the lowest above the highest.
             return np.where(gap > 0.0, gap / np.maximum(self.highest - self.lowest, 0.0), 0.0)
 
     def __repr__(self):
@@ -89,7 +91,7 @@ def bounds(
 ) -> Bounds:
     """Enclose every prediction of a model over a box of inputs, provably.
 
-    The bounds are of the model, rounding included; :doc:`/bounds` has the proof.
+    The bounds hold for predictions as computed, rounding included; :doc:`/bounds` has the proof.
 
     Parameters
     ----------
@@ -97,11 +99,11 @@ def bounds(
         An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search around one.
     box : array-like of shape (n_inputs, 2) or dict, default=None
         Low and high of every input, in the units of X, or {name: (low, high)}; ends may be
-        infinite. Others, and None, have the range of the training data.
+        infinite. Inputs not named, or all with None, have the range of the training data.
     tol : float, default=0.01
-        How far bounds and values that are taken may be apart, relative to the output's range.
+        How far bounds and values that were found may be apart, relative to the output's range.
     max_boxes : int, default=200_000
-        Boxes to look at for each bound, at the most. The bounds hold wherever this ends.
+        Most boxes to look at for each bound. The bounds hold even where this ends the search.
 
     Returns
     -------
@@ -111,7 +113,7 @@ def bounds(
     Raises
     ------
     ValueError
-        If the box is none, nothing bounds the model on it, or its memberships are not skanfis's.
+        If ``box`` is no box, nothing bounds the model on it, or a membership is not of skanfis.
 
     Examples
     --------
@@ -205,29 +207,32 @@ def monotonicity(
     """
     model, box = _checked(model, box, 0.0, max_boxes)
     (j,) = feature_indices([feature], model.input_names, "feature")
-    low, high = held_box(box, model, _BEYOND)
-    in_range = (low >= model.minimum).all() and (high <= model.maximum).all()
-    goes_on = model.tangent_at is None or np.isnan(model.tangent_at[j])
-    is_promised = in_range or model.out_of_bounds != "linear" or not goes_on
+    low, high = varying_part(box, model, _STRIP)
+    is_in_range = (low >= model.minimum).all() and (high <= model.maximum).all()
+    # Order in the range is order beyond it too where the value is held there, or the tangent does
+    # not change with other inputs.
+    is_steady = model.tangent_at is not None and np.isfinite(model.tangent_at[j])
+    is_enough = is_in_range or is_steady or model.out_of_bounds != "linear"
 
     def is_proven(k, sign):
-        if is_promised and is_in_order(model, k, sign * (np.arange(model.n_inputs) == j)):
+        if is_enough and is_in_order(model, k, sign * (np.arange(model.n_inputs) == j)):
             return True
         slope = Enclosure(model, k, -float(sign)).evaluate(j)
-        return largest(slope, low, high, 0.0, max_boxes, cuts_of(model), until=0.0).bound <= 0.0
+        found = largest(slope, low, high, 0.0, max_boxes, training_box(model), until=0.0)
+        return found.bound <= 0.0
 
     outputs = range(model.n_outputs)
     return np.array([next((s for s in (1, -1) if is_proven(k, s)), 0) for k in outputs])
 
 
-def cuts_of(model):
-    """Where boxes are cut first: the ends of the range of the training data, (n_inputs, 2)."""
+def training_box(model):
+    """The range of the training data, (n_inputs, 2); larger boxes are cut first at its ends."""
     return np.stack([model.minimum, model.maximum], axis=1)
 
 
 def _enclosed(model, box, j, scale, tol, max_boxes):
     """Bounds of outputs, or of their slopes by input j; ``tol`` is in units of ``scale(ends)``."""
-    low, high = held_box(box, model, 0.0 if j is None else _BEYOND)
+    low, high = varying_part(box, model, 0.0 if j is None else _STRIP)
     X, found = spread_points(low, high).T, []
     for k in range(model.n_outputs):
         sides = [Enclosure(model, k, sign).evaluate(j) for sign in (-1.0, 1.0)]
@@ -239,7 +244,7 @@ def _enclosed(model, box, j, scale, tol, max_boxes):
             # Bound and value are apart by rounding, beneath which no bound can go.
             least = max(tolerance, 8.0 * float(bound[top] - attained[top]))
             first = points[:, top], float(attained[top])
-            found.append(largest(evaluate, low, high, least, max_boxes, cuts_of(model), first))
+            found.append(largest(evaluate, low, high, least, max_boxes, training_box(model), first))
     below, above = found[::2], found[1::2]
     return Bounds(
         lower=np.array([-one.bound for one in below]),
@@ -264,24 +269,27 @@ def _checked(model, box, tol, max_boxes):
             raise ValueError(
                 f"The ranges of {group.family.name!r} memberships are not known: give another mf."
             )
-    if not (np.ndim(tol) == 0 and tol >= 0.0):
-        raise ValueError(f"tol={tol!r} must be zero or positive.")
+    if not (isinstance(tol, Real) and float(tol) >= 0.0):
+        raise ValueError(f"tol={tol!r} must be a number, zero or positive.")
     check_count("max_boxes", max_boxes, 1)
     return model, read_box(box, model)
 
 
 def read_box(box, model: TSKModel):
     """The box as an array (n_inputs, 2); what is not given is the range of the training data."""
-    found = cuts_of(model)
+    found = training_box(model)
     if box is None:
         return found
     names = ", ".join(map(repr, model.input_names))
     if isinstance(box, Mapping):
         for name, ends in box.items():
             (j,) = feature_indices([name], model.input_names, "box")
-            if np.shape(ends) != (2,):
-                raise ValueError(f"box[{name!r}]={ends!r} must be two numbers: (low, high).")
-            found[j] = ends
+            try:
+                low, high = ends
+                found[j] = low, high
+            except (TypeError, ValueError):
+                told = f"box[{name!r}]={ends!r} must be two numbers: (low, high)."
+                raise ValueError(told) from None
     else:
         try:
             given = np.array(box, dtype=float)
@@ -302,8 +310,8 @@ def read_box(box, model: TSKModel):
     return found
 
 
-def held_box(box, model: TSKModel, beyond=0.0):
-    """Lows and highs of the part of a box in which predictions change, and a strip ``beyond``."""
+def varying_part(box, model: TSKModel, strip=0.0):
+    """Lows and highs of the part of a box in which predictions change, and of a ``strip`` more."""
     low, high = box.T.copy()
     if model.out_of_bounds in SILENT:
         low, high = np.maximum(low, model.minimum), np.minimum(high, model.maximum)
@@ -325,15 +333,15 @@ def held_box(box, model: TSKModel, beyond=0.0):
                     "finite ends, or a finite max_extrapolation."
                 )
     # The way beyond is computed, and held, in floats: a few units in the last place more reach it.
-    strip = 8.0 * np.finfo(float).eps * (np.abs(model.minimum) + np.abs(model.maximum) + reach)
-    strip = np.where(reach > 0.0, strip, 0.0) + beyond * (model.maximum - model.minimum)
-    edges = model.minimum - reach - strip, model.maximum + reach + strip
+    rounding = 8.0 * np.finfo(float).eps * (np.abs(model.minimum) + np.abs(model.maximum) + reach)
+    more = np.where(reach > 0.0, rounding, 0.0) + strip * (model.maximum - model.minimum)
+    edges = model.minimum - reach - more, model.maximum + reach + more
     return np.clip(low, *edges), np.clip(high, *edges)
 
 
 def spread_points(low, high):
     """Rows all over a box, and of few inputs all its corners."""
     unit = qmc.Halton(low.size, scramble=False).random(_POINTS)
-    if low.size <= _CORNERS:
+    if low.size <= _MOST_INPUTS_OF_CORNERS:
         unit = np.vstack([np.indices((2,) * low.size).reshape(low.size, -1).T, unit])
     return np.clip(low + unit * (high - low), low, high)

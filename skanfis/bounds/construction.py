@@ -6,10 +6,9 @@ for every such pair, with values f, slopes b by x_j and u = (x_j - middle) / wid
 
     f_above - f_below + width ((o + c e^u) b_above + (o + c e^-u) b_below) >= 0
 
-all over a box: linear in the consequents at every point, and least at a corner of all inputs but
-x_j, along which it is convex. docs/bounds.rst says why, which rules of a tree, of a grid and of
-scattered rules are pairs, and their middle, width, o and c. Of one line for all rules there are
-none.
+all over a box. This is linear in the consequents at every point, and least at a corner of all
+inputs but x_j, along which it is convex. docs/bounds.rst says why, which rules of a tree, a grid
+and scattered rules are pairs, and their middle, width, o and c. One line for all rules has none.
 
 To fall is the same with all signs reversed. A prediction is within limits where every rule is.
 """
@@ -25,10 +24,10 @@ from ..model import TSKModel
 from .quadratic_program import nearest_by_exchange
 from .terms import EPS, ROUNDINGS
 
-# In standard deviations of the target, what is kept by slopes, and between rules, there to within
-# its half.
+# The margin that a slope keeps of zero, and a pair of its inequality, in standard deviations of the
+# target; a pair that has half of its margin is let be.
 _SLOPE, _MARGIN = 1e-6, 1e-5
-# Slopes as good as none, and the u beyond which they help no more: exp(u) stays finite.
+# Stands for a slope of zero, as a divisor; and the largest u, so that exp(u) is finite.
 _TINY, _FARTHEST = float(np.finfo(float).tiny), 300.0
 ONE_RULE = GridAntecedent.build([], [], [])
 
@@ -36,8 +35,8 @@ ONE_RULE = GridAntecedent.build([], [], [])
 class _Pairs(NamedTuple):
     """Pairs of rules, and what must hold of each; widths are negative where predictions fall.
 
-    Rule -1 is zero everywhere; ``column`` is the place of x_j in [1, x]. Until they are joined,
-    numbers that are the same of all are given once.
+    Rule -1 is zero everywhere; ``column`` is the place of x_j in [1, x]. Until pairs are joined, a
+    number may stand for all of them.
     """
 
     above: Any
@@ -47,7 +46,7 @@ class _Pairs(NamedTuple):
     width: Any = 1.0
     own: Any = 0.0  # o
     curved: Any = 0.0  # c
-    least: Any = 0.0  # in the place of zero
+    least: Any = 0.0  # the right-hand side of the inequality
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +58,7 @@ class RuleOrder:
 
     @classmethod
     def of(cls, antecedent: Antecedent, signs, limits, slope_inputs):
-        """None where no order is known that is enough; columns are those of ``slope_inputs``."""
+        """None where no order is known that is enough; consequents slope by ``slope_inputs``."""
         every = np.arange(antecedent.n_rules)
         nothing = np.full(every.size, -1)
         found = [_Pairs(every[:0], every[:0])]
@@ -70,7 +69,7 @@ class RuleOrder:
             if signs[j] < 0:
                 pairs = pairs._replace(above=pairs.below, below=pairs.above, width=-pairs.width)
             column = 1 + np.flatnonzero(slope_inputs == j)
-            # Without slopes by it there is the plain order.
+            # Without slopes by x_j only the values are compared.
             slopes = {"column": column[0]} if column.size else {"own": 0.0, "curved": 0.0}
             found.append(pairs._replace(**slopes))
         if np.isfinite(limits[0]):
@@ -80,14 +79,14 @@ class RuleOrder:
         return cls(_joined(found), signs[slope_inputs])
 
     def about(self, reference):
-        """The same for inputs [1, x] less a reference."""
+        """The same for inputs [1, x] less a reference [0, x0]."""
         middle = self.pairs.middle - reference[self.pairs.column]
         return replace(self, pairs=self.pairs._replace(middle=middle))
 
-    def left(self, rules, low, high):
-        """By how much each holds for rules a + b x on a box, and its rounding.
+    def margins(self, rules, low, high):
+        """By how much every inequality holds for rules a + b x on a box, and the rounding of that.
 
-        Beside these, where least is left, the sums over [1, x] of either rule.
+        Then, where it holds by least, its factors of [a, b] of the rule above, and of that below.
         """
         pairs, columns = self.pairs, self.pairs.column
         rules = np.vstack([rules, np.zeros((1, rules.shape[1]))])
@@ -106,19 +105,19 @@ class RuleOrder:
         by_above, by_below = at.copy(), at.copy()
         by_above[every, columns] += pairs.width * (pairs.own + pairs.curved * np.exp(u))
         by_below[every, columns] -= pairs.width * (pairs.own + pairs.curved * np.exp(-u))
-        left = (by_above * above - by_below * below).sum(axis=1) - pairs.least
+        margins = (by_above * above - by_below * below).sum(axis=1) - pairs.least
         size = (np.abs(by_above * above) + np.abs(by_below * below)).sum(axis=1)
-        # Rounding of u counts as often as it is long.
+        # The error of u grows with the distance of the place from the middle, in widths.
         far = 1.0 + (np.abs(place) + np.abs(pairs.middle)) / np.abs(pairs.width)
         rounding = EPS * (ROUNDINGS + at.shape[1]) * (size + np.abs(pairs.least)) * far
-        return left, rounding, by_above, by_below
+        return margins, rounding, by_above, by_below
 
     def holds(self, rules, low, high):
         """Whether all hold for certain, whatever rounding has done."""
         if not (self.signs * rules[:, 1:] >= 0.0).all():
             return False
-        left, rounding, *_ = self.left(rules, low, high)
-        return bool((left >= rounding).all())
+        margins, rounding, *_ = self.margins(rules, low, high)
+        return bool((margins >= rounding).all())
 
 
 def is_in_order(model: TSKModel, output, signs, limits=(-np.inf, np.inf)):
@@ -201,26 +200,27 @@ def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
 
 
 def nearest_in_order(order: RuleOrder, factor, start, to_rules, box, equal, equal_to):
-    """The u nearest to ``start`` that keep an order on a box.
+    """The u nearest to ``start`` that keep an order on a box; InfeasibleError where none do.
 
-    Rules on [1, z] are ``to_rules @ u``, and E u = e. InfeasibleError where nothing keeps all.
+    Rules on [1, z] are ``to_rules @ u``; of E u = e, ``equal`` is E and ``equal_to`` e.
     """
     n_basis = 1 + order.signs.size
     n_rules = len(to_rules) // n_basis
-    # First the signs of the slopes; then every pair that is not in order, where it is worst.
+    # Signs of slopes are given at once; a pair is added when it fails, at the point of the worst.
     slopes = to_rules.reshape(n_rules, n_basis, -1)[:, 1:][:, order.signs != 0]
     signs = order.signs[order.signs != 0, None]
     slopes = (signs * slopes).reshape(-1, to_rules.shape[1])
 
     def violated(u):
-        left, _, by_above, by_below = order.left((to_rules @ u).reshape(n_rules, n_basis), *box)
-        short = np.flatnonzero(left < 0.5 * _MARGIN)
+        rules = (to_rules @ u).reshape(n_rules, n_basis)
+        margins, _, by_above, by_below = order.margins(rules, *box)
+        short = np.flatnonzero(margins < 0.5 * _MARGIN)
         rows, place = np.zeros((short.size, n_rules + 1, n_basis)), np.arange(short.size)
         rows[place, order.pairs.above[short]] += by_above[short]
         rows[place, order.pairs.below[short]] -= by_below[short]
         rows = rows[:, :-1].reshape(short.size, len(to_rules)) @ to_rules
         return rows, order.pairs.least[short] + _MARGIN
 
-    # Slopes that are none, because the data ask for none, stay so.
+    # A slope that the penalty holds at zero, since data ask for none, cannot keep a margin.
     least = _SLOPE * factor.half_solve(slopes.T).any(axis=0)
     return nearest_by_exchange(factor, start, equal, equal_to, slopes, least, violated)

@@ -1,7 +1,7 @@
-"""Whether data contradict a constraint: what the free fit is certain of, and does against it.
+"""Whether data contradict a constraint: whether the free fit breaks it, and is certain to.
 
-A slope: the mean change of the free fit over a third of the rows, as the input goes from the least
-to the largest of these, is against the sign by more than four of its own standard deviations. A
+A slope: over a third of the rows, sorted by the input, the mean change of the free fit from the
+smallest to the largest value is against the sign by more than four of its standard deviations. A
 limit: at some row the free fit is beyond it by as many.
 """
 
@@ -9,28 +9,28 @@ from itertools import pairwise
 
 import numpy as np
 
-# Squared errors over the free fit's from which on it matters.
-_PLAIN = 1.01**2
-# Standard deviations; of all slopes by an input, the part of wrong sign that rules do not explain.
-_CERTAIN, _MUCH = 4.0, 0.25
-_MOST_ROWS, _ROWS_TOLD, _PARTS = 2048, 5, 3
+# Ratio of squared errors, with the constraint over without, below which nothing is said.
+_WORTH_SAYING = 1.01**2
+# Standard deviations that make certain; and the part of all slopes by an input that has the wrong
+# sign where data contradict: less may come from how rules bend between data.
+_CERTAIN, _WRONG_PART = 4.0, 0.25
+_MOST_ROWS, _ROWS_NAMED, _PARTS = 2048, 5, 3
 
 
 def contradicted(free, held, inequalities, fixed, rows, raised):
     """A sentence for every output whose constraints the data contradict.
 
     ``free`` and ``held`` are models in the user's units, ``fixed`` the fixed points and the outputs
-    there, ``rows`` X, y and their numbers, and ``raised`` the squared error of training over the
-    free fit's.
+    there, ``rows`` X, y and their numbers, ``raised`` the ratio of squared training errors.
     """
-    if free.posterior is None or raised <= _PLAIN:
+    if free.posterior is None or raised <= _WORTH_SAYING:
         return
     X, y, numbers = rows
     some = X[:: max(len(X) // _MOST_ROWS, 1)]
     points, values = fixed
     gap = np.zeros(values.shape)
     if len(points):
-        # Beyond the range they are answered as its edge, or what is followed from there.
+        # A point beyond the range is predicted as the nearest point from which nothing changes.
         reach = free.max_extrapolation * free.spread if free.out_of_bounds == "linear" else 0.0
         answered = np.clip(points, free.minimum - reach, free.maximum + reach)
         gap = np.abs(free.predict(points) - values) - _CERTAIN * _deviation(free, answered).T
@@ -41,12 +41,12 @@ def contradicted(free, held, inequalities, fixed, rows, raised):
         if not guilty:
             continue
         before, after = ((y[:, k] - model.predict(X)[:, k]) ** 2 for model in (free, held))
-        worst = np.sort(numbers[np.argsort(before - after)[:_ROWS_TOLD]])
+        worst = np.sort(numbers[np.argsort(before - after)[:_ROWS_NAMED]])
         yield (
-            f"The data contradict {' and '.join(guilty)}: kept, it raises the error of training "
+            f"The data contradict {' and '.join(guilty)}: keeping this raises the training error "
             f"of {output!r} from {np.sqrt(before.mean()):.3g} to {np.sqrt(after.mean()):.3g}, far "
             f"more than noise would; rows {', '.join(map(str, worst))} speak most against it. "
-            "Leave the constraint out, or look at the data."
+            "Leave the constraint out, or look at these rows."
         )
 
 
@@ -55,7 +55,7 @@ def _speaks_against(one, free, X):
     excess = one.excess(free, X)
     if one.input is None:
         return bool((excess > _CERTAIN * _deviation(free, X)[one.output]).any())
-    if excess[excess > 0.0].sum() <= _MUCH * np.abs(excess).sum():
+    if excess[excess > 0.0].sum() <= _WRONG_PART * np.abs(excess).sum():
         return False
     column = X[:, one.input]
     edges = np.quantile(column, np.linspace(0.0, 1.0, _PARTS + 1))
@@ -71,6 +71,6 @@ def _speaks_against(one, free, X):
 
 
 def _deviation(free, X):
-    """Of what the free fit says, without the noise, (n_outputs, n_rows)."""
+    """Standard deviation of the free fit itself, without the noise, (n_outputs, n_rows)."""
     of_rows, of_noise = free.posterior.inside(free, X.T), free.posterior.noise[:, None]
     return np.sqrt(np.maximum(of_rows**2 - of_noise**2, 0.0))

@@ -1,8 +1,8 @@
 """What a model's output, and its slopes, can be on a box: docs/bounds.rst has the derivation.
 
-E is the mean over rules by their strengths, b and f are slopes and values of the consequents, D the
-departures of the slopes of log-strengths from their mean, c their curvature, phi whatever all rules
-share; h is the way that is followed out of range. What rounding may add is added to each bound.
+E is the mean over rules by their strengths; f are the values of the consequents and b their slopes;
+D are the slopes of log-strengths less their mean, c their curvatures; phi is any function that all
+rules share; h is the way that is followed out of range. Bounds allow for rounding.
 """
 
 from dataclasses import dataclass, field, replace
@@ -46,7 +46,7 @@ class _Parts:
     value: np.ndarray  # range of f
     departure: dict[int, np.ndarray]  # range of D, broadcast to the shape of f
     curvature: dict[int, np.ndarray]  # range of d^2 log w / dx_j^2, likewise
-    known: dict = field(default_factory=dict)  # what has been found of them
+    known: dict = field(default_factory=dict)  # a cache
     slack: np.ndarray | None = None  # (n_boxes,), what values are off by
     slope_slack: np.ndarray | None = None  # (n_inputs, n_boxes)
 
@@ -66,7 +66,7 @@ class Enclosure:
         self.place = {j: place for place, one in enumerate(self.factors) for j in one}
         self.reach, self.tangents = reach_of(model), model.tangent_groups
         answering = model.with_out_of_bounds("clip") if model.out_of_bounds in SILENT else model
-        # What the rules say is enclosed; that outputs are held comes last, being monotone.
+        # The rules are enclosed before outputs are held: that is monotone, and comes last.
         self.rules = replace(answering, target=None)
         self.lowest, self.highest = np.sort(sign * model.output_limits[:, output])
 
@@ -85,7 +85,7 @@ class Enclosure:
     def values(self, low, high):
         """Upper bounds on boxes (n_inputs, n_boxes), a point in each, and the output there.
 
-        Then what splitting along each input promises, (n_inputs, n_boxes).
+        Then how much of the bound is due to the width along each input, (n_inputs, n_boxes).
         """
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
@@ -99,7 +99,7 @@ class Enclosure:
         return self.hold(bound), points, self.hold(attained), gain
 
     def slope(self, low, high, j):
-        """As :meth:`values` of dP/dx_j; what is attained is so in the limit where it jumps."""
+        """As :meth:`values`, of the slope by input j; of a jump, values are one-sided limits."""
         with np.errstate(all="ignore"):
             parts = self._parts(low, high)
             natural = self._slope(parts, low, high, j)[1]
@@ -161,7 +161,7 @@ class Enclosure:
         return replace(parts, slack=slack, slope_slack=slope_slack)
 
     def _slacks(self, parts):
-        """What values (n_boxes,), and slopes (n_inputs, n_boxes), are off by at the most."""
+        """Largest rounding errors of values, (n_boxes,), and of slopes, (n_inputs, n_boxes)."""
         far_off = size(parts.box) + np.abs(self.model.reference)[:, None]
         largest = (np.abs(self.height) + np.abs(self.slopes) @ far_off).max(axis=0)
         part = EPS * (ROUNDINGS + self.model.n_rules + self.model.n_inputs)
@@ -173,7 +173,7 @@ class Enclosure:
             moved += 2.0 * strength * error * size(self._centred(parts, place))
         slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
         for j, ends in parts.departure.items():
-            # Of a rule that speaks alone D is zero, and yet its own slope has been rounded.
+            # Where one rule speaks alone D is zero, and yet its slope has been rounded.
             steepness = self._placed(parts.shares[self.place[j]].steepness[j], self.place[j])
             steepness = np.maximum(steepness, size(ends))
             slopes[j] += part * (strength * steepness).sum(axis=self.axes) * largest

@@ -1,9 +1,8 @@
 """Constraints on the outputs of a fit, kept for certain.
 
-Rules in order (``construction``) keep them by their own inequalities. Where that costs more than
-2 % of the error, the consequents are those on the way from there to the free fit that are as near
-to it as branch and bound can prove. Where no order is known, or none holds, the way begins at the
-best line for all rules.
+Rules in order (``construction``) keep them by inequalities of their own; where no order is known,
+or none holds, the best line for all rules does. If that raises the error by more than 2 %, the fit
+goes back towards the free one as far as branch and bound can prove that all are kept.
 """
 
 from contextlib import suppress
@@ -20,7 +19,7 @@ from ..learning.data import Scale
 from ..learning.objective import Evaluation
 from ..model import TSKModel
 from ..policies import SILENT
-from .certified import cuts_of, spread_points
+from .certified import spread_points, training_box
 from .constraints import Constraints
 from .construction import ONE_RULE, RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from .contradictions import contradicted
@@ -29,22 +28,22 @@ from .quadratic_program import InfeasibleError, nearest_by_exchange
 from .search import largest
 from .terms import is_known
 
-# Squared errors over the free fit's: beyond the first, a way back is sought; beyond the other, with
-# consequents that were drawn, it is told.
-_DEAR, _FAR = 1.02**2, 1.1**2
-# Halvings of the way; boxes of each proof, and of all on the way to the nearest (fewer where there
-# are more terms than so many).
+# Ratios of squared errors, constrained over free: beyond the first, consequents nearer to the free
+# fit are sought; beyond the other, consequents that were drawn are worth a warning.
+_COSTLY, _WORTH_A_WARNING = 1.02**2, 1.1**2
+# Halvings of the way; most boxes of a proof, and of all proofs before the way is halved (fewer
+# where there are more terms than so many, for boxes then take longer).
 _HALVINGS, _MOST_BOXES, _ALL_BOXES, _TERMS = 6, 3000, 10_000, 20
 # Standard deviations of the target that rounding may leave between a fixed point and a prediction.
 _OFF = 1e-8
-# Points that are added at once, the worst of many; and what is kept at them, in standard deviations
-# of the target, and of the input.
+# Points that are added at once, the worst of many; and the margin that is kept at them, in standard
+# deviations of the target, and of the input.
 _POINTS_A_ROUND, _MARGIN = 20, 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Ordered:
-    """Local consequents of rules in order."""
+    """Local consequents of rules in order, or of one line for all rules."""
 
     local: np.ndarray  # (n_columns, n_outputs)
     is_line: bool
@@ -52,51 +51,46 @@ class Ordered:
 
 @dataclass(frozen=True, eq=False)
 class Kept:
-    """Consequents that keep all constraints, for certain, and the best at the same premises."""
+    """Consequents that keep all constraints, for certain, and the free ones of these premises."""
 
     free: Evaluation
-    evaluation: Evaluation
+    evaluation: Evaluation  # with the constraints
     coefficients: np.ndarray  # in the user's units
     points: np.ndarray  # in the range, at which values are known
 
 
 def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, rows):
-    """The consequents next to those of an evaluation that keep all constraints; and a report.
+    """The consequents nearest to those of an evaluation that keep all constraints; and a report.
 
-    ``model`` is in the user's units; ``rows`` are X, y and their numbers, to say which contradict
-    what is known, or None.
+    ``model`` is in the user's units. With ``rows``, X, y and their numbers, a warning names those
+    that contradict a constraint.
     """
     fit = _ConstrainedFit(model, evaluation, problem, constraints)
-    ordered, before = fit.in_order(), evaluation.mean_squared_error
+    ordered, before = fit.in_order(), float(evaluation.mean_squared_error)
     local, drawn = ordered.local, float(ordered.is_line)
-    if fit.error(local) > _DEAR * before:
+    if fit.error(local) > _COSTLY * before:
         other, way = fit.drawn(ordered)
         if fit.error(other) < fit.error(local):
             local, drawn = other, way
     kept = fit.kept(ordered, local)
-    after = kept.evaluation.mean_squared_error
-    # Of data without noise the free fit may have none, to the last bit.
+    after = float(kept.evaluation.mean_squared_error)
+    # Of data without noise the free fit may have no error at all.
     raised = after / before if before else np.inf
-    report = {
-        "certified": True,
-        "drawn": drawn,
-        "loss_before": float(before),
-        "loss_after": float(after),
-    }
+    report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
     if rows is not None:
         held = replace(fit.model, coefficients=kept.coefficients)
         free = replace(model, target=None)
         fixed = constraints.points, constraints.values
         for message in contradicted(free, held, fit.inequalities, fixed, rows, raised):
             warn_user(message, ConstraintWarning)
-    if drawn and raised > _FAR and after:
+    if drawn and raised > _WORTH_A_WARNING and after:
         names = ", ".join(one.name for one in fit.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
+        end = "one line" if ordered.is_line else "rules in order"
         warn_user(
-            f"To be certain of {names}, the rules were drawn {drawn:.0%} of the way to "
-            f"{'one line' if ordered.is_line else 'rules in order'}, which raises the error of "
-            f"training by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or leave a "
+            f"To be certain of {names}, the rules were drawn {drawn:.0%} of the way to {end}: that "
+            f"raises the training error by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or leave a "
             "constraint out.",
             ConstraintWarning,
         )
@@ -113,9 +107,9 @@ def at_equal_widths(problem, evaluation, constraints: Constraints):
 
 
 def ways_in_order(problem, evaluation, constraints: Constraints, equal, equal_to):
-    """The nearest rules in order, and then the nearest line, as far as they are; InfeasibleError.
+    """Yield the nearest rules in order, then the nearest line; InfeasibleError if neither exists.
 
-    ``equal`` are sums over the local consequents, and ``equal_to`` what each output has there.
+    Of the equalities E u = e for local consequents u, ``equal`` is E, ``equal_to`` e by output.
     """
     failure = InfeasibleError(False)
     for is_line in (False, True):
@@ -128,9 +122,10 @@ def ways_in_order(problem, evaluation, constraints: Constraints, equal, equal_to
 
 
 def held_in_search(constraints: Constraints | None):
-    """What makes premises and consequents, of standardised data, rise and fall as they must.
+    """The function that keeps signs during the search, on standardised data; None without signs.
 
-    None where nothing must. Limits and fixed points, in the user's units, are left out.
+    It gives the antecedent and consequents nearest to an evaluation. Limits and fixed points, which
+    are in the user's units, are left to the final fit.
     """
     if constraints is None or not constraints.signs.any():
         return None
@@ -161,12 +156,9 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
         antecedent, to_rules = ONE_RULE, np.eye(problem.n_basis)
         equal = equal @ to_local
     local = np.empty_like(normal.coefficients)
+    limits = (np.stack([constraints.lower, constraints.upper]) - targets.offset) / targets.scale
     for k, signs in enumerate(constraints.signs):
-        limits = [
-            (limit[k] - targets.offset[k]) / targets.scale[k]
-            for limit in (constraints.lower, constraints.upper)
-        ]
-        order = RuleOrder.of(antecedent, signs, limits, slopes)
+        order = RuleOrder.of(antecedent, signs, limits[:, k], slopes)
         if order is None:
             raise InfeasibleError(False)
         local[:, k] = to_local @ nearest_in_order(
@@ -185,7 +177,7 @@ class _ConstrainedFit:
         # That outputs are held on top is monotone: what rules keep, predictions do.
         self.model = replace(model.with_out_of_bounds("clip"), target=None)
         self.policy = model.out_of_bounds, model.max_extrapolation
-        # A model whose outputs are what each local consequent adds to the standardised target.
+        # A model with an output for each local consequent: what it adds to the standardised target.
         n_columns = problem.n_columns
         as_it_is = Scale(*np.array([[0.0], [1.0], [0.0], [1.0]]).repeat(n_columns, axis=1))
         self.columns = self._with(np.eye(n_columns), as_it_is)
@@ -199,7 +191,7 @@ class _ConstrainedFit:
                 f"out_of_bounds={model.out_of_bounds!r} predicts nothing: "
                 f"{model.describe_out_of_bounds(beyond)} Use out_of_bounds='linear' or 'clip'."
             )
-        # Of the fixed points, sums over the local consequents, and what they are to be.
+        # E and e of the fixed points, for the local consequents.
         targets = problem.rows.targets
         values = (constraints.values - targets.offset) / targets.scale
         at_points = self.columns.with_out_of_bounds(*self.policy).predict(constraints.points)
@@ -234,15 +226,16 @@ class _ConstrainedFit:
         if by_equalities:
             names = " and ".join(map(repr, self.model.output_names))
             return InfeasibleConstraintsError(
-                f"constraints fixes {names} at {n_points} points, which {rules} cannot "
-                "all meet: two are the same, or there are more than consequents. Give fewer "
+                f"constraints fixes {names} at {n_points} points, which {rules} cannot all meet: "
+                "two points are the same, or there are more points than consequents. Give fewer "
                 "points, or use more rules."
             )
         names = " and ".join(one.name for one in self.inequalities)
-        with_points = f", with the {n_points} fixed points of constraints," if n_points else ""
+        points = "1 fixed point" if n_points == 1 else f"{n_points} fixed points"
+        with_points = f" together with the {points}" if n_points else ""
         return InfeasibleConstraintsError(
-            f"No consequents of {rules} keep {names}{with_points} all at once. Drop "
-            "one of them, or use order=1 or more rules."
+            f"No consequents of {rules} keep {names}{with_points}. Drop a constraint, or use "
+            "order=1 or more rules."
         )
 
     def error(self, local):
@@ -250,7 +243,7 @@ class _ConstrainedFit:
         return self._ended(local).mean_squared_error
 
     def kept(self, ordered, local) -> Kept:
-        """These consequents at the end of the fit."""
+        """What the fit ends with, if it is these consequents."""
         model, points = self.model, self.constraints.points
         if self.policy[0] == "linear":
             # Beyond, a tangent is known, which is more than a value: it is not counted.
@@ -261,13 +254,13 @@ class _ConstrainedFit:
         return Kept(self.free, self._ended(local), coefficients, points)
 
     def drawn(self, ordered):
-        """The nearest that is proven on the way from there, and how far that is drawn."""
+        """The nearest that is proven on the way from near the free fit, 0, to those in order, 1."""
         local, drawn = ordered.local, 1.0
         if not all(is_known(group.family) for group in self.free.antecedent.groups):
             return local, drawn
         near = self._nearest_at_points(ordered)
         halves = 0.5 ** np.arange(1, 1 + _HALVINGS)
-        # First all of the way, then next to none of it, and only then halves of what is left.
+        # First all of the way back, then the least step of it: where that fails others will too.
         for step in (1.0, halves[-1], *halves[:-1]):
             now = near + (drawn - step) * (ordered.local - near)
             if self._is_proven(self._model(now)):
@@ -302,7 +295,7 @@ class _ConstrainedFit:
 
         for k, values in enumerate(equal_to.T):
             given = normal.factor, normal.coefficients[:, k], equal, values, *nothing
-            # Where there is no end to it, the last is as good a way to be drawn back from.
+            # Where the exchange does not end, its last consequents are as good to draw back from.
             with suppress(InfeasibleError):
                 local[:, k] = nearest_by_exchange(*given, partial(violated, k=k))
         return local
@@ -323,7 +316,7 @@ class _ConstrainedFit:
         bound_of = Enclosure(model, one.output, -one.sign).evaluate(one.input)
         until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
         most = int(_MOST_BOXES * self.part)
-        found = largest(bound_of, *ends, 0.0, most, cuts_of(model), until=until)
+        found = largest(bound_of, *ends, 0.0, most, training_box(model), until=until)
         self.n_boxes += found.n_boxes
         return found, until
 
@@ -337,7 +330,7 @@ class _ConstrainedFit:
         return found.point[None][: int(found.attained > until)]
 
     def _ended(self, local):
-        """The best, with other local consequents."""
+        """The evaluation of the free fit, with other local consequents in its place."""
         normal = self.free.normal
         change, weighed = local - normal.coefficients, normal.gram + normal.penalty
         cost = self.free.cost + 0.5 * float(np.sum(change * (weighed @ change)))
@@ -359,7 +352,7 @@ class _ConstrainedFit:
         return model
 
     def _with(self, local, targets):
-        """The model of local consequents of some targets."""
+        """The model of local consequents, for targets of this scale."""
         problem, inputs = self.problem, self.problem.rows.inputs
         design = problem.consequent_inputs, self.model.order
         common = problem.penalty.common, self.model.rule_weights

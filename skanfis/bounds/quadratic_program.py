@@ -20,7 +20,7 @@ _MOST_ROUNDS = 1000
 
 
 class InfeasibleError(Exception):
-    """No consequents keep the constraints; ``by_equalities``: not even the equalities alone."""
+    """No consequents keep the constraints, or, if ``by_equalities``, not even the equalities."""
 
     def __init__(self, by_equalities):
         super().__init__()
@@ -40,7 +40,7 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
     short = least - at_least @ start - half.T @ (base @ toward)
     free = half - base @ (base.T @ half)
     length = np.sqrt(np.sum(free**2, axis=0))
-    # What equalities decide, or nothing can change: met, or not to be met.
+    # Inequalities that the equalities decide, or no u can change: they hold, or nothing helps.
     fixed = length <= _DEPENDENT * np.sqrt(np.sum(half**2, axis=0)) + np.finfo(float).tiny
     if (short[fixed] > _ZERO * (1.0 + np.abs(least[fixed]))).any():
         raise InfeasibleError(False)
@@ -56,7 +56,7 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
 def nearest_by_exchange(factor, start, equal, equal_to, at_least, least, violated):
     """The same for inequalities that are found as they are needed, beside those given.
 
-    ``violated`` gives rows and least of some that u does not keep, none where it keeps all.
+    ``violated`` gives rows of G, and of h, that a u does not keep; none where it keeps all.
     """
     n_given = len(least)
     for _ in range(_MOST_ROUNDS):
@@ -64,7 +64,7 @@ def nearest_by_exchange(factor, start, equal, equal_to, at_least, least, violate
         more, least_of_more = violated(solved)
         if not len(more):
             return solved
-        # Others are found again if they are needed again: the distance grows in every round.
+        # Those that do not hold u back may be needed again: the distance grows, so it ends.
         kept = holds_back | (np.arange(len(least)) < n_given)
         at_least = np.vstack([at_least[kept], more])
         least = np.append(least[kept], least_of_more)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Boxes that are split at once; where there are fewer than the latter, they are split on, unseen.
+# Most boxes that are split in one round; fewest that are worth evaluating: fewer are split again.
 _BATCH, _FEWEST = 1024, 64
 
 
@@ -22,7 +22,7 @@ class Found:
 
 
 class _Boxes(NamedTuple):
-    """Boxes (n_inputs, n_boxes), their bounds, and what splitting along each input promises."""
+    """Boxes (n_inputs, n_boxes), their bounds, and how much is due to the width by each input."""
 
     low: np.ndarray
     high: np.ndarray
@@ -37,7 +37,7 @@ class _Boxes(NamedTuple):
 
     @property
     def is_point(self):
-        """Which cannot be split any more."""
+        """Which boxes cannot be split any more."""
         least = 4.0 * np.spacing(np.maximum(np.abs(self.low), np.abs(self.high)))
         return (self.high - self.low <= least).all(axis=0)
 
@@ -71,8 +71,8 @@ def largest(
 ) -> Found:
     """Enclose the largest value that a function takes on a box.
 
-    ``evaluate`` is as ``Enclosure.values``. Bound and value may be ``tolerance`` apart, or both on
-    one side of ``until``; boxes are cut at ``cuts`` first. ``first`` is a point and its value.
+    ``evaluate`` is as ``Enclosure.values``. The search ends when bound and value are ``tolerance``
+    apart, or on one side of ``until``. It cuts at ``cuts`` first; ``first`` is a point, its value.
     """
     where, best = (low, -np.inf) if first is None else first
     lows, highs = low[:, None].astype(float), high[:, None].astype(float)

@@ -2,12 +2,11 @@ r"""What terms can be on a box, for every family; shares of strengths, and means
 
 log mu rises up to the term's place and falls from there on. Slopes of log-concave families
 (Gaussians, sigmoids) fall; those of bells and of flanks with a foot are looked at piece by piece.
-Ranges are taken over a box wider by what rounding x and the term's numbers may amount to, and are
-then widened by rounding themselves: they hold of log mu as it is, and as it is computed.
+The box is first widened by what rounding x and the term's numbers may amount to, then the ranges by
+their own rounding: they hold of log mu as it is, and as it is computed.
 
 Strengths are products of shares, one of each factor: a softmax of sums l_k of log mu, enclosed from
-the ranges of all l_k. A mean sum_k nu_k v_k is bounded by weak duality; docs/bounds.rst has the
-formulas.
+the ranges of all l_k. Means sum_k nu_k v_k are bounded by weak duality: see docs/bounds.rst.
 """
 
 from dataclasses import dataclass, replace
@@ -33,8 +32,8 @@ from ..membership import (
 from ..membership.profiles import LinearProfile, SplineProfile
 
 EPS = float(np.finfo(float).eps)
-# Roundings of a membership, a share, a rule's output or its slope, in EPS, with room to spare: of
-# a dozen operations one after another, beside those of sums, which are counted.
+# Rounding errors, in EPS, of a membership, a share, a rule's output or its slope: of a dozen steps,
+# with room to spare. Those of sums are counted beside.
 ROUNDINGS = 32.0
 _SIDES, _PRODUCTS = tuple(SIDES.values()), tuple(PRODUCTS.values())
 _LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, *_PRODUCTS, *_SIDES)
@@ -51,7 +50,7 @@ def is_known(family):
 
 
 class TermRanges(NamedTuple):
-    """Of every term in every box: both ends, (2, n_terms, n_boxes), and an error."""
+    """Ranges over every box for every term, (2, n_terms, n_boxes), and an error."""
 
     log_mu: np.ndarray
     slope: np.ndarray
@@ -184,12 +183,12 @@ def _sigmoid_curve(lo, hi):
 
 
 def _along(factor, by_term):
-    """Along each input, sums over each share's terms, (..., n_shares, n_boxes)."""
+    """By input, sums over the terms of each share, (..., n_shares, n_boxes)."""
     return {j: by_term[..., places, :].sum(axis=-2) for j, places in factor.items()}
 
 
 def _total(factor, by_term):
-    """The same over all inputs."""
+    """Sums over the terms of each share on all inputs, (..., n_shares, n_boxes)."""
     return sum(_along(factor, by_term).values())
 
 
@@ -203,7 +202,7 @@ class Shares:
     error: np.ndarray  # of the logarithm of a share as it is computed, at most
     steepness: dict[int, np.ndarray]  # size of d l / dx_j
     curvature: dict[int, np.ndarray]  # range of d^2 l / dx_j^2
-    departure: dict[int, np.ndarray]  # range of D along each input
+    departure: dict[int, np.ndarray]  # range of D_j, d l / dx_j less its mean by the shares
 
 
 def term_ranges(antecedent: Antecedent, low, high):
@@ -252,7 +251,7 @@ def _by_range(low, high):
     least = down / (down + np.maximum(others_up, 0.0) + 2.0 * slack * up.sum(axis=0))
     spare = np.maximum(others_down - 2.0 * slack * down.sum(axis=0), 0.0)
     most = np.minimum(up / (up + spare) * (1.0 + slack), 1.0)
-    # Of a share that no box can give a strength to, nothing is left: 0 / 0.
+    # 0 / 0: all that is known of the share is that it lies from 0 to 1.
     return np.nan_to_num(least * (1.0 - slack), nan=0.0), np.nan_to_num(most, nan=1.0)
 
 

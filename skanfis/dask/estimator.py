@@ -26,9 +26,9 @@ class DaskANFISRegressor(ANFISRegressor):
     structure is searched and the memberships are trained first. Up to 100,000 rows are fetched.
 
     Parameters, attributes and results are those of :class:`skanfis.ANFISRegressor` on the same
-    rows, up to rounding errors. X, y, weights and groups may be dask arrays or frames cut at the
-    same rows, or whatever it takes. Of dask collections ``predict`` is lazy, and ``score`` is a
-    reduction. The scheduler is that which dask uses; partitions are loaded anew for every pass,
+    rows, up to rounding errors. Give X, y, weights and groups all as dask arrays or frames cut at
+    the same rows, or all as that takes them. On dask collections ``predict`` is lazy, and ``score``
+    is a reduction. The scheduler is dask's current one; partitions are loaded anew for every pass,
     some eight times, unless they have been persisted (``X.persist()``).
 
     Notes
@@ -109,7 +109,7 @@ class DaskANFISRegressor(ANFISRegressor):
 
     def _check_inputs(self, X):
         if is_collection(X):
-            raise TypeError("Of dask collections there are fit, predict, score: give X.compute().")
+            raise TypeError("Only fit, predict and score take dask collections: give X.compute().")
         return super()._check_inputs(X)
 
     def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):

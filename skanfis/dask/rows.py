@@ -18,7 +18,7 @@ from ..training.chunks import joined_scales
 
 # Results that one task adds: a deep tree has many tasks, a flat one holds many results at once.
 _FAN_IN = 8
-# Weights within which squares are finite.
+# Squares of weights up to this, and of their inverses, are finite.
 _LARGEST_WEIGHT = 2.0**400
 
 
@@ -29,7 +29,7 @@ def is_collection(value):
 
 @dataclass(frozen=True)
 class Layout:
-    """What every partition must look like; given names are None where the collection has none."""
+    """Shape and names that every partition must have; names are None where there are none."""
 
     n_inputs: int
     n_outputs: int
@@ -42,8 +42,8 @@ class Layout:
         for what, one, dimensions in (("X", X, (2,)), ("y", y, (1, 2))):
             if not is_collection(one):
                 raise TypeError(
-                    f"{what} is a {type(one).__name__}, but the other one is a dask collection: "
-                    "give both as dask arrays or DataFrames."
+                    f"{what} is a {type(one).__name__}, but other data are dask collections: give "
+                    "X and y as dask arrays or DataFrames, or compute() the others."
                 )
             if one.ndim not in dimensions:
                 raise ValueError(f"{what} has {one.ndim} dimensions: X must have 2, y 1 or 2.")
@@ -115,14 +115,14 @@ def _delayed(collection, what):
 
 
 def reduce_partitions(partitions: Partitions, of_rows: Callable, merge: Callable):
-    """What ``of_rows`` makes of every partition, merged two by two, in their order.
+    """Apply ``of_rows`` to every partition and merge the results, in the order of partitions.
 
     One task per partition, and a tree of merges; nothing but the result comes to the client.
-    ``of_rows`` takes the rows with weight, not standardised.
+    ``of_rows`` takes the rows with weight, not standardised; ``merge`` takes two results.
     """
     from dask.delayed import delayed
 
-    # One key for all tasks: what they have in common is sent to a worker once.
+    # One key for what all tasks have in common: it is sent to a worker once.
     common = delayed((partitions.layout, of_rows), traverse=False)
     apply, add = delayed(_apply, pure=False), delayed(reduce, pure=False)
     level = [apply(common, number, *parts) for number, parts in enumerate(partitions.pieces)]
@@ -219,7 +219,7 @@ def _numbers(table, what, names, n_columns):
 
 @dataclass(frozen=True, eq=False)
 class ClusterRows:
-    """As ``StandardisedData``, wherever the partitions are; on a sample, rows are at hand."""
+    """``StandardisedData`` whose rows stay on the cluster, but for a ``sample`` that is here."""
 
     partitions: Partitions
     n_rows: int
@@ -244,9 +244,9 @@ def _on_scales(rows, inputs, targets, of_rows):
 
 
 def _describe(rows, layout):
-    """Count, weight, and scales of inputs and targets of a partition, None of no rows.
+    """Count, weight, and scales of inputs and targets of a partition; None if it has no rows.
 
-    ValueError where it is not finite.
+    ValueError where a value is not finite.
     """
     if rows.n_rows == 0:
         return None
@@ -262,7 +262,7 @@ def _describe(rows, layout):
 
 
 def joined(one, other):
-    """Describe the rows of both."""
+    """The description, as of ``_describe``, of the rows of two partitions together."""
     if one is None or other is None:
         return other if one is None else one
     n_rows, weights, *scales = zip(one, other, strict=True)

@@ -98,9 +98,8 @@ def make_ofog(
 
     Every device is drawn from a population and goes through ``n_runs`` thermal runs, while the
     table steps through rates of both signs. A compensator on board knows the columns time,
-    temperature and output (or counts), and no others. Hold out whole runs (``run``) or devices
-    (``device``), never single rows: neighbours are nearly equal. :doc:`/gyro_simulator` has the
-    formulas and coefficients.
+    temperature and output (or counts) alone. Hold out whole runs (``run``) or devices (``device``),
+    never single rows: neighbours are nearly equal. Formulas are in :doc:`/gyro_simulator`.
 
     Parameters
     ----------
@@ -131,8 +130,8 @@ def make_ofog(
     coefficients : dict of str to float, default=None
         Nominal values by their names in :doc:`/gyro_simulator`. Zero turns an effect off.
     random_state : int, RandomState instance or None, default=None
-        Seed. Changing ``noise``, ``coefficients`` or ``device_spread`` leaves all that is drawn as
-        it was, up to its size.
+        Seed. The draws stay the same, up to their size, for another ``noise``, ``device_spread`` or
+        ``coefficients``.
 
     Returns
     -------
@@ -286,8 +285,7 @@ def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
 def _draw_rates(n_dwells, largest, levels, random_state):
     """True rate of each dwell of a power-up: each level comes once before any comes again.
 
-    Without levels there is one rate in each of as many equal parts of the range as there are
-    dwells.
+    Without levels the range is cut into as many equal parts as there are dwells, with a rate each.
     """
     if levels is None:
         parts = np.arange(n_dwells) + random_state.uniform(size=n_dwells)

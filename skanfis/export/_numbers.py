@@ -2,8 +2,7 @@
 
 Inputs are about the model's reference, rounded to the type: z = x - reference is exact for inputs
 near it, and an offset (a time stamp, a raw count) costs no digits. Consequents are about one value
-per output as well: strengths sum to one, so that it may be added at the end, and what is summed is
-no larger than it must be.
+per output, which is added at the end, since strengths sum to one: sums stay small.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The inputs of a folded model, taken out of tables; what those that encode a category tell."""
+"""The inputs of a folded model, read from the user's tables; levels of one-hot encoded columns."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from .._validation import check_finite
 
 
 class Level(NamedTuple):
-    """A level of a raw column, and all others, where there can be no more."""
+    """A level of a raw column, and all other levels; none of these if there may be unknown ones."""
 
     column: str
     level: str
@@ -26,20 +26,20 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """Raw column ``source`` as x = offset + scale z, or output ``place`` of what encodes it."""
+    """An input z: raw column ``source`` is offset + scale z, or z is an output of an encoder."""
 
     source: int
     name: str
     offset: float = 0.0
     scale: float = 1.0
     encode: Callable[..., np.ndarray] | None = None
-    place: int = -1
-    level: Level | None = None  # what it tells, if it is such an output
-    fill: Any = None  # in the place of what is missing
+    place: int = -1  # of the output
+    level: Level | None = None  # that an encoder's output indicates
+    fill: Any = None  # replaces missing values
     imputed: Callable[..., np.ndarray] | None = None  # the column as an imputer hands it on
 
     def values(self, X, encoded):
-        """The input on the rows of the user's table, and of what encoders make of these."""
+        """The input, in raw units, from the user's table and the outputs of encoders."""
         if self.encode is not None:
             return encoded[self.encode][:, self.place].astype(np.float64)
         numbers = _as_numbers(part_of(X, [self.source]))[:, 0]
@@ -47,7 +47,7 @@ class Column:
 
 
 def by_column(levels):
-    """Names of indicators by the raw column, and what the levels without one are called."""
+    """By raw column the names of its indicators, and the names of its levels without one."""
     found: dict[str, list[str]] = {}
     for name, level in levels.items():
         found.setdefault(level.column, []).append(name)

@@ -119,7 +119,7 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
     columns = [Column(j, name) for j, name in enumerate(names)]
     for label, step in steps:
         columns = _columns_after(label, step, columns)
-    # What orders the inputs, and no two of them share.
+    # Inputs are in the order of these keys, which must be different.
     keys = [(column.source, column.place) for column in columns]
     for column, key in zip(columns, keys, strict=True):
         if keys.count(key) > 1:
@@ -128,7 +128,7 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
                 "cannot be written with one membership per column. Let every column reach it once."
             )
     order = np.array(sorted(range(len(columns)), key=keys.__getitem__))
-    # Columns keep their names; a level may be called like one, "fibre_PM".
+    # A raw column keeps its name, even if an indicator would be called the same, "fibre_PM".
     by_claim = sorted(order, key=lambda j: columns[j].encode is not None)
     for j, name in zip(by_claim, distinct(columns[j].name for j in by_claim), strict=True):
         columns[j] = replace(columns[j], name=str(name))
@@ -148,7 +148,7 @@ def last_step(estimator: Any) -> Any:
 
 
 def final_step(estimator: Any, X: Any = None) -> tuple[Any, Any]:
-    """What predicts, behind what freezes or found it, and X, if given, as it takes it."""
+    """The last step, inside searches, frozen estimators and Pipelines; and X as that takes it."""
     estimator = found_by_search(estimator)
     if isinstance(estimator, FrozenEstimator):
         return final_step(estimator.estimator, X)
@@ -214,9 +214,7 @@ def _columns_after(label, step, columns):
 def _imputed(label, imputer, columns):
     """The columns, with what stands for missing values."""
     if imputer.add_indicator or not pd.isna(imputer.missing_values):
-        _refuse(
-            label, imputer, "only add_indicator=False and missing_values=nan leave numbers alone"
-        )
+        _refuse(label, imputer, "it needs add_indicator=False and missing_values=nan")
     if pd.isna(imputer.statistics_).any():
         _refuse(label, imputer, "it drops a column that has no values")
 

@@ -11,11 +11,9 @@ from ..antecedent import TermGroup
 MOST_NUMBERS = 20_000_000
 # Squares of numbers up to this size, and of their ratios, are finite.
 LARGEST_NUMBER = 1e50
-# Of lengths and factors, which something is divided by.
+# Lengths and factors are no smaller: something is divided by them.
 SMALLEST_NUMBER = 1e-50
-
-# Of a value in a message.
-_SHOWN = 60
+_SHOWN = 60  # characters of a value in a message
 
 
 def check_size(n_rules, n_terms, n_inputs, n_outputs):
@@ -65,7 +63,7 @@ def shown(value):
 
 
 def read_bytes(path, most_bytes):
-    """The file's bytes; ValueError, without reading on, where there are more than so many."""
+    """The bytes of a file; ValueError if there are more than so many, which are not read."""
     text = os.fsdecode(path)
     if "\n" in text or text.lstrip().startswith("{"):
         raise ValueError(

@@ -99,7 +99,7 @@ def export_json(
         if (n_bytes := len(text.encode())) > _MOST_BYTES:
             raise ValueError(f"{n_bytes:,} bytes, of at most {_MOST_BYTES:,}. joblib can keep it.")
     except ValueError as error:
-        raise ValueError(f"the model cannot be written such that it can be read: {error}") from None
+        raise ValueError(f"cannot write what read_json would refuse: {error}") from None
     if path is not None:
         Path(path).write_text(text, encoding="utf-8", newline="\n")
     return text
@@ -142,7 +142,8 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
     except RecursionError:
         raise ValueError(f"{path}: nested too deeply to be a model.") from None
     except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
+        kind = "no JSON: " if isinstance(error, json.JSONDecodeError | UnicodeDecodeError) else ""
+        raise ValueError(f"{path}: {kind}{error}") from None
 
 
 def _terms(model):

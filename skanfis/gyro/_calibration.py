@@ -28,15 +28,15 @@ from .metrics import rms, scale_factor
 
 _TIME_CONSTANT = 30.0  # of the rate of the temperature [s]
 _MOST_FIT_ROWS = 10_000
-# Of the law beside rules, in temperature: of degree 1 rules would have to bend for it.
+# Degree in temperature of the law beside rules: with 1, rules would be spent on its curvature.
 _DEGREE = 2
 # Rules are looked for among so many rows, and fitted to all. More than so many rules gained 1 % on
 # 16 simulated logs, and looking at them takes as long again.
 _ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 12
-# Of a verdict: the name of the model in it, and what a gain must be above to be worth having.
+# The model's name in a verdict, and the gain that a compensation must exceed to be worth having.
 _MODEL, _LEAST_GAIN = "this model", 1.02
 _CONFIDENCE = 0.95
-# Errors smaller than this part of the uncompensated one are rounding, and equal.
+# Errors below this part of the uncompensated one are rounding: they count as equal.
 _ROUNDING = 1e-9
 
 
@@ -76,16 +76,16 @@ class Gain:
 
 @dataclass(frozen=True)
 class Verdict:
-    """RMS errors [deg/s] by name, the simplest first and the model last, and the name to use.
+    """RMS errors [deg/s] by name, the simplest first and the model last, and which is recommended.
 
-    ``gains`` has those of the model over each of the others.
+    ``gains`` are those of the model over each of the others.
     """
 
     rms: dict[str, float]
     gains: dict[str, Gain]
     n_groups: int
     recommended: str
-    is_one_cycle: bool = False  # and cannot tell whether it repeats
+    is_one_cycle: bool = False  # one thermal cycle cannot show that it repeats
 
     @property
     def model(self):
@@ -250,7 +250,7 @@ def fit_model(X, target, groups, recipe):
             return found
         structure = {"partition": found[-1].model_}
     rules = _make_rules(recipe, **structure)
-    # In every round the same rules begin: looked for once, in what the law leaves.
+    # The rules are searched once, in what the law leaves: every round begins with them.
     whole = rules if law is None else ResidualRegressor(law, rules, n_rounds=ROUNDS)
     return whole.fit(X, target)
 
@@ -272,7 +272,7 @@ def some_rows(rows, n_rows, X, rng):
 
 
 def _held_out(X, target, groups, split, recipe, tell, rng):
-    """Predictions of every row by a model new to it, which are in range, folds, models."""
+    """Predictions of every row by a model new to it; which rows are in range; folds; models."""
     predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
     folds, models = [], []
     for number, (train, test) in enumerate(split.folds, 1):
@@ -316,10 +316,10 @@ def _to_write(recipe, verdict, simpler):
 
 
 def judge(errors, groups, is_one_cycle=False):
-    """Judge compensations by their errors on the same rows, and what was held out together.
+    """Judge compensations by their errors on the same rows, in groups that were held out together.
 
     ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
-    One thermal cycle at rest shows of no more than a constant that it repeats.
+    One thermal cycle at rest recommends a constant at most: it cannot show that more repeats.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     counts = np.bincount(codes)

@@ -25,7 +25,7 @@ _LONGEST_RUN = 31 * 86_400.0  # s
 _FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
 _LEAST_SPAN = 10.0  # degC, to learn from
 _NOISE = 5.0  # degC by which a few rows may differ
-# Fewer rows tell neither a line in every input nor what is left of it.
+# Fewer rows determine neither a line in every input nor the errors that it leaves.
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
 LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
@@ -33,22 +33,23 @@ _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
 # Steps of 20 times the usual one are no noise; glitches are rare.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LEAST_CORRELATION = 0.9  # of output and rate
-# Rows at which one value of the output is no chance, and their part of the range of rates then.
+# An output is saturated where it has its largest or smallest value in so many rows or more, at
+# rates that differ by more than this part of their range.
 _FEWEST_SATURATED, _SATURATED = 3, 0.02
-# What an error says of it; of a file its name is put in.
+# Messages have this text; where a file was read, ``LogFile.located`` puts the column's name in.
 RATE_COLUMN = "column of the rate"
 
 # More than so many rows of a kind support one another.
 _MOST_GLITCHES = 3
-# Times the deviation of the next row: none of a bell-shaped noise comes near, nor of Student's with
-# three degrees of freedom in a thousand logs.
+# A row is alone if it deviates so many times as much as the next one: Gaussian noise never comes
+# near, nor does Student's with three degrees of freedom in a thousand logs.
 _ALONE = 5.0
-# Their median is the row's surroundings, and stands one other glitch among them.
+# A row is compared with the median of so many, which bears one other glitch among them.
 _N_NEIGHBOURS = 8
 _MOST_CANDIDATES = 2_000  # the rows farthest off
-# A temperature moves slowly: a part of its range is a lot from one row to the next.
+# A temperature moves slowly: a step of this part of its range, from row to row, is a glitch.
 _SMOOTH = 0.2
-_SOUND = 0.9  # of the rows, at least, are no glitches
+_SOUND = 0.9  # part of the rows, at least, that are no glitches
 
 
 def check_log(
@@ -93,7 +94,7 @@ def check_log(
     skanfis.gyro.errors.LogError: column 'temperature', row 0: ... degC is not plausible ...
     """
     units = CANONICAL | declared_units(units)
-    if len(log) < (_FEWEST_ROWS if len(inputs) else 1):
+    if len(log) < _FEWEST_ROWS:
         rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
         raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
     for part in columns_of(inputs):
@@ -101,7 +102,7 @@ def check_log(
             raise LogError(f"the log has no {part}.")
     runs = log["run"] if "run" in log else np.zeros(len(log))
     check_rows(log, units, pd.factorize(runs, use_na_sentinel=False)[0])
-    n_runs = log["run"].nunique() if "run" in log and len(inputs) else 1
+    n_runs = log["run"].nunique() if "run" in log else 1
     if n_runs * _FEWEST_ROWS_PER_RUN > len(log):
         raise LogError(
             f"{n_runs} runs in {len(log)} rows are too many; is it a counter of rows? A run lasts "
@@ -334,7 +335,7 @@ def find_glitches(log, error):
     places /= np.where(scale > 0.0, scale, 1.0)
     # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
     tree = cKDTree(places, balanced_tree=False)
-    # Itself among them, which a median stands too.
+    # The row itself is among them, which a median bears too.
     nearest = tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
     sizes = np.abs(error[far] - np.median(error[nearest], axis=1))
     order = np.argsort(-sizes, kind="stable")[: _MOST_GLITCHES + 1]

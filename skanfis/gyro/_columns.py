@@ -9,7 +9,7 @@ import numpy as np
 
 from ..export.folding import final_step
 
-# Of each unit: its factor to the canonical one, and spellings in lower case, without blanks.
+# By unit: its factor to the canonical one, and spellings in lower case, without blanks.
 _TABLE = {
     "time": {
         "s": (1.0, "sec secs second seconds"),
@@ -96,7 +96,7 @@ def rate_unit_of(unit):
 
 
 def in_rate_unit(unit, wanted):
-    """The unit with its rate as wanted, and what values are multiplied by; as it is without one."""
+    """A unit such as "deg/h/degC" with its rate as wanted, and the factor that this takes."""
     own = rate_unit_of(unit)
     if own is None:
         return unit, 1.0

@@ -24,8 +24,8 @@ _TRUTH = (
     "true truth table turntable drehtisch ref reference stage commanded command cmd encoder soll "
     "consigne"
 )
-# How much a word in a column's name speaks for a part. A chamber's thermometer is no gyro's; what
-# is of a temperature, as its rate, is no rotation.
+# Scores: how much a word in a column's name speaks for a part. A chamber's thermometer is not the
+# gyro's; a rate of a temperature is no rotation.
 _WORDS = {
     "time": {
         5.0: "time timestamp zeit uhrzeit zeitstempel zeitpunkt datetime temps 时间",
@@ -44,9 +44,9 @@ _SCORES = {
     part: {word: score for score, words in table.items() for word in words.split()}
     for part, table in _WORDS.items()
 }
-_STRANGER = -0.5  # any other word
-_FOLLOWS = 0.9  # correlation of the axis that the table turns
-_SIGNAL, _UNIT = 3.0, 0.25  # a unit of a raw signal, for the output; any unit
+_STRANGER = -0.5  # score of any other word
+_SIGNAL, _UNIT = 3.0, 0.25  # scores of a raw signal's unit, for the output; of any unit
+_FOLLOWS = 0.9  # correlation with the rate, of the axis that the table turns
 _OF_NO_PART = (
     "residual fit fitted error err noise random walk std sigma var variance status flag valid crc "
     "checksum seq sequence index trend delta diff acc accel accelerometer mag pressure humidity "
@@ -98,9 +98,9 @@ class Request:
 
 @dataclass
 class Layout:
-    """Places of the parts in a file and their units there; ``others`` would do as well.
+    """Places of the parts in a file, and their units there.
 
-    ``assumed`` are parts whose units are neither told nor in the names.
+    ``others`` are columns that would do as well, ``assumed`` parts whose units nothing tells.
     """
 
     header: list
@@ -255,7 +255,7 @@ def _by_unit(part, columns, layout):
 
 
 def _by_text(part, columns, layout):
-    """A column that is called so, of what begins like numbers: reading says why it holds none."""
+    """A column that is called so and begins like numbers: reading it will say what is wrong."""
     for column in columns:
         is_free = column.place not in layout.places.values() and part != "time"
         if is_free and column.score(part) > 0.0 and column.text.lstrip("+-.,\u2212")[:1].isdigit():

@@ -165,7 +165,7 @@ def of_rates(compensator, log, rates):
 def written_text(calibration):
     """What is written, and whether that is what is recommended."""
     asked = calibration.recipe.write != "recommended"
-    others = "as --write asks" if asked else "as recommended; --write names another"
+    others = "as --write asks" if asked else "as recommended; --write chooses another"
     return f"{ARTICLES.get(calibration.written, 'the fuzzy rules')}, {others}"
 
 
@@ -181,14 +181,13 @@ def against_reading(calibration):
 
 
 def proven_bounds(calibration):
-    """What is proven in the range of the calibration, of what the rules, or a cubic, give.
+    """What is proven of the rules, or a cubic, in the range of the calibration.
 
-    The size that no compensation exceeds [deg/s]; and whether the compensated rate goes with the
-    output, in the sense of the scale factor: None where the output is no input, or what is beside
-    the rules is not bounded.
+    The size that no compensation exceeds [deg/s]; and whether the compensated rate always follows
+    the output: None if the output is no input, or what stands beside the rules is not bounded.
     """
     compensator, X = calibration.compensator, calibration.X
-    own, rules = 1.0 / compensator.scale_factor, compensator.estimator
+    per_output, rules = 1.0 / compensator.scale_factor, compensator.estimator
     if isinstance(getattr(rules, "base_", None), Polynomial):
         error = ErrorModel(compensator, rules, X)
         return float(np.abs(error.ranges(*error.ends.T[:, :, None])[0]).max()), None
@@ -199,8 +198,8 @@ def proven_bounds(calibration):
         return largest, None
     # rate = output / factor - error: its slope has the factor's sign where the error's is less.
     slope = gradient_bounds(rules, "output", max_boxes=_MOST_BOXES)
-    rises = slope.upper[0] < own if own > 0.0 else slope.lower[0] > own
-    return largest, bool(np.all(rises))
+    follows = slope.upper < per_output if per_output > 0.0 else slope.lower > per_output
+    return largest, bool(follows[0])
 
 
 def formula_of(calibration, name):

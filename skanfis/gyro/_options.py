@@ -39,8 +39,8 @@ _TARGETS = (
     "ardupilot:AXIS[:INSTANCE] (1 to 3)"
 )
 _OF_OUTSIDE = (
-    "beyond the range of the calibration, where rows are flagged: hold the edge (clip), go on "
-    "along the tangent for a while (linear, default; a cubic is held), or give none (nan)"
+    "beyond the range of the calibration, where rows are flagged: hold the value at the edge "
+    "(clip), follow the tangent for a while (linear, default; a cubic is held), or none (nan)"
 )
 _WHAT = """\
 Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
@@ -84,14 +84,14 @@ def make_parser():
     group = parser.add_argument_group("reading the log")
     told = "text with a header, as CSV or .lvm, .mat, .xlsx or Parquet: one log, or a file per run"
     add("logs", told, nargs="+", metavar="LOG")
-    told = f"the column of {', '.join(PARTS)}; what is not named is guessed by names and units"
+    told = f"columns of {', '.join(PARTS)}; those not named are guessed from names and units"
     add("--columns", told, metavar="PART=NAME", **several)
-    told = f"by default those in the names, or what the values tell. {units}"
+    told = f"units in the files (default: from the names of columns, or the values). {units}"
     add("--units", told, metavar="PART=UNIT", **several)
-    told = "of a raw signal at one rate, which does not tell it: counts per deg/s"
+    told = "of a raw signal, such as counts per deg/s; asked for where the log has one rate"
     add("--scale-factor", told, type=_scale_factor)
     group = parser.add_argument_group("the model")
-    told = "all that the log has; time, since power-on, with three runs or more"
+    told = "default: all that the log has, the time since power-on only with three runs or more"
     add("--inputs", told, nargs="+", choices=INPUTS)
     told = "fuzzy terms per input, such as 2,1,3; 'search' (default) finds rules by held-out groups"
     add("--terms", told, type=_terms, default="search")
@@ -99,24 +99,24 @@ def make_parser():
     add("--physics", told, action="store_true")
     group = parser.add_argument_group("where it holds, and how it is checked")
     add("--outside", _OF_OUTSIDE, choices=("clip", "linear", "nan"), default=Recipe.outside)
-    add("--groups", "what to hold out", choices=KINDS, default="auto")
+    add("--groups", "what is held out (auto: as the log asks)", choices=KINDS, default="auto")
     group = parser.add_argument_group("the report")
     add("--serial", "serial number of the gyro", default="")
     add("--operator", "who made the calibration", default="")
-    told = "of the specification, as in residual_rms=0.01deg/s (at most), reduction_factor=10"
-    add("--limits", f"{told} (at least)", type=parse_limit, metavar="FIGURE=VALUE", **several)
+    told = "of the specification: at most residual_rms=0.01deg/s, at least reduction_factor=10"
+    add("--limits", told, type=parse_limit, metavar="FIGURE=VALUE", **several)
     add("--pdf", "also write it as report.pdf", action="store_true")
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
-    add("--trust", "of a .joblib, which runs the code in it: trust its maker", action="store_true")
+    add("--trust", "load a MODEL that is a .joblib: runs its maker's code", action="store_true")
     told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
-    told = "what is recommended (default), or another: the rules of the model, or what is simpler"
+    told = "the recommended compensation (default), the rules, or one of the simpler ones"
     add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
     stds = ("c99", "c89", "c99:float", "c89:float")
     add("--c", "also write the model as C, by this standard, in double or float", choices=stds)
-    told = f"also a simple target, where it is good enough: {_TARGETS}"
+    told = f"also write a simple function in place of the model, if it is good enough: {_TARGETS}"
     add("--target", told, type=_target, **several)
     told = "replace files that exist, and remove those of an earlier run that are not written anew"
     add("--force", told, action="store_true")

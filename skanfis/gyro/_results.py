@@ -31,8 +31,7 @@ _SMALL = 0.05  # deg/s
 _DOTS_PER_INCH = 160  # sharp in print
 _FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
 _MOST_ROWS_SHOWN = 20_000  # rows beyond cover one another
-# Display and caption by name of the files; of a caption the first sentence is read out to those who
-# cannot see the picture.
+# Display and caption by name of the files; a caption's first sentence is also the alternative text.
 _PICTURES = {
     "error-by-time": (ErrorDisplay, "Error against time, before and after."),
     "error-by-temperature": (ErrorDisplay, "Error against temperature, before and after."),
@@ -83,8 +82,7 @@ class Picture(NamedTuple):
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         file = io.BytesIO()
-        # Software and date would make two reports on the same log differ. A figure's own savefig
-        # draws it twice.
+        # No software and date, for reports on one log to be the same. savefig would draw it twice.
         FigureCanvasAgg(figure).print_png(file, metadata={"Software": None})
         files = {}
         for name, table in tables.items():
@@ -147,7 +145,7 @@ class Results:
 
     @cached_property
     def of_allan(self):
-        """Arguments of an AllanDisplay, or why there is none."""
+        """Arguments of an AllanDisplay, a dict; or a text, why there can be none."""
         if find_spec("allantools") is None:
             return "allantools is not installed (pip install allantools)"
         if self.time is None:

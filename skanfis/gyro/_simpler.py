@@ -19,7 +19,7 @@ from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from .compose import FrozenRules, Polynomial, ResidualRegressor, joined, law_and_rules
 from .physics import OpenLoopArcsineRegressor
 
-# Of law and rules by turns: what dies away after power-on would bend the law that is fitted first.
+# Law and rules are fitted in turn: a law fitted once bends towards what dies away after power-on.
 ROUNDS = 2
 NOTHING = "no compensation"
 LAW_AND_LINE = "arcsine law and a line"
@@ -38,9 +38,9 @@ NAMES = {
 class Simpler:
     """A simple compensation.
 
-    ``after`` is the compensated rate of every row by a model that had not seen its group;
-    ``estimator`` is fitted to all rows. Both are None where the log does not allow it, and
-    ``missing`` says why. ``fold_models`` are those of the folds, then none.
+    ``after`` is the compensated rate of every row, by the model of ``fold_models`` that had not
+    seen its group; ``estimator`` is fitted to all rows. There are none where the log does not allow
+    it: ``missing`` says why.
     """
 
     name: str
@@ -58,11 +58,11 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
     """
     parts = [train for train, _ in folds] + [rows]
     with warnings.catch_warnings():
-        # What it is worth is measured.
+        # Not warned of: what each compensation is worth is measured.
         for category in (ConvergenceWarning, ConstantInputWarning, OutOfBoundsWarning):
             warnings.simplefilter("ignore", category)
         for name, predicts, fit in kinds(list(X), policy):
-            target, predicted = rate if predicts == "rate" else before - rate, np.full(len(X), 0.0)
+            target, predicted = (rate if predicts == "rate" else before - rate), np.zeros(len(X))
             try:
                 *made, whole = (fit(X.iloc[part], target[part]) for part in parts)
                 for estimator, (_, test) in zip(made, folds, strict=True):
@@ -72,7 +72,7 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
                         n_lost = np.count_nonzero(is_lost)
                         raise ValueError(f"it has no finite prediction for {n_lost} rows")
             except ValueError as error:
-                # Of the law alone: no rate changes, or too few rows tell its coefficients.
+                # Only the law has reasons: the rate never changes, or rows are too few for it.
                 yield Simpler(name, predicts, missing=str(error))
                 continue
             after = predicted if predicts == "rate" else before - predicted
@@ -80,7 +80,7 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
 
 
 def kinds(inputs, policy):
-    """Name, what it predicts, and what fits it to X and y."""
+    """Yield the name of each compensation, what it predicts, and the function that fits it."""
 
     def zero(X, y):
         return fitted_rule(X, np.zeros(len(X)), 0, policy)
@@ -95,7 +95,7 @@ def kinds(inputs, policy):
         return joined(*law_and_rules(ResidualRegressor(*both, n_rounds=ROUNDS).fit(X, y)))
 
     def cubic(X, y):
-        # Beyond the box it is held: there the tangent of a cubic leads far away soon.
+        # Held beyond the box: the tangent of a cubic soon leads far away.
         rule = fitted_rule(X, np.zeros(len(X)), 0, "clip" if policy == "linear" else policy)
         return joined(Polynomial.fitted(X, y, (rule.model.minimum, rule.model.maximum)), rule)
 

@@ -285,10 +285,10 @@ def clock_form(column):
 
 
 def going_on(time, form, counter):
-    """Times [s], some NaN, that go on where the clock went back, and rows of all but midnights.
+    """Times [s], some NaN, that go on where the clock went back; and such rows, save midnights.
 
-    A clock of some form goes back at midnight and at the end of daylight saving, any other by the
-    range of its counter [s]; where that is set anew instead, it has not gone round.
+    A clock with a ``form`` goes back at midnight and at the end of daylight saving; a ``counter``
+    by its range [s], unless it was set anew instead.
     """
     known = np.flatnonzero(np.isfinite(time))
     steps = np.diff(time[known], prepend=time[known[:1]])

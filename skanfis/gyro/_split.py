@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from ..inspection.text import counted
 from ._columns import check_column, label_texts
 from .errors import LogError
 
@@ -88,7 +89,8 @@ def group_by_rate_level(rate: ArrayLike) -> np.ndarray:
     """
     rate = check_column(rate, "rate")
     labels = level_numbers(np.abs(rate))
-    if labels is None:
+    # Many rates of a row or two each are no levels of a table either.
+    if labels is None or 1 + labels.max() >= max(_MOST_LEVELS, labels.size / 2):
         raise ValueError(
             f"rate has no levels: it changes continuously between {rate.min():g} and "
             f"{rate.max():g}. If a table went from level to level, leave out the rows in between, "
@@ -98,7 +100,7 @@ def group_by_rate_level(rate: ArrayLike) -> np.ndarray:
 
 
 def level_numbers(rate, fewest=1):
-    """Number of each row's level of so many rows, lowest first; None where most are in none."""
+    """Number of each row's level, lowest first, of ``fewest`` rows each; None if most have none."""
     values, inverse, n_rows = np.unique(rate, return_inverse=True, return_counts=True)
     gaps = np.diff(values)
     smallest = _SMALLEST_TOLERANCE * np.abs(values).max()
@@ -154,11 +156,11 @@ class Split:
 
 
 def choose_split(log, kind="auto", *, uses_output=True):
-    """The split of the kind asked for, or of that which the log calls for.
+    """The split of the kind asked for; of "auto", of the kind that the log calls for.
 
-    ``uses_output`` says whether the compensator sees the output: only then can it tell levels.
+    ``uses_output``: only a compensator that sees the output can memorise levels of the rate.
     """
-    # Numbers in the order of the names, whatever the order of the files.
+    # Groups are numbered in the order of their names, whatever the order of the files.
     groups = {
         name: np.unique(label_texts(log[name]).astype(str), return_inverse=True)[1]
         for name in ("device", "run")
@@ -179,12 +181,12 @@ def choose_split(log, kind="auto", *, uses_output=True):
     for part in parts:
         _check(part, counts)
     numbers = np.column_stack([_fold_numbers(part, groups[part], len(parts)) for part in parts])
-    # Rows of the same run, or of the same level, are neither trained on nor tested.
+    # Rows that share one part with those that are tested, the run or the level, are left out.
     sides = ((numbers != fold, numbers == fold) for fold in np.unique(numbers, axis=0))
     folds = [tuple(np.flatnonzero(side.all(axis=1)) for side in pair) for pair in sides]
     what = " and ".join(_WORDS[part][0] for part in parts)
-    counted = ", ".join(f"{counts[part]} {_WORDS[part][1]}" for part in parts)
-    sentence = f"{what} held out ({counted}, {len(folds)} folds; {reason})"
+    of_each = ", ".join(f"{counts[part]} {_WORDS[part][1]}" for part in parts)
+    sentence = f"{what} held out ({of_each}, {len(folds)} folds; {reason})"
     caution, n_levels = "", counts.get("level", 0)
     if 1 < n_levels < _FEWEST["level"] and "level" not in parts:
         caution = (
@@ -199,8 +201,8 @@ def _choose(groups, counts, has_time):
     # The best comes first: devices, runs, levels, legs, pieces.
     enough = [name for name, count in counts.items() if count >= _FEWEST[name]]
     if not enough:
-        found = [f"{counts[name]} {name}(s)" for name in ("device", "run") if name in counts]
-        found.append(f"{counts.get('level', 0)} rate levels")
+        found = [counted(counts[name], name) for name in ("device", "run") if name in counts]
+        found.append(counted(counts.get("level", 0), "rate level"))
         clock = "" if has_time else _NO_CLOCK
         raise LogError(
             "the compensator could not be checked: the log has "
@@ -224,10 +226,9 @@ def _check(part, counts):
         missing = what.get(part, f"column for the {part}")
         raise LogError(f"cannot hold out by {part}: the log has no {missing}.")
     if counts[part] < _FEWEST[part]:
-        name = "leg" if part == "piece" else part
+        found = counted(counts[part], "leg" if part == "piece" else part)
         raise LogError(
-            f"cannot hold out by {part}: the log has {counts[part]} {name}(s), and at least "
-            f"{_FEWEST[part]} are needed."
+            f"cannot hold out by {part}: the log has {found}; at least {_FEWEST[part]} are needed."
         )
 
 
@@ -289,10 +290,10 @@ def _turns(temperature, least):
 
 
 def cut_legs(legs):
-    """Fold of each row: the pieces of every leg in turn, one leg's beside another's of the next.
+    """Fold of each row: one piece of every leg, and of the next leg another one.
 
-    With a piece of a leg that warms goes one at another temperature of the next, which cools: the
-    model has seen each temperature one way.
+    A leg that warms and the next, which cools, so lose different temperatures: the model has seen
+    each temperature one way.
     """
     return (_pieces(legs) + 2 * legs) % _N_FOLDS
 

@@ -12,13 +12,14 @@ from .errors import UsageError
 
 _NO_TEMPERATURE = 500.0  # marks of no value, such as 9999, are beyond it in any unit
 _COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
-# Logs that stay above the one, or reach the other, may be in degF; beyond the last nothing else is.
+# A log that is always warmer, or reaches the second, may be in degF; one that reaches the third is.
 _WARM, _HOT, _HOTTEST = 30.0, 86.0, 130.0
 _SINCE_1970 = 9e8, 4.1e9  # s, of clocks that tell a date from 1998 to 2099
 _STEPS = 1e-4, 600.0  # s, from one row to the next
-_HEATING = 5e-4, 60.0  # degC/min over a run, as the slowest logs in s have it,
-_CHAMBER, _FAST = (0.02, 60.0), 10.0  # as a chamber or a warm-up does, and as hardly any does
-_LEAST_HEATING = 1.0  # degC, to tell by
+_HEATING = 5e-4, 60.0  # degC/min over a run, between which a time may be in s
+_CHAMBER = 0.02, 60.0  # between which it may be in another unit: as a chamber or a warm-up heats
+_FAST = 10.0  # degC/min if in s, beyond which it may be in min or h: hardly any chamber is as fast
+_LEAST_HEATING = 1.0  # degC, below which heating tells nothing
 _SMALLEST_SCALE, _LARGEST_SCALE = 1.0, 2_200.0  # deg/s: the largest rate of a log that turns
 _LARGEST_BIAS = 20.0  # deg/s
 _EARTH_RATE = 15.041 / 3600.0  # deg/s
@@ -31,8 +32,8 @@ _AS_THE_RATE = 0.7, 1.4  # slope of an output that is a rate
 def settle_units(values, units, *, is_all=True):
     """Units of the parts that ``units`` lacks, by values of all (NaN where there is none).
 
-    UsageError, with the options to copy, where more than one reading is plausible; unless these are
-    not all values, which may tell it.
+    UsageError, with the options to copy, where more than one reading is plausible; but not of some
+    values alone, since all of them may tell.
     """
     heat = values.get("temperature", np.empty(0))
     values = values | {"temperature": np.where(np.abs(heat) < _NO_TEMPERATURE, heat, np.nan)}
@@ -43,7 +44,7 @@ def settle_units(values, units, *, is_all=True):
             ways = find(values, units)
             readings = [known | {part: unit} for known in readings for unit in ways]
     readings = [known | more for known in readings for more in _of_rates(values, units)]
-    # The clock is told by the first run.
+    # More values do not tell more of the clock: it is told by the first run.
     if len(readings) > 1 and (is_all or len({each.get("time") for each in readings}) > 1):
         raise UsageError(_question(values, readings))
     return readings[0]
@@ -115,7 +116,7 @@ def _of_time(values, units):
     steps = np.diff(time)
     if not (steps > 0.0).any() or not np.isfinite(heat).any():
         return ["s"]
-    # Of the first run, if the clock tells one from another.
+    # Of the first run, if the clock begins anew after it: not of a few rows before a glitch.
     ends = np.flatnonzero(steps < 0.0)
     end = ends[0] + 1 if ends.size and ends[0] > 10 else time.size
     degrees = convert(heat[:end], units.get("temperature", "degC"))

@@ -160,8 +160,7 @@ def export_c_physics(
     Returns
     -------
     code : CCode
-        The text of both files, and the most that an evaluation takes; the one arcsine is not
-        counted.
+        The text of both files, and the most that an evaluation takes beside one arcsine.
 
     Raises
     ------
@@ -309,7 +308,7 @@ def _header(whole, dialect, price, units, notes):
             beyond = f"Outside this range {LAW_GOES_ON}."
     what += rules if model.coefficients.any() else ""
     lines = [
-        *map(remark, notes),
+        *map(remark, [notes] if isinstance(notes, str) else notes),
         f"{what}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(price, "" if whole.is_cubic else "an arcsine, "),
         "",

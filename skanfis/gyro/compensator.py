@@ -14,7 +14,7 @@ from ..exceptions import OutOfBoundsWarning
 from ..export import export_json
 from ..export.c.dialect import status_word
 from ..export.folding import found_by_search
-from ..export.json_reader import parse_json
+from ..export.json_reader import model_of
 from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask, declared_units
 from .compose import FrozenRules, Polynomial, ResidualRegressor, cubic_powers, joined, law_and_rules
@@ -244,7 +244,7 @@ def _settings(document):
             raise ValueError(f"{key} is {shown(found)}; it must be an object of texts")
     declared_units(document["units"])
     try:
-        model = parse_json(json.dumps(document["model"]))
+        model = model_of(document["model"])
     except ValueError as error:
         raise ValueError(f"model.{error}") from error
     if not _are_of(columns, inputs):

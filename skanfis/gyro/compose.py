@@ -90,8 +90,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If ``n_rounds`` is less than 1, or if the base has no finite prediction for some
-            training row.
+            If ``n_rounds`` is less than 1, or the base has no finite prediction for a training row.
         """
         check_scalar(self.n_rounds, "n_rounds", (int, np.integer), min_val=1)
         # Each part checks X for itself, here and in predict; only its columns are taken note of.
@@ -185,8 +184,7 @@ def cubic_powers(n_inputs):
 class Polynomial:
     """sum_k c_k prod_j z_j^p_kj with z = (x - center) / scale, x held in a box; a fitted base.
 
-    The terms are all up to the third degree, in the order of scikit-learn; all columns of X are
-    inputs.
+    Inputs are all columns of X, terms all up to the third degree, in the order of scikit-learn.
     """
 
     minimum_: np.ndarray

@@ -55,8 +55,8 @@ _TERMS = {
     "rate_random_walk": "rate random walk, K (528, 952)",
 }
 _PROOF = (
-    "Proven for every point in the range of the calibration. How far the gyro is from the "
-    "compensator is not."
+    "This holds for the compensator, at every point in the range of the calibration. It says "
+    "nothing of how far the compensator is from the gyro."
 )
 
 
@@ -200,10 +200,9 @@ def _check(results):
     blocks = [Block("text", text) for text in texts]
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
-        "On the same held-out rows in range. What this model, the fuzzy rules, is better by is "
-        "the ratio of RMS "
-        f"errors, in the geometric mean over {held_out_groups(calibration)}. Recommended is the "
-        "simplest that no more elaborate one beats with an interval above 1.02."
+        'All on the same held-out rows in range. "This model" is the fuzzy rules; the others leave '
+        f"so many times its RMS error, in the geometric mean over {held_out_groups(calibration)}. "
+        "Recommended is the simplest that no more elaborate one beats by 2 %, interval included."
     )
     blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
     lines = []
@@ -293,7 +292,7 @@ def _written(results):
     if not calibration.writes_model:
         text = (
             f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model. --write "
-            f"names another, with a report of its own: rules, {', '.join(NAMES)}."
+            f"chooses another, with a report of its own: rules, {', '.join(NAMES)}."
         )
         formula = Block("open", rules_text(calibration), "What to compute")
         return "What is written", [Block("text", text), formula, _on_board(calibration)]
@@ -310,8 +309,8 @@ def _written(results):
 
 
 def _on_board(calibration):
-    notes = "\n".join(notes_on(calibration.compensator))
-    return Block("details", f"y[0] is what it gives.\n{notes}", "What to compute on board")
+    notes = ["y[0] is the output of the C code.", *notes_on(calibration.compensator)]
+    return Block("details", "\n".join(notes), "What to compute on board")
 
 
 def _log(results):

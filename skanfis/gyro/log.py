@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ..export.fis.reader import distinct
+from ..inspection.text import counted
+from ..naming import distinct
 from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, settle
@@ -25,13 +26,13 @@ from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
 from .metrics import rows_by_run
 
-_ROWS = 100_000  # of a piece, which is all that is held of a file's texts
-# A rest without power is longer than what a logger drops, and than a few of its steps.
+_ROWS = 100_000  # rows of a piece: no more texts of a file are held at once
+# A gap between two runs is so long, and so many steps: longer than what a logger drops.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
 _FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
 _SHORTEST_RUN = 3  # rows, at the end of a file
-_BEGINNING = 0.1  # part of a run, where a clock is again that has been set anew
+_BEGINNING = 0.1  # a clock that goes back to this part of a run has begun anew
 
 
 def read_log(
@@ -275,9 +276,11 @@ class LogFile:
             time, back = going_on(parts["time"].to_numpy(), self._form, counter)
             parts["time"] = pd.Series(time, parts["time"].index)
             by = "one hour (daylight saving)" if self._form else "by the range of its 32 bits"
-            for place in map(self.source.place_of, back[:1]):
-                told = f"the clock goes back {by} in {back.size} place(s), first at {place}"
-                self.notes.append(f"{self.path}: {told}; the time goes on")
+            for first in map(self.source.place_of, back[:1]):
+                places = f"{counted(back.size, 'place')}, first at {first}"
+                self.notes.append(
+                    f"{self.path}: the clock goes back {by} in {places}; the time goes on"
+                )
         return pd.DataFrame(parts, copy=False)
 
     def _in_order(self, log):
@@ -296,10 +299,8 @@ class LogFile:
             twice &= log["time"].diff() == 0.0
         if twice.any():
             first, last = map(self.source.place_of, log.index[twice][[0, -1]])
-            self.notes.append(
-                f"{self.path}: {twice.sum():,} rows occur twice, from {first} to {last}; the "
-                "second time they are left out"
-            )
+            repeated = counted(f"{twice.sum():,}", "repeated row")
+            self.notes.append(f"{self.path}: {repeated} left out, from {first} to {last}")
             log = log[~twice]
         return log
 
@@ -317,7 +318,7 @@ class LogFile:
         n_last = np.count_nonzero(code == code[-1])
         if code[-1] and n_last < _SHORTEST_RUN:
             self.notes.append(
-                f"{self.path}: the clock jumps at the last {n_last} row(s), which are left out"
+                f"{self.path}: the clock jumps; what follows, {counted(n_last, 'row')}, is left out"
             )
             code = code[:-n_last]
         if not code[-1]:
@@ -382,8 +383,8 @@ def _since_power_on(log):
     if 0.0 <= earliest <= step and earliest + step < start.max() < times.last().min():
         late = np.count_nonzero(start > earliest + step)
         notes.append(
-            f"the clock of {late} run(s) begins up to {start.max():.4g} s after power-on, which is "
-            f"at {earliest:.4g} s as in the others"
+            f"in {counted(late, 'run')} the clock begins up to {start.max():.4g} s after power-on, "
+            f"which is at {earliest:.4g} s as in the others"
         )
         log = log.assign(power_on=earliest)
     if (log["power_on"] == times.transform("first")).all():

@@ -18,11 +18,10 @@ from .errors import needed
 _PPM = 1e6
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
 HYSTERESIS_BINS, ROWS_PER_MEAN = 20, 5
-# A nonlinearity is looked for in means over such parts of the range of rates.
-_RATE_BINS = 101
-# Part of the largest rate up to which a gyro is at rest, and rows that its bias is read off then.
+_RATE_BINS = 101  # parts of the range of rates, in means over which a nonlinearity is looked for
+# A gyro is at rest up to this part of the largest rate; bias is read off so many such rows or more.
 _AT_REST, _FEWEST_AT_REST = 1e-4, 10
-# The largest value of a resample says nothing of the largest to come.
+# They have no interval: the largest value of a resample says nothing of the largest to come.
 LARGEST_VALUES = ("residual_peak", "residual_peak_to_peak")
 ALLAN_FIGURES = {
     "angle_random_walk": "deg/sqrt(h)",
@@ -40,7 +39,7 @@ _UNEVEN = 0.01  # largest deviation of the time between rows, relative
 
 
 class _Figure(NamedTuple):
-    """A figure of merit of some columns; ``also`` is one that is given by name where there is such.
+    """A figure of merit: a function of the columns ``needs``, and of ``also`` where the log has it.
 
     With ``combine``, the function is of one run, and ``combine`` of the values of all runs.
     """
@@ -214,11 +213,10 @@ def allan_deviation(error, sampling_interval, run=None):
 
 
 def allan_figures(tau, deviation):
-    """Of each figure its value, NaN where the curve [s, deg/h] has none, and why it has none.
+    """The value of each figure, NaN where the curve [s, deg/h] has none, and why it has none.
 
     A slope is found where a line through three neighbouring points has it within 0.15; the lowest
-    such line counts, before the minimum and any rise for N and after the minimum for K. A minimum
-    at an end is none.
+    such line counts, before the minimum and any rise for N, after it for K. No end is a minimum.
     """
     if tau.size < _POINTS_PER_SLOPE:
         raise ValueError(f"The curve has {tau.size} points; at least {_POINTS_PER_SLOPE} needed.")

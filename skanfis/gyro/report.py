@@ -11,7 +11,7 @@ from ._columns import RATE_UNITS, in_rate_unit
 # With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
 _FEWEST_RUNS = 5
 _N_BLOCKS = 30
-# The spread comes from the runs or blocks: evenly thinned rows show it as well.
+# Resamples hold so many rows, evenly thinned: their spread is that of the runs or blocks.
 _MOST_ROWS = 2_000
 _FEWEST_DEFINED = 0.9  # part of the resamples that must have the figure
 _PERCENTILES = 2.5, 97.5
@@ -52,7 +52,7 @@ def gyro_report(
     allan : bool, default=False
         Whether to read N, B and K off the Allan deviation; needs ``time``, and allantools.
     n_resamples : int, default=200
-        Of the intervals; zero makes none.
+        Resamples for the intervals; zero makes no intervals.
     rate_unit : {"deg/s", "deg/h"}, default=None
         Unit of every figure that is a rate, or a rate per something; None leaves each its usual.
     random_state : int, RandomState instance or None, default=None

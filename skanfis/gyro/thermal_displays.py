@@ -9,17 +9,18 @@ from ._columns import ask, check_column, evenly_chosen
 from .displays import SIDES, GyroDisplay, bins_of, dress, mark_decades, signs, three_digits
 from .metrics import HYSTERESIS_BINS, ROWS_PER_MEAN
 
-# Odd, so that a bin has the rest in its middle; near rest, a bias over the rate would fill it.
+# Bands of temperature; bins of the rate, an odd number, so that rest is in the middle of one; and
+# the part of the largest rate below which a bias, divided by the rate, would hide all else.
 _N_BANDS, _N_RATES, _SMALLEST_SHARE = 3, 41, 0.05
 SLOWEST = 0.05  # degC/min, below which a temperature neither rises nor falls
 _BRANCHES = {"warming": ("^-", "#c8443c"), "cooling": ("v-", "#3a6ea5")}
-# Odd ones: what an error of the scale factor adds changes its sign with the rate.
+# Powers of the rate, odd: what an error of the scale factor adds changes its sign with the rate.
 _POWERS = (1, 3, 5, 7)
 # Of maps: cells and points on each axis, and dots for rows, which beyond so many cover one another.
 _N_CELLS, _N_POINTS, _MOST_DOTS = 24, 96, 2_000
 # How far a map of the coverage goes beyond the data, as a part of their range.
 _MARGIN = 0.15
-# Of the sizes that a colour scale covers, so that one outlier does not flatten it.
+# Part of the cells that a colour scale covers, so that one outlier does not flatten it.
 _NEARLY_ALL = 0.995
 _NO_DATA = "#e9e9e6"
 _COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some, full

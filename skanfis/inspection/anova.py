@@ -7,9 +7,10 @@ factor of e in one product over the blocks,
 
     (1 + a_r e) prod_g (p_rg + p_rg l_rg e) .
 
-So E[y | x_v] takes of blocks that are not in v the means of p and p l; the mean of its square, of
-those in v the means of their products in rules r and s, which have an e each. Components are
-differences. Other rules are drawn: y at draws, and at draws that share x_v with them alone.
+So E[y | x_v] needs, of blocks that are not in v, the means of p and p l; the mean of its square
+needs, of those in v, the means of products of these in rules r and s, which have an e each.
+Components are differences. Rules of other kinds are sampled: y at draws, and at draws that share
+x_v with them alone.
 """
 
 from dataclasses import dataclass, replace
@@ -21,10 +22,10 @@ import numpy as np
 from ..blocks import add_each, fitting_rows, row_blocks
 from ..learning.data import Scale, StandardisedData
 from ..search import representative_rows, weighted_quantile
-from .measures import _CONSTANT
+from .measures import CONSTANT
 
-# Values that a fit keeps of every input, of so many rows; draws in place of closed forms, and draws
-# that all points of one curve share.
+# Values of every input that a fit keeps, from so many rows at most; draws in place of closed forms,
+# and those that each point of a curve is a mean over.
 N_VALUES, _MOST_ROWS, N_DRAWS, N_SHARED = 200, 2000, 20_000, 200
 
 
@@ -42,7 +43,7 @@ class Block:
 
 
 def rule_functions(antecedent, inputs):
-    """Sets of terms that rules have on inputs, the first of none, and which set each rule has."""
+    """Sets of terms that rules have on some inputs, the empty one first; and that of each rule."""
     table = antecedent.rule_terms
     own = np.where(np.isin(np.append(antecedent.term_inputs, -1)[table], inputs), table, -1)
     own = np.pad(own, ((1, 0), (0, 1)), constant_values=-1)
@@ -60,7 +61,7 @@ def _functions(factors, sets, z):
 
 
 def _sums(rows, antecedent, blocks, sets):
-    """Over rows, of every block the sums of products of its functions."""
+    """Sums over rows of the products of the functions of each block."""
     totals = [np.zeros(2 * [(1 + len(j)) * len(own)]) for j, own in zip(blocks, sets, strict=True)]
     n_values = antecedent.n_rules + 3 * antecedent.n_terms + 4 * max(map(len, sets))
     for part in row_blocks(rows.n_rows, fitting_rows(n_values)):
@@ -73,7 +74,7 @@ def _sums(rows, antecedent, blocks, sets):
 
 
 def _moments(rows, antecedent, blocks):
-    """Of every block the mean products of its functions; None where strengths are no products."""
+    """Means over rows of the same; None for each block if strengths are no products."""
     if antecedent.factors(np.zeros((rows.inputs.scale.size, 1))) is None:
         return [None] * len(blocks)
     sets = [rule_functions(antecedent, inputs)[0] for inputs in blocks]
@@ -118,7 +119,7 @@ def _beside(rows, antecedent):
 
 
 def draw(blocks, n_draws, rng):
-    """Rows of the product."""
+    """Rows drawn from the product of the blocks' distributions."""
     rows = np.empty((n_draws, sum(len(block.inputs) for block in blocks)))
     for block in blocks:
         chosen = rng.choice(len(block.values), n_draws, p=block.weight)
@@ -127,7 +128,10 @@ def draw(blocks, n_draws, rng):
 
 
 class ProductAnova:
-    """Of one output of rules whose strengths are products; ``error`` is what a share is off by."""
+    """The ANOVA of one output of rules whose strengths are products, in closed form.
+
+    ``error`` is what a share of the variance may be off by.
+    """
 
     error = 0.0
 
@@ -155,7 +159,7 @@ class ProductAnova:
         self.variance = _but_rounding(self.closed(range(len(blocks))), self.mean)
 
     def _others(self, subset):
-        """Of every rule, the product of the means of all blocks but some."""
+        """Of every rule, the product of the means of all blocks that are not in the subset."""
         others = (mean for g, mean in enumerate(self.means) if g not in subset)
         return reduce(_times, others, self.start)
 
@@ -165,7 +169,7 @@ class ProductAnova:
         return float(reduce(_times_both, squares, _outer(self._others(subset)))[1, 1].sum())
 
     def totals(self):
-        """Of every block, the variance that is left where all others are known."""
+        """Of every block, the variance that is left when all others are known (Sobol's total)."""
         before = accumulate(self.squares[:-1], _times_both, initial=_outer(self.start))
         nothing = np.zeros_like(self.squares[0])
         nothing[0, 0] = 1.0
@@ -222,11 +226,11 @@ def _outer(of_rules):
 
 def _but_rounding(variance, mean):
     """Zero where an output varies by rounding errors only."""
-    return variance if variance > (_CONSTANT * mean) ** 2 else 0.0
+    return variance if variance > (CONSTANT * mean) ** 2 else 0.0
 
 
 class DrawnAnova:
-    """The same of any rules, by draws."""
+    """The same for any rules, by draws."""
 
     error = 0.02
 
@@ -236,23 +240,23 @@ class DrawnAnova:
         has_part = model.consequents[:, 1:, output].any(axis=0)
         has_part[model.antecedent.term_inputs] = True
         self.has_part = [has_part[list(block.inputs)].any() for block in blocks]
-        rng = np.random.default_rng(0)
-        self.mean, self.rows, self.others = 0.0, *(draw(blocks, N_DRAWS, rng) for _ in "yz")
+        rng, self.mean = np.random.default_rng(0), 0.0
+        self.rows, self.others = draw(blocks, N_DRAWS, rng), draw(blocks, N_DRAWS, rng)
         self.y, self.of_others = (self._given((), rows, rows) for rows in (self.rows, self.others))
         self.mean = float(self.y.mean())
         self.y, self.of_others = self.y - self.mean, self.of_others - self.mean
         self.variance = _but_rounding(float(self.y.var()), self.mean)
 
     def _given(self, subset, X, draws):
-        """The sum of rules at draws that have x_v of rows X, less the mean."""
+        """The sum of rules at ``draws``, which take x_v from rows X, less the mean."""
         columns = [j for g in subset for j in self.blocks[g].inputs]
         draws[:, columns] = X[:, columns]
         return replace(self.model, target=None).predict(draws)[:, self.output] - self.mean
 
     def _conditional(self, subset, X):
-        """At rows X in the box, y with all but x_v drawn, less the mean: on average E[y | x_v].
+        """At rows X in the box, y with all but x_v drawn, less the mean: E[y | x_v] in expectation.
 
-        Less what is due to the draws themselves, by the regression on y at these.
+        What the draws themselves add is taken off, by regression on y at the draws.
         """
         if not (parts := [g for g in subset if self.has_part[g]]):
             return np.zeros(len(X))

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .._validation import check_count, position_of
+from .._validation import check_count, checked_position
 from ..antecedent import TreeAntecedent
 from ..export import fold, fold_with_rows
 from ..export.columns import by_column
@@ -19,16 +19,16 @@ from .rules import has_training_data
 from .sentences import PRECISION, rounded
 
 # Points of a membership along its input, and bins of the data behind it.
-_N_POINTS, _BINS = 201, 30
+_N_POINTS, BINS = 201, 30
 # The brightest end of a colour map is hard to see on white.
-_BRIGHTEST = 0.85
+BRIGHTEST = 0.85
 # Beyond so many terms, a legend is longer than the picture is high.
 _MOST_NAMED = 7
 # Characters of a legend, or of a note below, that a panel has room for.
 _LEGEND_WIDTH = 42
 # Contours that can still be told apart by colour.
 _LEVELS = 15
-# Below this coverage the prediction counts as extrapolated.
+# Below this coverage a prediction counts as extrapolated: it does not set the colours.
 _COVERED = 0.5
 
 
@@ -92,7 +92,7 @@ class MembershipDisplay:
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the memberships on ``ax``, as of :meth:`from_estimator`."""
         data = "" if self.inputs[0].counts is None else "; grey: data"
-        self.axes_ = _panels(ax, len(self.inputs), f"dashed: before training{data}")
+        self.axes_ = panels_or_new(ax, len(self.inputs), f"dashed: before training{data}")
         self.figure_ = self.axes_[0].figure
         for terms, axes in zip(self.inputs, self.axes_, strict=True):
             _draw_terms(axes, terms)
@@ -110,7 +110,7 @@ def _terms_on(model, j, rows):
     names = tuple(model.term_names[t] for t in own)
     before = np.exp(model.initial_antecedent.log_memberships(Z)[own])
     after = np.exp(model.antecedent.log_memberships(Z)[own])
-    counts, edges = (None, None) if rows is None else np.histogram(rows[:, j], _BINS)
+    counts, edges = (None, None) if rows is None else np.histogram(rows[:, j], BINS)
     return InputTerms(model.input_names[j], names, grid, before, after, edges, counts)
 
 
@@ -121,7 +121,7 @@ def _draw_terms(axes, terms):
         axes.stairs(heights, terms.edges, fill=True, color="0.9", zorder=0)
     # In the order of places: scattered terms come in the order of their rules.
     places = terms.after @ terms.grid / terms.after.sum(axis=1)
-    shades = _pyplot().get_cmap()(np.linspace(0.0, _BRIGHTEST, len(names)))
+    shades = pyplot().get_cmap()(np.linspace(0.0, BRIGHTEST, len(names)))
     for t, shade in zip(np.argsort(places, kind="stable"), shades, strict=True):
         axes.plot(terms.grid, terms.before[t], "--", color=shade, linewidth=1.0, alpha=0.7)
         axes.plot(terms.grid, terms.after[t], color=shade, linewidth=1.8, label=names[t])
@@ -202,13 +202,13 @@ class ResponseSurfaceDisplay:
         check_count("grid_resolution", grid_resolution, 2)
         model, reader = fold_with_reader(estimator)
         points = None if X is None else reader(X)
-        if isinstance(features, str) or len(features) != 2:
+        if np.size(features) != 2:
             raise ValueError(f"features={features!r} must be two inputs.")
         if model.n_inputs == 1:
             raise ValueError(
                 "The model has one input, and a surface takes two: plot what it predicts along it."
             )
-        both = [_position(feature, model.input_names) for feature in features]
+        both = [checked_position(feature, model.input_names) for feature in features]
         if both[0] == both[1]:
             raise ValueError(f"features={features!r} is the same input twice.")
         for j in both:
@@ -217,8 +217,8 @@ class ResponseSurfaceDisplay:
                     f"features={features!r}: {model.input_names[j]!r} has one value, "
                     f"{model.minimum[j]:g}. Name two inputs that vary."
                 )
-        k = _position(output, model.output_names, "output")
-        (xx0, xx1), rows, others = _section(model, both, grid_resolution, held, reader.levels)
+        k = checked_position(output, model.output_names, "output")
+        (xx0, xx1), rows, others = section_over(model, both, grid_resolution, held, reader.levels)
         coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
         display = cls(
             xx0=xx0,
@@ -234,14 +234,13 @@ class ResponseSurfaceDisplay:
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the surface on ``ax``, as of :meth:`from_estimator`."""
-        ax = self.ax_ = _axes(ax)
+        ax = self.ax_ = axes_or_new(ax)
         self.figure_ = ax.figure
         x, y = self.xx0[0], self.xx1[:, 0]
-        # Extrapolation shall not set the colours.
         seen = self.response[self.coverage >= _COVERED]
         seen = seen if seen.size > 1 else self.response
         low, high = np.min(seen), np.max(seen)
-        levels = _pyplot().MaxNLocator(_LEVELS).tick_values(low, high) if high > low else None
+        levels = pyplot().MaxNLocator(_LEVELS).tick_values(low, high) if high > low else None
         self.surface_ = ax.contourf(x, y, self.response, levels=levels, extend="both")
         self.figure_.colorbar(self.surface_, ax=ax, label=on_axis(self.output_name))
         # White over the surface, the thicker the less data cover it; under the points.
@@ -257,13 +256,13 @@ class ResponseSurfaceDisplay:
         return self
 
 
-def _axes(ax, figsize=(5.6, 4.2)):
-    """The axes that are given, or of a new figure."""
-    return _pyplot().subplots(figsize=figsize, layout="constrained")[1] if ax is None else ax
+def axes_or_new(ax, figsize=(5.6, 4.2)):
+    """The axes that are given, or those of a new figure."""
+    return pyplot().subplots(figsize=figsize, layout="constrained")[1] if ax is None else ax
 
 
-def _panels(ax, count, note):
-    """So many axes as an array: those given, or of a new figure, with a note at its foot."""
+def panels_or_new(ax, count, note):
+    """So many axes as an array: those given, or new ones in a figure with a note at its foot."""
     if ax is not None:
         axes = np.ravel(ax)
         if axes.size != count:
@@ -271,12 +270,13 @@ def _panels(ax, count, note):
         return axes
     columns = min(3, count)
     rows = -(-count // columns)
-    figure = _pyplot().figure(figsize=(3.2 * columns, 2.6 * rows), layout="constrained")
+    figure = pyplot().figure(figsize=(3.2 * columns, 2.6 * rows), layout="constrained")
     figure.supxlabel(fill(note, _LEGEND_WIDTH * columns), fontsize="small", color="0.4")
     return np.array([figure.add_subplot(rows, columns, i + 1) for i in range(count)])
 
 
-def _pyplot():
+def pyplot():
+    """The module of matplotlib; ImportError with what to install."""
     try:
         import matplotlib.pyplot as plt
     except ImportError as error:
@@ -287,18 +287,7 @@ def _pyplot():
     return plt
 
 
-def _position(feature, names, what="input"):
-    """Position of an input or output given by its name or position."""
-    found = position_of(feature, names)
-    if found is not None:
-        return found
-    raise ValueError(
-        f"{feature!r} is no {what}: give a position from 0 to {len(names) - 1}, or one of "
-        f"{', '.join(map(repr, names))}."
-    )
-
-
-def _section(model, both, n_points, held, levels):
+def section_over(model, both, n_points, held, levels):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 
     The others take their value in ``held``, or their mean in training, in few digits, or what is
@@ -311,15 +300,16 @@ def _section(model, both, n_points, held, levels):
     if not isinstance(held, Mapping):
         raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")
     names, (categories, unnamed) = list(model.input_names), by_column(levels)
-    taken = {*both, *(_position(feature, names) for feature in held)}
+    taken = {*both, *(checked_position(feature, names) for feature in held)}
     for indicators in categories.values():
         own = [names.index(name) for name in indicators]
-        # One level at most, and none beside those that are drawn or held.
-        row[own], share = 0.0, model.reference[own]
+        # The commonest level is held, unless a level is drawn or held already.
+        row[own] = 0.0
+        share = model.reference[own]
         if taken.isdisjoint(own) and share.max() >= 1.0 - share.sum():
             row[own[int(share.argmax())]] = 1.0
     for feature, value in held.items():
-        j = _position(feature, model.input_names)
+        j = checked_position(feature, model.input_names)
         if j in both:
             raise ValueError(f"held[{feature!r}]: that input is drawn.")
         low, high = model.minimum[j], model.maximum[j]

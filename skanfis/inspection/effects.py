@@ -10,18 +10,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from .._validation import checked_position
 from ..export.columns import by_column
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
-from .displays import _position
 from .text import MOST_NAMED, counted
 
-# Shares that differ by more are told; so is what is held, of more of the product's mass.
+# Notes are made of shares that differ by more, and of outputs held on more of the combinations.
 _DIFFERENT, _HELD = 0.1, 0.01
-_N_HELD = 10_000
-# Of shares as they are printed.
-_DIGITS = 3
+_N_HELD = 10_000  # combinations that are drawn
+_DIGITS = 3  # of printed shares
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +60,7 @@ def effects(
         Rows whose distributions are taken, input by input. None: those of the training rows, which
         ``fit`` keeps (JSON, ``partial_fit`` and ``merge`` do not).
     groups : dict of str to sequence of str or int, default=None
-        Columns that enter as one, by a name for them; takes X, for how they go together.
+        Columns that enter as one, by a name for them. Needs X, which tells how they go together.
     output : int or str, default=0
         Which output.
 
@@ -224,7 +223,7 @@ class Study:
     def of(cls, estimator, X, groups, output):
         """Of an estimator; ValueError as of :func:`effects`."""
         model, read = fold_with_reader(estimator)
-        k = _position(output, model.output_names, "output")
+        k = checked_position(output, model.output_names, "output")
         rows = None if X is None else np.clip(read(X), model.minimum, model.maximum)
         if groups and rows is None:
             raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
@@ -235,7 +234,7 @@ class Study:
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):
                 raise ValueError(f"groups[{label!r}] is {columns!r}: a list of columns is needed.")
-            own = {_position(column, model.input_names) for column in columns}
+            own = {checked_position(column, model.input_names) for column in columns}
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
                 if not own >= set(found.pop(other)):
                     raise ValueError(f"groups[{label!r}] has some columns of {other!r}, not all.")
@@ -244,7 +243,7 @@ class Study:
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}
         labels, inputs = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
         if sum(map(len, inputs)) != model.n_inputs:
-            raise ValueError("groups: one of them is called as a column that it does not have.")
+            raise ValueError("groups: a group may not have the name of a column outside of it.")
         is_shown = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
         blocks = _known(model, inputs, rows)
         return cls(model, k, labels, blocks, is_shown, rows, _anova(model, k, blocks))

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_count
 from .anova import N_SHARED, draw
-from .displays import _BINS, _BRIGHTEST, _panels, _pyplot
+from .displays import BINS, BRIGHTEST, panels_or_new, pyplot
 from .effects import Study
 from .labels import on_axis
 
@@ -98,7 +98,7 @@ class EffectsDisplay:
         """Draw the effects on ``ax``, as of :meth:`from_estimator`."""
         note = "curve: mean over all other inputs, ± 2 sd; shaded: terms; grey: data"
         note += "; colours: beyond what both do alone" if self.pairs else ""
-        self.axes_ = _panels(ax, len(self.curves) + len(self.pairs), note)
+        self.axes_ = panels_or_new(ax, len(self.curves) + len(self.pairs), note)
         self.figure_ = self.axes_[0].figure
         # One scale for all, so that what is flat looks flat.
         mean, sd = (np.hstack([one[key] for one in self.curves]) for key in ("mean", "deviation"))
@@ -141,7 +141,7 @@ def _curve(study, g):
             deviation[i] = model.posterior.of_mean(model, others.T.copy())[study.output]
     is_own = np.isin(model.antecedent.term_inputs, block.inputs)
     if axis["levels"] is None:
-        counts, edges = np.histogram(block.values[:, 0], _BINS)
+        counts, edges = np.histogram(block.values[:, 0], BINS)
     else:
         is_at = (block.values[:, None] == rows[:, block.inputs]).all(axis=2)
         weight = np.ones(len(is_at)) if block.weight is None else block.weight
@@ -179,7 +179,7 @@ def _draw_curve(axes, curve):
     if curve["levels"] is not None:
         axes.errorbar(points, mean, band, fmt="o", color="black", capsize=3.0)
     else:
-        shades = _pyplot().get_cmap()(np.linspace(0.0, _BRIGHTEST, len(curve["terms"])))
+        shades = pyplot().get_cmap()(np.linspace(0.0, BRIGHTEST, len(curve["terms"])))
         for term, shade in zip(curve["terms"], shades, strict=True):
             axes.fill_between(points, term, color=shade, alpha=0.13, linewidth=0, **on_height)
         axes.fill_between(points, mean - band, mean + band, color="0.3", alpha=0.4, linewidth=0)

@@ -3,10 +3,12 @@
 import unicodedata
 from textwrap import fill, wrap
 
+from .text import counted
+
 # Categories of what no reader sees; and joiners, without which some scripts are not written.
 _HIDDEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")
 _JOINERS = "\u200c\u200d"
-# Inputs that a title names, its letters in a line, and those along an axis of a panel.
+# Inputs that a title names; letters in a line of a title, and of a label along an axis.
 _MOST_HELD, _LETTERS, _LETTERS_ON_AXIS = 4, 60, 20
 
 
@@ -31,9 +33,9 @@ def on_axis(name):
 
 
 def title_of(held, *notes):
-    """Inputs and the values at which they are held, a few of them, and notes, over a picture."""
+    """The title of a picture: the first inputs that are held with their values, then notes."""
     told = {k: as_label(v) if isinstance(v, str) else f"{v:.12g}" for k, v in held.items()}
     values = [f"{as_label(name)} = {value}" for name, value in told.items()]
     more = len(values) - _MOST_HELD
-    others = [f"{more} more inputs held"] if more > 0 else []
+    others = [f"{counted(more, 'more input')} held"] if more > 0 else []
     return fill("; ".join([*values[:_MOST_HELD], *others, *notes]), _LETTERS)

@@ -1,4 +1,4 @@
-r"""How the rules of a model stand to their sum, and to the rows, in one pass over rows.
+r"""How far each rule is from the model, and from the target, in one pass over rows.
 
 With strengths w_r, consequents f_r, the output yhat = sum_r w_r f_r at the nearest point of the box
 of training, and sd the target's standard deviation, the *strongest rule alone* is
@@ -20,7 +20,7 @@ from ..learning.data import column_statistics
 from .sentences import Sentences
 
 # A target that varies by rounding errors only, as the predictions of a constant do, is constant.
-_CONSTANT = 16.0 * np.finfo(float).eps
+CONSTANT = 16.0 * np.finfo(float).eps
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +56,9 @@ def measure(model, read, n_rows, y=None, sample_weight=None):
 
 
 def _scale(target):
-    """Deviations of a target; one of a constant."""
+    """Standard deviations of a target, 1 for a constant."""
     largest = np.maximum(np.abs(target.minimum), np.abs(target.maximum))
-    is_constant = target.maximum - target.minimum <= _CONSTANT * largest
+    is_constant = target.maximum - target.minimum <= CONSTANT * largest
     return np.where(is_constant, 1.0, target.scale)
 
 
@@ -95,7 +95,7 @@ def rule_sums(model, printed, target, rows, y, weight):
 
 
 def measures_of(target, sums):
-    """What sums over all rows amount to."""
+    """The :class:`Measures` from the sums over all rows."""
     weight, mass, lead, alone, rule_errors, first, second, errors, printed_errors = sums
     rows = lead[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -18,15 +18,14 @@ from .rules import has_training_data, premise_texts
 from .sentences import Sentences
 from .text import counted, number
 
-# In deviations of the target: whoever reads the strongest rule alone is then as wrong as a model
-# that explains three quarters of the variance; beyond, the rule says too little of the model.
+# In deviations of the target: the strongest rule alone is then as far from the model as one that
+# explains three quarters of the variance is from the target; beyond, it says too little.
 GREATEST_ALONE = 0.5
-# What the text as printed may err, over the model's error; and a rule, over a constant's.
+# Largest ratio of the error of the text as printed to the model's, and of a rule's to a constant's.
 GREATEST_ERROR = 1.05
-# Errors of no more are rounding's, as of predictions that are the target.
+# Smaller errors are rounding, as where the target is the prediction itself.
 _ROUNDING = np.sqrt(np.finfo(float).eps)
-# A slope has a sign where it is this many of its deviations from zero; in rules of this part of the
-# weight.
+# A slope has a sign if it is so many deviations from zero, in a rule of this part of the weight.
 _DEVIATIONS, _LEAST_WEIGHT = 2.0, 0.05
 # A sentence names so many, and counts the others.
 _MOST_NAMED = 5

@@ -63,17 +63,18 @@ def parts_led(model):
 
 
 def readability_in_training(estimator, model, levels):
-    """The fit's ``readability_`` in the names of ``model``, the whole; None where there is none."""
+    """The fit's ``readability_`` for ``model``, which is the estimator folded and renamed; or None.
+
+    Behind a scaler the numbers are rounded in other units, and what the text errs is not known.
+    """
     found = getattr(last_step(estimator), "readability_", None)
     if found is None:
         return None
-    # Columns that were moved and not scaled have the same numbers, rounded as they were.
+    measures = found.measures
+    # Sorted: columns that were only moved keep their numbers.
     own, fitted = (np.sort(one.coefficients, axis=1) for one in (model, found.model))
-    if np.array_equal(own, fitted):
-        return replace(found, model=model, levels=levels)
-    # Behind a scaler: numbers are rounded in other units now, and what they err is not known.
-    unknown = np.full(model.n_outputs, np.nan)
-    measures = replace(found.measures, printed_errors=unknown)
+    if not np.array_equal(own, fitted):
+        measures = replace(measures, printed_errors=np.full(model.n_outputs, np.nan))
     return replace(found, model=model, measures=measures, levels=levels)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..export.folding import last_step
 from ..search.choice import tolerated
-from .displays import _axes, _pyplot
+from .displays import axes_or_new, pyplot
 
 # Colours that the colour-blind can tell apart, and a marker for each kind.
 _KINDS = {"one rule": ("0.3", "s"), "grid": ("#0072b2", "o"), "scattered": ("#d55e00", "^")}
@@ -82,7 +82,7 @@ class StructureDisplay:
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the candidates on ``ax``, as of :meth:`from_estimator`."""
-        ax = self.ax_ = _axes(ax)
+        ax = self.ax_ = axes_or_new(ax)
         self.figure_ = ax.figure
         structures = sorted(self.structures, key=lambda one: one["reading_cost"])
         for kind in dict.fromkeys(one["kind"] for one in structures):
@@ -113,6 +113,6 @@ def _places(structures):
 def _on_logarithms(set_scale, axis):
     """A logarithmic scale with plain numbers."""
     set_scale("log")
-    axis.set_major_locator(_pyplot().LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_locator(pyplot().LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(_pyplot().NullFormatter())
+    axis.set_minor_formatter(pyplot().NullFormatter())

@@ -26,17 +26,16 @@ from .sentences import PRECISION, Sentences, rounded
 
 # Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 3
-# What has no part in the model is named up to so many, and else counted.
+# Inputs in no rule are named if they are so few, and else counted.
 MOST_NAMED = 5
-_KEPT = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
-# What shares that sum to one may lack of it.
-_ROUNDING = 1e-9
-# How to compute a prediction; the parts in braces where there is such a thing.
+_UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
+_ROUNDING = 1e-9  # of a sum of shares
+# How to compute a prediction; the parts in braces are left out where there is no such thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
-    "AND multiplies. {terms}A rule says its value{line}, plus its own slopes. What a rule errs "
-    "by is its RMSE, used alone, on the rows on which it is the strongest."
+    "AND multiplies. {terms}A rule says its value{line}, plus its own slopes.{errs}"
 )
+_ERRS = " What a rule errs by is its RMSE, used alone, on the rows on which it is the strongest."
 _HOW_OF_ONE = "A prediction is what the rule says: its value, plus its slopes."
 # How true a condition is that is written out, by what stands before its place.
 _WRITTEN = {
@@ -135,7 +134,7 @@ def export_text(
     if len(chosen) < model.n_rules:
         parts.append(f"{_left_out(model, chosen)} left out.")
     if show_terms:
-        parts.append(_legend(said, precision))
+        parts.append(_legend(said, found, precision))
     parts.append("\n".join(_wrapped(one) for one in _last_lines(said, found, precision)))
     return "\n\n".join(parts)
 
@@ -296,7 +295,8 @@ def _last_lines(said, found, precision=PRECISION):
     return str(found).splitlines()
 
 
-def _legend(said, precision):
+def _legend(said, found, precision):
+    """The ranges and terms of the inputs, policy, limits, and how to compute a prediction."""
     model, lines = said.model, ["Inputs, as they were trained:"]
     families = [group.family for group in model.antecedent.groups]
     at = {one.name for family in families for one in family.parameters if one.kind == "location"}
@@ -341,7 +341,8 @@ def _legend(said, precision):
     terms = [text for sign, text in _WRITTEN.items() if sign in signs]
     formulas = {family.name: family.formula for family in families}
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
-    how = _HOW.format(terms="".join(terms), line=_LINE if said.common.any() else "")
+    line, errs = _LINE if said.common.any() else "", _ERRS if found else ""
+    how = _HOW.format(terms="".join(terms), line=line, errs=errs)
     if model.n_rules == 1 and not model.antecedent.n_terms:
         how = _HOW_OF_ONE
     return "\n".join([*lines, "", _wrapped(how)])
@@ -365,9 +366,9 @@ def _left_out(model, chosen):
 
 def _wrapped(text, first="", later=""):
     """The text in lines, the first and the later ones indented; none is broken at a ±."""
-    text = text.replace(" ± ", _KEPT)
+    text = text.replace(" ± ", _UNBROKEN)
     lines = fill(text, _WIDTH, initial_indent=first, subsequent_indent=later)
-    return lines.replace(_KEPT, " ± ")
+    return lines.replace(_UNBROKEN, " ± ")
 
 
 def _range(low, high, precision):

@@ -6,12 +6,12 @@ from typing import Any, Self, cast
 
 import numpy as np
 
-from .._validation import check_choice
+from .._validation import check_choice, checked_position
 from ..antecedent import TreeAntecedent
 from ..export.columns import Level
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
-from .displays import _axes, _position, _section
+from .displays import axes_or_new, section_over
 from .labels import as_label, on_axis, title_of
 from .rules import condition, parts_led
 from .sentences import Sentences, rounded
@@ -70,7 +70,8 @@ class TreeDisplay:
         estimator : fitted estimator or TSKModel
             As :func:`skanfis.export.fold` takes it; scalers are folded into the cuts.
         kind : {"tree", "plane"}, default="tree"
-            "plane" is of trees that cut two inputs; the others are held at their mean.
+            "plane" is of trees that cut two inputs; the others are held as in
+            :class:`ResponseSurfaceDisplay`.
         output : int or str, default=0
             Which output, by position or name.
         ax : matplotlib Axes, default=None
@@ -92,7 +93,7 @@ class TreeDisplay:
         if kind == "plane" and inputs.size != 2:
             names = ", ".join(repr(model.input_names[j]) for j in inputs)
             raise ValueError(f"kind='plane' is of two inputs; this tree cuts {names}.")
-        place = _position(output, model.output_names, "output")
+        place = checked_position(output, model.output_names, "output")
         return cls(model=model, output=place, kind=kind, levels=reader.levels).plot(ax=ax)
 
     @property
@@ -138,7 +139,7 @@ class TreeDisplay:
         step = _LETTER * max(map(len, words.ravel())) + _MARGIN
         last = _LETTER * max(map(len, self.leaves)) + _MARGIN
         size = step * depth.max() + last + _MARGIN, _LEAF * n_rules + _MARGIN
-        ax = self.ax_ = _axes(ax, size)
+        ax = self.ax_ = axes_or_new(ax, size)
         for k, pair in enumerate(ends):
             start = depth[n_rules + k], height[n_rules + k]
             for end, text in zip(pair, words[k], strict=True):
@@ -157,8 +158,8 @@ class TreeDisplay:
 
     def _draw_plane(self, ax):
         model, both = self.model, np.unique(self.model.antecedent.term_inputs)
-        ax = self.ax_ = _axes(ax)
-        axes, rows, held = _section(model, both, _N_POINTS, None, self.levels)
+        ax = self.ax_ = axes_or_new(ax)
+        axes, rows, held = section_over(model, both, _N_POINTS, None, self.levels)
         response = model.predict(rows)[:, self.output].reshape(_N_POINTS, _N_POINTS)
         colours = ax.pcolormesh(*axes, response, shading="nearest", rasterized=True)
         ax.figure.colorbar(colours, ax=ax, label=on_axis(model.output_names[self.output]))

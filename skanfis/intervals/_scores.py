@@ -1,8 +1,8 @@
 r"""How far rows that a model has not seen lie from its predictions, and quantiles of that.
 
-Each of K units (rows, or groups of rows) and of a new one has the mass 1 / (K + 1); a group's is
-shared by its rows, the new one's lies at infinity. A score covers with probability c where the rows
-of this score or less have the mass c.
+Each of K units (rows, or groups of rows), and a new one, has the mass 1 / (K + 1). The rows of a
+group share its mass; the new unit's score counts as infinite. Intervals of a score cover with
+probability c if the rows of this score or less have the mass c.
 """
 
 import inspect
@@ -26,11 +26,11 @@ from .._validation import check_finite, group_numbers, named_refusals, positive_
 from ..exceptions import OutOfBoundsWarning
 from ..export.folding import final_step
 
-# An exact fit has no deviation to divide by: of the target's range, what rounding leaves.
+# Least deviation, as a part of the target's range: an exact fit has none to divide by.
 _LEAST_DEVIATION = 1e-12
-# Of a row that a model has to itself.
+# Least 1 - leverage: a row that the model fits exactly has none to divide by.
 _SMALLEST_FREEDOM = 1e-6
-# What rounding leaves of a sum of masses.
+# Rounding error of a sum of masses.
 ROUNDING = 1e-9
 
 
@@ -73,7 +73,7 @@ def checked_targets(y, sample_weight, groups):
 
 
 def fit_params(router, regressor, sample_weight, groups):
-    """What of weights and groups goes to the regressor's ``fit``; ``router`` routes metadata."""
+    """The weights and groups that the regressor's ``fit`` takes; ``router`` routes metadata."""
     given = {"sample_weight": sample_weight, "groups": groups}
     given = {name: value for name, value in given.items() if value is not None}
     if get_config()["enable_metadata_routing"]:
@@ -140,18 +140,18 @@ def folds(cv, targets, groups, seed):
 
 
 def least_deviations(targets):
-    """What no deviation of targets (n_rows,) or (n_rows, n_outputs) is below, (n_outputs,)."""
+    """The least deviation to divide by, for targets (n_rows,) or (n_rows, n_outputs)."""
     least = _LEAST_DEVIATION * np.atleast_1d(np.ptp(targets, axis=0))
     return np.where(least > 0.0, least, np.finfo(float).tiny)
 
 
 def predicted(estimator, X, least):
-    """Predictions and deviations, (n_rows, n_outputs); of ``least`` None deviations are one."""
+    """Predictions and deviations, (n_rows, n_outputs); with ``least`` None, deviations are one."""
     if least is None:
         mean = np.asarray(estimator.predict(X), dtype=float)
         centers = mean.reshape(len(mean), -1)
         return centers, np.ones(centers.shape)
-    # By itself: with metadata routing a Pipeline would have to be told of return_std.
+    # The last step itself: with metadata routing a Pipeline would have to be told of return_std.
     final, X = final_step(estimator, X)
     if "return_std" not in inspect.signature(final.predict).parameters:
         raise ValueError(
@@ -192,7 +192,7 @@ def leave_one_out_scores(estimator, data, weight, least):
     leverage = (deviations / noise) ** 2 - 1.0
     own = np.ones((1, 1))
     if weight is not None:
-        # Rows that each row counts as in a fit.
+        # As how many rows a row of this weight counts in the fit.
         own = weight[:, None] * max(1.0, weight.sum() / np.sum(weight**2))
     freedom = np.clip(1.0 - own * leverage, _SMALLEST_FREEDOM, 1.0)
     residual = np.abs(data.targets.reshape(centers.shape) - centers) / freedom

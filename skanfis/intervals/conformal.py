@@ -144,7 +144,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         ------
         ValueError
             If the data are not finite, ``cv`` does not hold out every row once and groups as a
-            whole, one group alone has weight, or "loo" has groups; if there is no deviation.
+            whole, one group alone has weight, or "loo" has groups; if ``scaled`` is asked of a
+            regressor without ``return_std``.
         """
         X, y, sample_weight = indexable(X, y, sample_weight)
         targets, weight, numbers = _scores.checked_targets(y, sample_weight, groups)
@@ -205,9 +206,9 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             How often a new row's target is to lie in its interval; of several outputs, each by
             itself.
         confidence : float, "auto" or None, default="auto"
-            With groups: how probable it is to be that ``coverage`` of a new group's rows, or more,
-            lie in their intervals. "auto" is as probable as ``coverage``; None promises the
-            coverage on average over new groups.
+            With groups: the probability with which ``coverage`` or more of a new group's rows lie
+            in their intervals. "auto" takes the number of ``coverage``; None promises the coverage
+            on average over new groups.
 
         Returns
         -------
@@ -218,8 +219,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         Raises
         ------
         ValueError
-            If there are too few rows or groups, K giving K / (K + 1) at most; if a confidence is
-            asked for without groups.
+            If there are too few rows or groups: K of them allow K / (K + 1) at most; if a
+            confidence is asked for without groups.
         """
         check_is_fitted(self)
         coverage, confidence = self._checked_levels(coverage, confidence)
@@ -241,18 +242,20 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return ANFISRegressor() if self.estimator is None else self.estimator
 
     def _checked_levels(self, coverage, confidence):
-        """Both levels, as far as the rows or groups at hand allow them; None of no groups."""
-        if self._groups is None and confidence not in (None, "auto"):
+        """Coverage, and confidence or None; ValueError if there are too few rows or groups."""
+        asked = "coverage" if confidence in (None, "auto") else "confidence"
+        if asked == "confidence" and self._groups is None:
             raise ValueError(
-                "confidence is of whole groups, and fit was given none: give it groups, or None."
+                "confidence is of whole groups, and fit was given none: fit with groups, or leave "
+                "confidence at None."
             )
-        for name, level in (("confidence", confidence), ("coverage", coverage)):
+        if confidence == "auto":
+            confidence = None if self._groups is None else coverage
+        for name, level in (("coverage", coverage), ("confidence", confidence)):
             is_number = isinstance(level, Real) and 0.0 < float(level) < 1.0
-            if not is_number and (name == "coverage" or level not in (None, "auto")):
+            if not is_number and (name == "coverage" or level is not None):
                 raise ValueError(f"{name}={level!r} must be a number between 0 and 1.")
-        by_group = self._groups is not None and confidence is not None
-        is_asked = by_group and confidence != "auto"
-        name, level = ("confidence", confidence) if is_asked else ("coverage", coverage)
+        level = coverage if confidence is None else confidence
         total = self.n_units_ / (self.n_units_ + 1.0)
         if total < level - _scores.ROUNDING:
             needed = int(np.ceil(level / (1.0 - level) - _scores.ROUNDING))
@@ -260,8 +263,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
             held_out = " held out" if self.method == "split" else ""
             more = ", or a larger calibration_fraction" if self.method == "split" else ""
             raise ValueError(
-                f"{name}={level:g} needs {needed} {what}{held_out} or more; there "
-                f"are {self.n_units_:.4g}, enough for {name}={np.floor(1e3 * total) / 1e3:g}. Ask "
-                f"for less, or give more {what}{more}."
+                f"{asked}={level:g} needs {needed} {what}{held_out} or more; there are "
+                f"{self.n_units_:.4g}, enough for {asked}={np.floor(1e3 * total) / 1e3:g}. Ask for "
+                f"less, or give more {what}{more}."
             )
-        return float(coverage), float(level) if by_group else None
+        return float(coverage), None if confidence is None else float(confidence)

@@ -137,7 +137,7 @@ def test_one_rule_is_bounded_least_squares(rng):
     signs = np.array([-1, 1, 1])
     held = ANFISRegressor(n_mfs=1, alpha=1e-9, agreement=0.0, monotonic_cst=signs)
     # The slope by the first input is 1.
-    with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0': kept"):
+    with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0': keep"):
         held.fit(X, y)
     centred = X - X.mean(axis=0)
     ends = np.where(signs > 0, 0.0, -np.inf), np.where(signs > 0, np.inf, 0.0)
@@ -298,7 +298,7 @@ def test_there_is_always_a_line(rng):
         ),
         (
             {"constraints": [FixedPoint([0.0, 0.0], 1.0), FixedPoint([0.0, 0.0], 2.0)]},
-            r"fixes 'y' at 2 points, which 9 rules cannot all meet: two are the same",
+            r"fixes 'y' at 2 points, which 9 rules cannot all meet: two points are the same",
         ),
         (
             {"constraints": points_on_a_line(*np.linspace(-0.5, 0.5, 40))},
@@ -311,7 +311,12 @@ def test_there_is_always_a_line(rng):
         (
             # A line through two points leaves the limit.
             {"n_mfs": 1, "constraints": [*points_on_a_line(-0.5, 0.5), OutputLimits(upper=0.7)]},
-            "1 rule keep the upper limit 0.7 of 'y', with the 2 fixed points",
+            "1 rule keep the upper limit 0.7 of 'y' together with the 2 fixed points",
+        ),
+        (
+            # There is no room for the margin between both.
+            {"constraints": [FixedPoint([0.0, 0.0], 1.0), OutputLimits(upper=1.0 + 1e-9)]},
+            "9 rules keep the upper limit 1 of 'y' together with the 1 fixed point. Drop",
         ),
     ],
 )

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import LinearConstraint, minimize
 
 from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
-from skanfis.bounds.certified import cuts_of
+from skanfis.bounds.certified import training_box
 from skanfis.bounds.construction import RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
 from skanfis.bounds.search import largest
@@ -111,11 +111,11 @@ def test_what_is_in_order_rises(kind):
         assert (signs * slopes >= -1e-9).all()
         free = evaluation.coefficients.reshape(antecedent.n_rules, -1)
         ends = [end[: free.shape[1] - 1] for end in problem.rows.inputs.box]
-        falls += (held.left(free, *ends)[0] < 0.0).any()
+        falls += (held.margins(free, *ends)[0] < 0.0).any()
         for j in np.flatnonzero(signs):
             slope = partial(Enclosure(model, 0, -float(signs[j])).slope, j=int(j))
             until = 1e-9 * scale / model.spread[j]
-            found = largest(slope, low, high, 0.0, 400, cuts_of(model), until=until)
+            found = largest(slope, low, high, 0.0, 400, training_box(model), until=until)
             assert found.attained <= until
             n_proven, n_asked = n_proven + (found.bound <= until), n_asked + 1
     # A slope that touches zero inside the range takes more boxes than these.

@@ -160,7 +160,7 @@ def test_what_is_lazy_is_what_is_eager(n_outputs):
     assert_array_equal(model.predict(table).compute().to_numpy(), eager)
     assert_array_equal(table.map_partitions(model.coverage).compute(), model.coverage(X))
     for method in (model.coverage, model.strengths, model.apply, model.in_bounds):
-        with pytest.raises(TypeError, match=r"fit, predict, score: give X\.compute"):
+        with pytest.raises(TypeError, match=r"fit, predict and score take dask .* X\.compute"):
             method(table)
 
 
@@ -271,7 +271,12 @@ def weighted(weight):
         (
             lambda: (cut(100, data(300)[0])[0], data(300)[1]),
             TypeError,
-            "y is a ndarray, but the other one is a dask collection",
+            "y is a ndarray, but other data are dask collections",
+        ),
+        (
+            lambda: (*data(300), da.ones(300, chunks=100)),
+            TypeError,
+            "X is a ndarray, but other data are dask collections: .* compute",
         ),
         (
             lambda: weighted(np.where(np.arange(300) == 107, -2.0, 1.0)),

@@ -313,6 +313,7 @@ def test_units_and_notes_stand_in_the_header():
     assert "ms? Ask; <U+003F>?/ and <U+003F><U+003F>? do not." in comment
     assert "[1] x1 [degC?]: " in comment
     assert "[0] y [deg/s <U+002A>/]: " in comment
+    assert "\n * Two words.\n" in export_c(quick().fit(X, Y), name="m", notes="Two words.").header
 
 
 @pytest.mark.theory

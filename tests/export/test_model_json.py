@@ -212,7 +212,10 @@ def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
     with pytest.raises(ValueError, match=r"model\.json: nested too deeply"):
         read_json(path)
     path.write_text(export_json(A_GRID), encoding="utf-16")
-    with pytest.raises(ValueError, match=r"model\.json: 'utf-8' codec"):
+    with pytest.raises(ValueError, match=r"model\.json: no JSON: 'utf-8' codec"):
+        read_json(path)
+    path.write_text("time,rate\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"model\.json: no JSON: Expecting value"):
         read_json(path)
     with open(path, "wb") as file:
         file.truncate(2**40)
@@ -225,12 +228,12 @@ def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
 def test_what_would_be_larger_than_is_read_is_not_written(tmp_path, monkeypatch):
     size = len(export_json(A_GRID).encode())
     monkeypatch.setattr("skanfis.export.model_json._MOST_BYTES", size - 1)
-    with pytest.raises(ValueError, match=rf"such that it can be read: {size:,} bytes, of at most"):
+    with pytest.raises(ValueError, match=rf"read_json would refuse: {size:,} bytes, of at most"):
         export_json(A_GRID, tmp_path / "large.json")
     assert not any(tmp_path.iterdir())
 
 
 def test_what_could_not_be_read_is_not_written():
     wide = replace(A_GRID, spread=np.array([1e-60, 1.0, 1.0]))
-    with pytest.raises(ValueError, match=r"cannot be written .*: inputs\[0\]\.spread: 1e-60"):
+    with pytest.raises(ValueError, match=r"cannot write .*: inputs\[0\]\.spread: 1e-60"):
         export_json(wide)

@@ -263,7 +263,7 @@ def largest_number(log):
             "line 3, column 'time': time does",
         ),
         (lambda log: log.assign(temperature=20.0), "", "'temperature': the temperature spans 0"),
-        (one_run_without_levels, "", r"not be checked: the log has 1 device\(s\), 1 run\(s\)"),
+        (one_run_without_levels, "", r"not be checked: the log has 1 device, 1 run, 0 rate levels"),
         (groups_apart, f"{SMALL} --groups run", "every row lies outside the range"),
         (
             largest_number,

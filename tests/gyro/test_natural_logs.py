@@ -383,7 +383,7 @@ def test_a_clock_that_is_put_one_hour_back_goes_on(tmp_path, truth, form):
     np.testing.assert_allclose(np.diff(reading.log["time"]), 20.0)
     assert "run" not in reading.log
     told = "; ".join(reading.notes)
-    assert "the clock goes back one hour (daylight saving) in 1 place(s), first at line 252" in told
+    assert "the clock goes back one hour (daylight saving) in 1 place, first at line 252" in told
 
 
 @pytest.mark.parametrize(("unit", "steps", "times"), [(1e-6, 2e7, 2), (1e-3, 6e5, 1)])
@@ -394,7 +394,8 @@ def test_a_counter_of_32_bits_that_begins_again_goes_on(tmp_path, truth, unit, s
     reading = found_in(tmp_path, truth[PARTS[1:]].assign(**{name: clock}))
     np.testing.assert_allclose(np.diff(reading.log["time"]), steps * unit)
     assert "run" not in reading.log
-    told = f"back by the range of its 32 bits in {times} place(s), first at line 18; the time goes"
+    places = "1 place" if times == 1 else f"{times} places"
+    told = f"back by the range of its 32 bits in {places}, first at line 18; the time goes"
     assert told in "; ".join(reading.notes)
 
 
@@ -404,7 +405,7 @@ def test_a_block_that_occurs_twice_is_left_out(tmp_path, truth):
     reading = found_in(tmp_path, pd.concat([table[:200], table[100:]]))
     same(reading, truth)
     told = "; ".join(reading.notes)
-    assert "100 rows occur twice, from line 202 to line 301" in told
+    assert "100 repeated rows left out, from line 202 to line 301" in told
 
 
 @pytest.mark.parametrize("n_runs", [1, 5])
@@ -420,10 +421,10 @@ def test_rows_from_the_last_to_the_first_are_turned_round(tmp_path, truth, n_run
 @pytest.mark.parametrize(
     ("last", "n_rows", "told"),
     [
-        ("0,21.5,1.0,1.0", 300, "the clock jumps at the last 1 row(s), which are left out"),
-        ("9e6,21.5,1.0,1.0", 300, "the clock jumps at the last 1 row(s), which are left out"),
+        ("0,21.5,1.0,1.0", 300, "the clock jumps; what follows, 1 row, is left out"),
+        ("9e6,21.5,1.0,1.0", 300, "the clock jumps; what follows, 1 row, is left out"),
         ("3000,21.", 300, "1 of 301 rows lack a value"),
-        ("{same}", 300, "1 rows occur twice"),
+        ("{same}", 300, "1 repeated row left out"),
     ],
 )
 def test_a_last_row_that_is_a_glitch_is_no_run(tmp_path, truth, last, n_rows, told):

@@ -57,8 +57,11 @@ def test_one_level_is_a_level():
         np.random.default_rng(0).uniform(-100, 100, 500_000),
         100 * np.sin(np.arange(100_000) / 5000.0),
         np.random.default_rng(0).normal(size=100_000),
+        # Rows that are few: every one lies clear of the next.
+        100 * np.sin(np.arange(300) / 50.0),
+        np.linspace(-100.0, 100.0, 1000),
     ],
-    ids=["1500", "500000", "sine", "normal"],
+    ids=["1500", "500000", "sine", "normal", "short sine", "ramp"],
 )
 def test_a_rate_that_changes_continuously_has_no_levels(rate):
     with pytest.raises(ValueError, match=r"no levels: it changes continuously between -"):
@@ -137,9 +140,9 @@ def test_asked_for_or_for_a_compensator_that_does_not_see_the_output(levels_and_
     ("kind", "message"),
     [
         ("device", "cannot hold out by device: the log has no column"),
-        ("run", r"cannot hold out by run: the log has 2 run\(s\), and at least 3"),
+        ("run", r"cannot hold out by run: the log has 2 runs; at least 3"),
         ("level", "cannot hold out by level: the log has no rate levels"),
-        ("auto", r"could not be checked: the log has 2 run\(s\), 0 rate levels"),
+        ("auto", r"could not be checked: the log has 2 runs, 0 rate levels"),
         ("auto", r"No column of the time was found, .* --columns time=NAME"),
     ],
 )

@@ -122,6 +122,7 @@ class TestSurface:
             ({"features": (0,)}, ValueError, "must be two inputs"),
             ({"features": (0, "pressure")}, ValueError, "'pressure' is no input: give a position"),
             ({"features": "rate"}, ValueError, "must be two inputs"),
+            ({"features": 1}, ValueError, "features=1 must be two inputs"),
             ({"output": 1}, ValueError, "1 is no output: give a position from 0 to 0, or one of"),
             ({"held": [1.0]}, TypeError, "held must be a dict"),
             ({"held": {"rate": np.nan}}, ValueError, "must be a number in the range of training"),
@@ -246,6 +247,7 @@ def test_a_title_names_a_few_of_the_inputs_that_are_held():
     held = {f"x{k}": 0.5 * k for k in range(9)}
     assert title_of(dict(list(held.items())[:2]), "pale") == "x0 = 0; x1 = 0.5; pale"
     assert title_of(held) == "x0 = 0; x1 = 0.5; x2 = 1; x3 = 1.5; 5 more inputs held"
+    assert title_of(dict(list(held.items())[:5])).endswith("x3 = 1.5; 1 more input held")
 
 
 @pytest.mark.parametrize(

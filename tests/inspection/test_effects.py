@@ -158,7 +158,7 @@ def test_groups_enter_as_one(of_indicators):
     [
         ({"fibre": ["a", "d"]}, "'d' is no input"),
         ({"one": ["a", "b"], "two": ["b", "c"]}, "some columns of 'one', not all"),
-        ({"rate": ["a", "b"]}, "called as a column"),
+        ({"rate": ["a", "b"]}, "name of a column outside"),
         ({"fibre": "a"}, r"groups\['fibre'\] is 'a': a list of columns is needed"),
         ({"fibre": []}, "a list of columns is needed"),
         (["a", "b"], "must be a dict"),

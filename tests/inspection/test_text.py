@@ -391,6 +391,7 @@ def test_a_model_without_data_has_no_weights_to_tell():
     text = export_text(model, max_shown=2)
     assert "\nRule 0:\n  IF" in text
     assert "\n10 rules left out.\n" in text
+    assert "errs" not in text
 
 
 def test_what_the_text_errs_is_told_in_the_units_of_the_fit_alone(rng):
@@ -399,7 +400,8 @@ def test_what_the_text_errs_is_told_in_the_units_of_the_fit_alone(rng):
     y = np.sin(X[:, 0] / 300.0) + 0.1 * rng.standard_normal(100)
     plain = ANFISRegressor(n_mfs=2).fit(X, y)
     scaled = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)).fit(X, y)
-    *_, told = export_text(plain).split("\n\n")
+    *_, how, told = export_text(plain).split("\n\n")
+    assert "What a rule errs by" in " ".join(how.split())
     assert "; the text as printed errs " in told.splitlines()[0]
     *_, untold = export_text(scaled).split("\n\n")
     assert re.fullmatch(r"\d+ numbers\.", untold.splitlines()[0])

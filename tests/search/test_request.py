@@ -281,7 +281,7 @@ def test_names_of_terms_are_carried(data):
     assert [term["name"] for term in model.memberships_] == list(model.model_.term_names)
     later = ANFISRegressor(partition=model.model_, max_iter=0).fit(X, y)
     assert later.model_.term_names == model.model_.term_names
-    with pytest.raises(ValueError, match="3 names for input 'temperature', which has 2 terms"):
+    with pytest.raises(ValueError, match="names for input 'temperature': 3 given for 2 terms"):
         model.rename_terms({"temperature": ["a", "b", "c"]})
     assert model.model_.term_names == later.model_.term_names
 

@@ -98,8 +98,7 @@ def export_c(
     Raises
     ------
     ValueError
-        If a parameter is none of the above, a step cannot be folded in, or the model's numbers go
-        beyond what "float" holds.
+        If a parameter is none of the above, a step cannot be folded in, or "float" is too narrow.
 
     Examples
     --------

@@ -37,8 +37,7 @@ class _Number:
 class Body:
     """A function of x and p: log mu of a family, or its derivative by x.
 
-    ``text`` has its statements; ``cost`` is how many exponentials, logarithms, multiplications and
-    divisions they have.
+    ``text`` are its statements, ``cost`` their exponentials, logarithms, products and divisions.
     """
 
     def __init__(self, family, dialect, is_slope):

@@ -48,9 +48,8 @@ def status_word(is_out, is_silent, is_uncovered):
 class Dialect:
     """Turns templates into C.
 
-    A number that ends in R becomes a constant of the type, ``$name`` the prefix of identifiers,
-    ``$NAME`` that of macros, ``$real`` the type, ``$EXP`` and the like its functions, ``$MAX`` its
-    largest number.
+    A number that ends in R becomes a constant of the type. ``$name`` is the prefix of identifiers,
+    ``$NAME`` of macros; ``$real`` the type, ``$EXP`` a function, ``$MAX`` the largest number of it.
     """
 
     name: str

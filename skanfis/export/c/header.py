@@ -58,7 +58,7 @@ def header(source, units, notes):
     model, numbers, dialect = source.model, source.numbers, source.dialect
     lowest, highest = model.output_limits
     lines = [
-        *map(remark, notes),
+        *map(remark, [notes] if isinstance(notes, str) else notes),
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(source.cost),
         "",
@@ -102,7 +102,7 @@ def _ranges(names, low, high, units):
 
 
 def in_digits(low, high):
-    """Both ends of a range, to about a hundred-thousandth of its width."""
+    """Both ends of a range as texts, to about a hundred-thousandth of its width."""
     width = float(high) - float(low)
     if not 0.0 < width < np.inf:
         return [f"{end:.7g}" for end in (low, high)]

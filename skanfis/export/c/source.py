@@ -2,7 +2,7 @@
 
 The functions are in ``templates``; here is which of their lines there are, how many of each thing,
 and what it costs. The order of work is that of ``skanfis.model``; "linear" is worked out outside
-the box alone, by the derivative along the way back.
+the box alone, by the derivative along the way from its nearest point.
 """
 
 import re
@@ -272,8 +272,7 @@ class RulesPart(Source):
     """The rules of a model as static functions of a larger C file, which share its status word.
 
     The file calls ``int NAME_predict(const REAL x[], REAL y[])``, where NAME is the prefix of the
-    file and ``suffix``. ``model``, ``low`` and ``high`` are the model and its box in the type of
-    the file.
+    file and ``suffix``. ``model``, ``low`` and ``high`` are rounded to the type of the file.
     """
 
     def __init__(self, model, dialect, suffix, min_coverage):

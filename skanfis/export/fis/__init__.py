@@ -41,8 +41,7 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
     """Write a trained model as a .fis file, for MATLAB, Octave or fuzzylite.
 
     The system is Sugeno's, with product as AND and weighted average; numbers have all their digits.
-    Outside the Range of the inputs, the box of the training data, other programs do as they like:
-    clamp the inputs.
+    Clamp the inputs to their Range, that of the training data: beyond it programs differ.
 
     Parameters
     ----------
@@ -98,8 +97,8 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
         parse_fis(text)
     except ValueError as error:
         raise ValueError(
-            f"the model cannot be written such that it can be read: {error} Train on inputs and "
-            "targets in other units."
+            f"cannot write what read_fis would refuse: {error} Train on inputs and targets in "
+            "other units."
         ) from None
     if path is not None:
         Path(path).write_text(text, encoding="ascii", newline="\n")

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...model import TSKModel
-from ...naming import distinct as distinct  # the application may take it from export alone
+from ...naming import distinct
 from ..json_reader import rule_base
 from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
 from .functions import theta_of
@@ -328,9 +328,8 @@ def _model(inputs, outputs, antecedents, consequents):
 def _kind_and_order(inputs, antecedents):
     """Which rule base the rules are, and where its first, second, ... stand in the file.
 
-    Rules of a grid are all combinations, in C order, of at least two terms of one family, in order,
-    on every input that they look at. Scattered rules look at the same inputs, by terms of their own
-    and of one family.
+    A grid: all combinations, in C order, of two or more terms of one family, in order, on every
+    input that rules look at. Scattered: rules look at the same inputs by terms of their own.
     """
     every = np.arange(len(antecedents))
     used = [(one, own) for one, own in zip(inputs, antecedents.T, strict=True) if own.any()]

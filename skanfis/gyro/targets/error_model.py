@@ -1,9 +1,8 @@
 """The error that a compensator takes off, and how far what stands in its place can be from it.
 
-Both have certain ranges of values and slopes over boxes, and the difference is certain by the mean
-value theorem. The error is a sum of rules, whose ranges are those of ``skanfis.bounds``, of
-polynomials and the arcsine law, by interval arithmetic. Intervals are pairs of arrays, with a
-number for every box.
+Ranges of both, and of their slopes, over boxes are certain, and so is the difference by the mean
+value theorem. The error is a sum of rules, with ranges from ``skanfis.bounds``, of polynomials and
+the arcsine law, by interval arithmetic. An interval is a pair of arrays, a number for every box.
 """
 
 import warnings
@@ -28,8 +27,8 @@ _N_POINTS = 4096
 class ErrorModel:
     """The indicated minus the compensated rate [deg/s], as a function of the inputs.
 
-    ``estimator`` is that of the compensator, or of a fold, and X what it was fitted to: its range
-    is ``ends`` (n_inputs, 2).
+    ``estimator`` is that of the compensator, or of a fold; ``ends`` (n_inputs, 2) is the range of
+    X, to which it was fitted.
     """
 
     def __init__(self, compensator, estimator, X):
