@@ -150,7 +150,7 @@ class Calibration:
 
         Errors are in a unit of which ``per_unit`` are 1 deg/s.
         """
-        found = [self.split.caution] if self.split.caution else []
+        found = list(self.split.cautions)
         if "output" not in self.recipe.inputs and np.abs(self.rate).max() > LARGEST_AT_REST:
             found.append(
                 "the gyro turned, and its output is no input: what is learnt as its bias has the "

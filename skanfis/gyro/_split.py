@@ -46,6 +46,13 @@ _NO_CLOCK = (
     " No column of the time was found, whose gaps would tell runs apart: name it with --columns "
     "time=NAME."
 )
+# Cautions where there are several of a kind, and too few of them.
+_TOO_FEW = {
+    "level": "the table stood still at {} rates alone, but for their sign, too few to hold one "
+    "out: what is left at all others is not known, and may be any.",
+    "device": "{} devices share one compensator, and are too few to hold one out: what it leaves "
+    "of any other is not known, and one from the log of each alone may leave less.",
+}
 _LEGS = "legs between turning points of the temperature"
 # What is held out, and what of it is counted.
 _WORDS = {
@@ -143,14 +150,14 @@ class Split:
     """Folds of a cross-validation: every row is tested once, by a model that is new to its group.
 
     ``labels`` are those that a report lists, ``sentence`` says what was held out and why, and
-    ``caution`` what that cannot show.
+    ``cautions`` what that cannot show.
     """
 
     kind: str
     folds: list
     labels: np.ndarray
     sentence: str
-    caution: str = ""
+    cautions: tuple[str, ...] = ()
 
 
 def choose_split(log, kind="auto", *, uses_output=True):
@@ -185,13 +192,12 @@ def choose_split(log, kind="auto", *, uses_output=True):
     what = " and ".join(_WORDS[part][0] for part in parts)
     counted = ", ".join(f"{counts[part]} {_WORDS[part][1]}" for part in parts)
     sentence = f"{what} held out ({counted}, {len(folds)} folds; {reason})"
-    caution, n_levels = "", counts.get("level", 0)
-    if 1 < n_levels < _FEWEST["level"] and "level" not in parts:
-        caution = (
-            f"the table stood still at {n_levels} rates alone, but for their sign, too few to hold "
-            "one out: what is left at all others is not known, and may be any."
-        )
-    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, caution)
+    cautions = tuple(
+        told.format(counts[part])
+        for part, told in _TOO_FEW.items()
+        if part not in parts and 1 < counts.get(part, 0) < _FEWEST[part]
+    )
+    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, cautions)
 
 
 def _choose(groups, counts, has_time):

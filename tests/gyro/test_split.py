@@ -217,11 +217,22 @@ def test_a_row_less_moves_no_other_row_to_another_fold():
         np.testing.assert_array_equal(less, np.delete(whole, lost))
 
 
-@pytest.mark.parametrize(("rates", "n_levels"), [([-50, 50], 1), ([-50, 0, 50], 2), (LEVELS, 5)])
-def test_too_few_levels_to_hold_one_out_are_told(rates, n_levels):
-    log = make_ofog(n_devices=1, n_runs=4, sampling_interval=60.0, rates=rates, random_state=0)
-    split = choose_split(log)
-    assert ("level" in split.kind) == (n_levels >= 5)
-    expected = "the table stood still at 2 rates alone" if n_levels == 2 else ""
-    assert split.caution[: len(expected)] == expected
-    assert bool(split.caution) == (n_levels == 2)
+@pytest.mark.parametrize(
+    ("rates", "n_devices", "expected"),
+    [
+        ([-50, 50], 1, []),
+        ([-50, 0, 50], 1, ["the table stood still at 2 rates alone"]),
+        (LEVELS, 1, []),
+        (LEVELS, 2, ["2 devices share one compensator"]),
+        (LEVELS, 3, []),
+    ],
+)
+def test_too_few_levels_or_devices_to_hold_one_out_are_told(rates, n_devices, expected):
+    n_runs = 4 if n_devices == 1 else 2
+    kinds = {"n_devices": n_devices, "n_runs": n_runs, "rates": rates}
+    log = make_ofog(**kinds, sampling_interval=60.0, random_state=0)
+    split = choose_split(log.assign(run=log.groupby(["device", "run"]).ngroup()))
+    assert ("level" in split.kind) == (rates is LEVELS)
+    assert [
+        told[: len(start)] for told, start in zip(split.cautions, expected, strict=True)
+    ] == expected
