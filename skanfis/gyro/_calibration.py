@@ -310,8 +310,8 @@ def _to_write(recipe, verdict, simpler):
         return verdict.recommended
     name = NAMES.get(recipe.write, verdict.model)
     if name not in verdict.rms:
-        reasons = [each.missing for each in simpler if each.name == name] or ["no such on this log"]
-        raise LogError(f"--write {recipe.write}: {reasons[0]}.")
+        reason = next(each.missing for each in simpler if each.name == name)
+        raise LogError(f"--write {recipe.write}: {reason}.")
     return name
 
 

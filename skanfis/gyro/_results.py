@@ -50,10 +50,7 @@ _PICTURES = {
         ResidualSurfaceDisplay,
         "Mean residual and number of rows over temperature and rate.",
     ),
-    "held-out-groups": (
-        GroupResidualDisplay,
-        "RMS error of every held-out group. One without a dot has no row in range.",
-    ),
+    "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group; no dot: not in range."),
     "allan-deviation": (
         AllanDisplay,
         "Allan deviation of the error, over the runs that are in range from end to end. It is the "

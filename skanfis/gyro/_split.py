@@ -185,7 +185,7 @@ def choose_split(log, kind="auto", *, uses_output=True):
     parts = kind.split("+")
     for part in parts:
         _check(part, counts)
-    numbers = np.column_stack([_fold_numbers(part, groups[part], len(parts)) for part in parts])
+    numbers = np.column_stack([fold_numbers(part, groups[part], len(parts)) for part in parts])
     # Rows of the same run, or of the same level, are neither trained on nor tested.
     sides = ((numbers != fold, numbers == fold) for fold in np.unique(numbers, axis=0))
     folds = [tuple(np.flatnonzero(side.all(axis=1)) for side in pair) for pair in sides]
@@ -237,12 +237,14 @@ def _check(part, counts):
         )
 
 
-def _fold_numbers(part, groups, n_parts):
+def fold_numbers(part, groups, n_parts):
     """Number of the fold that tests each row, as far as one part of a split decides."""
     if part == "level":
         return groups % (_N_LEVEL_FOLDS_BESIDE if n_parts > 1 else _N_FOLDS)
     if part == "piece":
-        return cut_legs(groups)
+        # The pieces of every leg in turn: with one of a leg that warms goes one at another
+        # temperature of the next, which cools. The model has seen each temperature one way.
+        return (_pieces(groups) + 2 * groups) % _N_FOLDS
     # In their order, whatever their sizes: a row more or less moves no group to another fold.
     return groups % min(_N_FOLDS, np.unique(groups).size)
 
@@ -292,15 +294,6 @@ def _turns(temperature, least):
             turns += [low] if rising else []
             rising, high = 1, place
     return starts[np.array(turns, dtype=int)]
-
-
-def cut_legs(legs):
-    """Fold of each row: the pieces of every leg in turn, one leg's beside another's of the next.
-
-    With a piece of a leg that warms goes one at another temperature of the next, which cools: the
-    model has seen each temperature one way.
-    """
-    return (_pieces(legs) + 2 * legs) % _N_FOLDS
 
 
 def _pieces(legs):

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError, group_by_rate_level
-from skanfis.gyro._split import choose_split, cut_legs, find_legs, level_numbers
+from skanfis.gyro._split import choose_split, find_legs, fold_numbers, level_numbers
 
 GRID = np.linspace(-100.8, 100.8, 57)  # steps of 3.6 deg/s
 UNEVEN = np.array([-100.0, -30, -10, -3, -1, -0.3, 0, 0.3, 1, 3, 10, 30, 100])
@@ -184,7 +184,7 @@ def test_every_run_has_legs_of_its_own_and_long_logs_are_thinned():
 def test_pieces_leave_each_temperature_to_the_other_direction():
     temperature = cycle(-30, 60, -30)
     legs = find_legs(temperature)
-    folds = cut_legs(legs)
+    folds = fold_numbers("piece", legs, 1)
     assert set(folds) == set(range(5))
     for fold in range(5):
         up, down = (temperature[(folds == fold) & (legs == leg)] for leg in (0, 1))
