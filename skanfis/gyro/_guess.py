@@ -138,9 +138,9 @@ def settle(source, request, first=None):
             raise LogError(f"{source.path}: {told}")
     taken = list(layout.places.values())
     if shared := [part for part in layout.places if taken.count(layout.places[part]) > 1]:
-        told = f"column {layout.name(shared[0])!r} cannot be both {' and '.join(shared)}"
         raise LogError(
-            f"{source.path}: {told}. Name another for one of them (--columns PART=NAME)."
+            f"{source.path}: column {layout.name(shared[0])!r} cannot be both "
+            f"{' and '.join(shared)}. Name another for one of them (--columns PART=NAME)."
         )
     layout.places = {part: layout.places[part] for part in PARTS if part in layout.places}
     layout.units = CANONICAL | layout.units

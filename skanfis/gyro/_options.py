@@ -184,7 +184,7 @@ def _scale_factor(text):
 def _terms(text):
     if text == "search":
         return text
-    numbers = ()
+    numbers: tuple[int, ...] = ()
     with contextlib.suppress(ValueError):
         numbers = tuple(int(part) for part in text.split(","))
     if not numbers or min(numbers) < 1:

@@ -174,7 +174,7 @@ def hysteresis(rate, error, temperature, temperature_rate) -> float:
     if not temperature_rate.min() < 0 < temperature_rate.max():
         raise ValueError("No hysteresis: the temperature does not both rise and fall.")
     edges = np.linspace(temperature.min(), temperature.max(), HYSTERESIS_BINS + 1)
-    biases = biases_of_branches(rate, error, temperature, temperature_rate, edges)
+    biases = biases_of_branches(edges, rate, error, temperature, temperature_rate)
     gaps = np.abs(np.subtract(*biases))
     if np.isnan(gaps).all():
         told = f"warming and cooling share no temperature at which both have {ROWS_PER_MEAN} rows"
@@ -182,7 +182,7 @@ def hysteresis(rate, error, temperature, temperature_rate) -> float:
     return float(PER_HOUR * np.nanmax(gaps))
 
 
-def biases_of_branches(rate, error, temperature, temperature_rate, edges):
+def biases_of_branches(edges, rate, error, temperature, temperature_rate):
     """Mean errors in bins of temperature while warming, and while cooling, at a rate of zero.
 
     What the error owes to the rate, an odd polynomial that is linear in temperature, is fitted

@@ -111,7 +111,7 @@ class HysteresisDisplay(GyroDisplay):
         table = pd.DataFrame({"temperature [degC]": 0.5 * (edges[:-1] + edges[1:])})
         for side in SIDES:
             columns = rows.dropna(subset=side)[["rate", side, *self._PER_ROW]].to_numpy().T
-            for name, bias in zip(_BRANCHES, biases_of_branches(*columns, edges), strict=True):
+            for name, bias in zip(_BRANCHES, biases_of_branches(edges, *columns), strict=True):
                 table[f"bias {side}, {name} [{self._unit}]"] = bias
         return {"bias": table}
 
