@@ -251,7 +251,7 @@ def test_a_file_of_matlab_that_was_cut_or_damaged_is_refused(tmp_path, truth, le
         found(path)
 
 
-@pytest.mark.parametrize("form", ["%Y-%m-%d", "%d.%m.%Y"])
+@pytest.mark.parametrize("form", ["%Y-%m-%d", "%d.%m.%Y", "%d-%b-%Y", "%d-%m-%Y"])
 def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
     """Runs a day apart, by whose hours alone each would go on from the one before."""
     clock = 36_000 + 10 * np.arange(300) + 86_400 * truth["run"].astype(int)
