@@ -158,9 +158,7 @@ def _summary(results):
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
         _box(calibration, "It may be used from"),
-        Block(
-            "pictures", [each for name, each in results.pictures.items() if name == _ON_FIRST_PAGE]
-        ),
+        Block("pictures", [results.pictures[_ON_FIRST_PAGE]]),
     ]
     return "Summary", blocks
 
@@ -201,9 +199,8 @@ def _check(results):
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
         "On the same held-out rows in range. What this model, the fuzzy rules, is better by is "
-        "the ratio of RMS "
-        f"errors, in the geometric mean over {held_out_groups(calibration)}. Recommended is the "
-        "simplest that no more elaborate one beats with an interval above 1.02."
+        f"the ratio of RMS errors, in the geometric mean over {held_out_groups(calibration)}. "
+        "Recommended is the simplest that no more elaborate one beats with an interval above 1.02."
     )
     blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
     lines = []
@@ -233,8 +230,7 @@ def _merit(results):
         name, unit = line["figure"], signs(line["unit"])
         lines.append((_words(name), *cells, unit, _TERMS.get(name, "none")))
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit", "IEEE term"]
-    resampled = results.merit.attrs["resampled"]
-    blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
+    blocks = [_table(head, lines, f"Intervals by resampling {table.attrs['resampled']}")]
     for note, part in table[table["note"] != ""].groupby("note", sort=False):
         blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
     if results.checks:
@@ -244,8 +240,7 @@ def _merit(results):
         ]
         caption = "After compensation, on the held-out rows in range"
         head = ["figure", "required", "after", "unit", "result", "remark"]
-        heading = Block("heading", "Limits of the specification")
-        blocks += [heading, _table(head, checks, caption)]
+        blocks += [Block("heading", "Limits of the specification"), _table(head, checks, caption)]
     return "Figures of merit", blocks
 
 

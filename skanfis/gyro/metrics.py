@@ -174,8 +174,7 @@ def hysteresis(rate, error, temperature, temperature_rate) -> float:
     if not temperature_rate.min() < 0 < temperature_rate.max():
         raise ValueError("No hysteresis: the temperature does not both rise and fall.")
     edges = np.linspace(temperature.min(), temperature.max(), HYSTERESIS_BINS + 1)
-    biases = biases_of_branches(edges, rate, error, temperature, temperature_rate)
-    gaps = np.abs(np.subtract(*biases))
+    gaps = np.ptp(biases_of_branches(edges, rate, error, temperature, temperature_rate), axis=0)
     if np.isnan(gaps).all():
         told = f"warming and cooling share no temperature at which both have {ROWS_PER_MEAN} rows"
         raise ValueError(f"No hysteresis: {told}.")
@@ -324,11 +323,17 @@ def _sensitivity(rate, output, temperature):
 
 
 def _bias_sensitivity(error, of_bias, column, name, **other):
-    """Slope of the bias in a column, fitted together with that in another."""
+    """Slope of the bias in a column, fitted together with that in another.
+
+    Of the rows at rest, as the bias is, where these reach half as far as all rows do.
+    """
+    columns = [column, *other.values()]
+    if any(np.ptp(each[of_bias]) < 0.5 * np.ptp(each) for each in columns):
+        of_bias = np.ones_like(of_bias)
     without = f"{name} never changes"
     if other:
         without = "temperature and temperature_rate do not change independently of each other"
-    design = [_centred(values[of_bias]) for values in (column, *other.values())]
+    design = [_centred(values[of_bias]) for values in columns]
     return PER_HOUR * _least_squares(design, error[of_bias], without)[0]
 
 

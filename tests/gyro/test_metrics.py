@@ -282,6 +282,9 @@ def test_the_bias_is_of_the_rows_at_rest_where_there_are_some():
     columns = {"temperature": np.tile(np.arange(10.0), 5), "of_bias": rows_of_bias(rate)}
     columns["error"] = (1e-6 * rate**2 + 2.0 / HOUR) * columns["temperature"]
     assert figure("bias_temperature_sensitivity", **columns) == pytest.approx(2.0)
+    # Rows at rest at one temperature tell no slope: those of all have the mean 5000 of rate**2.
+    columns["of_bias"] &= columns["temperature"] < 1.0
+    assert figure("bias_temperature_sensitivity", **columns) == pytest.approx(20.0)
     of_line = figure("bias", error=error[moving], of_bias=rows_of_bias(rate[moving]))
     assert of_line == pytest.approx(HOUR * error[moving].mean(), rel=1e-12)
     assert of_line > 50.0
