@@ -154,11 +154,12 @@ def _summary(results):
         (_words(name), three_digits(before), three_digits(after), signs(unit))
         for name, before, after, unit in known.itertuples()
     ]
+    first = [each for name, each in results.pictures.items() if name == _ON_FIRST_PAGE]
     blocks = [
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
         _box(calibration, "It may be used from"),
-        Block("pictures", [results.pictures[_ON_FIRST_PAGE]]),
+        Block("pictures", first),
     ]
     return "Summary", blocks
 
@@ -341,8 +342,7 @@ def _table(head, lines, caption=""):
 
 
 def _interval(low, high):
-    is_known = np.isfinite([low, high]).all()
-    return f"[{three_digits(low)}, {three_digits(high)}]" if is_known else ""
+    return f"[{three_digits(low)}, {three_digits(high)}]" if np.isfinite(low + high) else ""
 
 
 def _words(name):
