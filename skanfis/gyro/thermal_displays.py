@@ -107,7 +107,7 @@ class HysteresisDisplay(GyroDisplay):
     _PANELS = 2, 1
 
     def _computed(self, rows):
-        _, edges = bins_of(rows["temperature"], HYSTERESIS_BINS)
+        _, edges = bins_of(rows.dropna(subset="after")["temperature"], HYSTERESIS_BINS)
         table = pd.DataFrame({"temperature [degC]": 0.5 * (edges[:-1] + edges[1:])})
         for side in SIDES:
             columns = rows.dropna(subset=side)[["rate", side, *self._PER_ROW]].to_numpy().T
