@@ -150,7 +150,7 @@ class Calibration:
 
         Errors are in a unit of which ``per_unit`` are 1 deg/s.
         """
-        found = [self.split.caution] if self.split.caution else []
+        found = list(self.split.cautions)
         if "output" not in self.recipe.inputs and np.abs(self.rate).max() > LARGEST_AT_REST:
             found.append(
                 "the gyro turned, and its output is no input: what is learnt as its bias has the "
@@ -310,8 +310,8 @@ def _to_write(recipe, verdict, simpler):
         return verdict.recommended
     name = NAMES.get(recipe.write, verdict.model)
     if name not in verdict.rms:
-        reasons = [each.missing for each in simpler if each.name == name] or ["no such on this log"]
-        raise LogError(f"--write {recipe.write}: {reasons[0]}.")
+        reason = next(each.missing for each in simpler if each.name == name)
+        raise LogError(f"--write {recipe.write}: {reason}.")
     return name
 
 

@@ -134,11 +134,14 @@ def settle(source, request, first=None):
         _guess(source, request, layout, first)
     for part in request.require:
         if part not in layout.places:
-            taken = layout.places.values() if request.guess else ()
-            told = _no_column(part, names[part], source.header, taken)
+            told = _no_column(part, names[part], source.header, layout.places.values())
             raise LogError(f"{source.path}: {told}")
-    if len(set(layout.places.values())) < len(layout.places):
-        raise LogError(f"{source.path}: two parts cannot be the same column of the file.")
+    taken = list(layout.places.values())
+    if shared := [part for part in layout.places if taken.count(layout.places[part]) > 1]:
+        raise LogError(
+            f"{source.path}: column {layout.name(shared[0])!r} cannot be both "
+            f"{' and '.join(shared)}. Name another for one of them (--columns PART=NAME)."
+        )
     layout.places = {part: layout.places[part] for part in PARTS if part in layout.places}
     layout.units = CANONICAL | layout.units
     return layout

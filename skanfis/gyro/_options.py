@@ -4,6 +4,7 @@ A limit is FIGURE=VALUE: bias=5deg/h says that the bias is 5 deg/h at most, with
 """
 
 import argparse
+import contextlib
 import math
 import re
 from argparse import ArgumentTypeError
@@ -170,10 +171,9 @@ def _target(text):
 
 
 def _scale_factor(text):
-    try:
+    value = math.nan
+    with contextlib.suppress(ValueError):
         value = float(text)
-    except ValueError:
-        value = math.nan
     if not 1e-30 <= abs(value) <= 1e30:
         raise ArgumentTypeError(
             f"{shortened(text)} must be a number from 1e-30 to 1e30, or such a negative one"
@@ -184,10 +184,9 @@ def _scale_factor(text):
 def _terms(text):
     if text == "search":
         return text
-    try:
+    numbers: tuple[int, ...] = ()
+    with contextlib.suppress(ValueError):
         numbers = tuple(int(part) for part in text.split(","))
-    except ValueError:
-        numbers = ()
     if not numbers or min(numbers) < 1:
         raise ArgumentTypeError(f"{shortened(text)} must be search, or numbers such as 2,3,3")
     n_rules = math.prod(numbers)

@@ -16,10 +16,9 @@ from ._options import check_limit
 from .c_compensator import input_units
 from .compensator import features
 from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, signs, three_digits
-from .metrics import rms, rows_for_allan
+from .metrics import SLOWEST, rms, rows_for_allan
 from .report import gyro_report
 from .thermal_displays import (
-    SLOWEST,
     CoverageDisplay,
     HysteresisDisplay,
     ResidualSurfaceDisplay,
@@ -43,14 +42,14 @@ _PICTURES = {
     "hysteresis": (
         HysteresisDisplay,
         "Bias against temperature, while warming and while cooling. The gap is IEEE 528's "
-        "hysteresis error; what depends on the rate is taken off, other than in the table. "
-        "Temperature alone cannot close a loop.",
+        "hysteresis error; what depends on the rate is taken off. Temperature alone cannot close "
+        "a loop.",
     ),
     "residual-surface": (
         ResidualSurfaceDisplay,
         "Mean residual and number of rows over temperature and rate.",
     ),
-    "held-out-groups": (GroupResidualDisplay, "RMS error of every held-out group."),
+    "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group; no dot: not in range."),
     "allan-deviation": (
         AllanDisplay,
         "Allan deviation of the error, over the runs that are in range from end to end. It is the "

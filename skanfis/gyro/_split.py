@@ -47,6 +47,13 @@ _NO_CLOCK = (
     " No column of the time was found, whose gaps would tell runs apart: name it with --columns "
     "time=NAME."
 )
+# Cautions where there are several of a kind, and too few of them.
+_TOO_FEW = {
+    "level": "the table stood still at {} rates alone, but for their sign, too few to hold one "
+    "out: what is left at all others is not known, and may be any.",
+    "device": "{} devices share one compensator, and are too few to hold one out: what it leaves "
+    "of any other is not known, and one from the log of each alone may leave less.",
+}
 _LEGS = "legs between turning points of the temperature"
 # What is held out, and what of it is counted.
 _WORDS = {
@@ -145,14 +152,14 @@ class Split:
     """Folds of a cross-validation: every row is tested once, by a model that is new to its group.
 
     ``labels`` are those that a report lists, ``sentence`` says what was held out and why, and
-    ``caution`` what that cannot show.
+    ``cautions`` what that cannot show.
     """
 
     kind: str
     folds: list
     labels: np.ndarray
     sentence: str
-    caution: str = ""
+    cautions: tuple[str, ...] = ()
 
 
 def choose_split(log, kind="auto", *, uses_output=True):
@@ -180,20 +187,19 @@ def choose_split(log, kind="auto", *, uses_output=True):
     parts = kind.split("+")
     for part in parts:
         _check(part, counts)
-    numbers = np.column_stack([_fold_numbers(part, groups[part], len(parts)) for part in parts])
+    numbers = np.column_stack([fold_numbers(part, groups[part], len(parts)) for part in parts])
     # Rows that share one part with those that are tested, the run or the level, are left out.
     sides = ((numbers != fold, numbers == fold) for fold in np.unique(numbers, axis=0))
     folds = [tuple(np.flatnonzero(side.all(axis=1)) for side in pair) for pair in sides]
     what = " and ".join(_WORDS[part][0] for part in parts)
     of_each = ", ".join(f"{counts[part]} {_WORDS[part][1]}" for part in parts)
     sentence = f"{what} held out ({of_each}, {len(folds)} folds; {reason})"
-    caution, n_levels = "", counts.get("level", 0)
-    if 1 < n_levels < _FEWEST["level"] and "level" not in parts:
-        caution = (
-            f"the table stood still at {n_levels} rates alone, but for their sign, too few to hold "
-            "one out: what is left at all others is not known, and may be any."
-        )
-    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, caution)
+    cautions = tuple(
+        told.format(counts[part])
+        for part, told in _TOO_FEW.items()
+        if part not in parts and 1 < counts.get(part, 0) < _FEWEST[part]
+    )
+    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, cautions)
 
 
 def _choose(groups, counts, has_time):
@@ -232,12 +238,14 @@ def _check(part, counts):
         )
 
 
-def _fold_numbers(part, groups, n_parts):
+def fold_numbers(part, groups, n_parts):
     """Number of the fold that tests each row, as far as one part of a split decides."""
     if part == "level":
         return groups % (_N_LEVEL_FOLDS_BESIDE if n_parts > 1 else _N_FOLDS)
     if part == "piece":
-        return cut_legs(groups)
+        # The pieces of every leg in turn: with one of a leg that warms goes one at another
+        # temperature of the next, which cools. The model has seen each temperature one way.
+        return (_pieces(groups) + 2 * groups) % _N_FOLDS
     # In their order, whatever their sizes: a row more or less moves no group to another fold.
     return groups % min(_N_FOLDS, np.unique(groups).size)
 
@@ -287,15 +295,6 @@ def _turns(temperature, least):
             turns += [low] if rising else []
             rising, high = 1, place
     return starts[np.array(turns, dtype=int)]
-
-
-def cut_legs(legs):
-    """Fold of each row: one piece of every leg, and of the next leg another one.
-
-    A leg that warms and the next, which cools, so lose different temperatures: the model has seen
-    each temperature one way.
-    """
-    return (_pieces(legs) + 2 * legs) % _N_FOLDS
 
 
 def _pieces(legs):

@@ -179,8 +179,9 @@ def _recipe(options, reading, at_rest):
     """What the options ask for; UsageError where the log does not go with them."""
     unit = reading.units["output"]
     inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
-    if options.physics and "output" not in inputs:
-        raise UsageError("--physics: the arcsine law needs the output among the inputs.")
+    asked = "--physics" if options.physics else f"--write {options.write}"
+    if (options.physics or "law" in options.write) and "output" not in inputs:
+        raise UsageError(f"{asked}: the arcsine law needs the output among the inputs.")
     if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
         raise UsageError(
             f"--terms has {counted(len(options.terms), 'number')} for "

@@ -154,13 +154,12 @@ def _summary(results):
         (_words(name), three_digits(before), three_digits(after), signs(unit))
         for name, before, after, unit in known.itertuples()
     ]
+    first = [each for name, each in results.pictures.items() if name == _ON_FIRST_PAGE]
     blocks = [
         _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
         Block("soft", flagged_text(calibration)),
         _box(calibration, "It may be used from"),
-        Block(
-            "pictures", [each for name, each in results.pictures.items() if name == _ON_FIRST_PAGE]
-        ),
+        Block("pictures", first),
     ]
     return "Summary", blocks
 
@@ -232,8 +231,7 @@ def _merit(results):
         name, unit = line["figure"], signs(line["unit"])
         lines.append((_words(name), *cells, unit, _TERMS.get(name, "none")))
     head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit", "IEEE term"]
-    resampled = results.merit.attrs["resampled"]
-    blocks = [_table(head, lines, f"Intervals by resampling {resampled}")]
+    blocks = [_table(head, lines, f"Intervals by resampling {table.attrs['resampled']}")]
     for note, part in table[table["note"] != ""].groupby("note", sort=False):
         blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
     if results.checks:
@@ -243,8 +241,7 @@ def _merit(results):
         ]
         caption = "After compensation, on the held-out rows in range"
         head = ["figure", "required", "after", "unit", "result", "remark"]
-        heading = Block("heading", "Limits of the specification")
-        blocks += [heading, _table(head, checks, caption)]
+        blocks += [Block("heading", "Limits of the specification"), _table(head, checks, caption)]
     return "Figures of merit", blocks
 
 
@@ -345,8 +342,7 @@ def _table(head, lines, caption=""):
 
 
 def _interval(low, high):
-    is_known = np.isfinite([low, high]).all()
-    return f"[{three_digits(low)}, {three_digits(high)}]" if is_known else ""
+    return f"[{three_digits(low)}, {three_digits(high)}]" if np.isfinite(low + high) else ""
 
 
 def _words(name):

@@ -348,7 +348,9 @@ class LogFile:
         form = self._form if part == "time" else ""
         numbers = as_numbers(column, form=form) if form else numbers
         bad = np.isnan(numbers)
-        bad[bad] = (column[bad].notna() & ~column[bad].isin(NO_VALUE)).to_numpy()
+        # Logs that were joined have their header again.
+        no_value = [*NO_VALUE, self.layout.name(part)]
+        bad[bad] = (column[bad].notna() & ~column[bad].isin(no_value)).to_numpy()
         if bad.any():
             row = int(bad.argmax())
             kind = "no time like those before" if form else "not a number"

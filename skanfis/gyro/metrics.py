@@ -18,6 +18,9 @@ from .errors import needed
 _PPM = 1e6
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
 HYSTERESIS_BINS, ROWS_PER_MEAN = 20, 5
+SLOWEST = 0.05  # degC/min, below which a temperature neither rises nor falls
+# Powers of the rate, odd: what an error of the scale factor adds changes its sign with the rate.
+_POWERS = (1, 3, 5, 7)
 _RATE_BINS = 101  # parts of the range of rates, in means over which a nonlinearity is looked for
 # A gyro is at rest up to this part of the largest rate; bias is read off so many such rows or more.
 _AT_REST, _FEWEST_AT_REST = 1e-4, 10
@@ -73,7 +76,7 @@ def figures_of_merit(full_scale=1.0):
     full = "ppm of full scale"
     slope, slope_in_ramp = (partial(_bias_sensitivity, name=name) for name in (heat, ramp))
     short, long = (partial(_squares_of_means, over=seconds) for seconds in (10.0, 100.0))
-    timed, pooled = ("error", "time"), _pooled_deviation
+    timed, pooled, of_bias = ("error", "time"), _pooled_deviation, ("error", "of_bias")
 
     def bias(error, of_bias):
         return PER_HOUR * error[of_bias].mean() if of_bias.any() else np.nan
@@ -103,13 +106,13 @@ def figures_of_merit(full_scale=1.0):
             "scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread
         ),
         _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
-        _Figure("bias", "deg/h", bias, ("error", "of_bias")),
-        from_run_to_run("bias_repeatability", "deg/h", bias, ("error", "of_bias"), combine=spread),
-        _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, ("error", heat), also=ramp),
+        _Figure("bias", "deg/h", bias, of_bias),
+        from_run_to_run("bias_repeatability", "deg/h", bias, of_bias, combine=spread),
+        _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, (*of_bias, heat), also=ramp),
         _Figure(
-            "bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, ("error", ramp), also=heat
+            "bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, (*of_bias, ramp), also=heat
         ),
-        _Figure("hysteresis", "deg/h", hysteresis, ("error", heat, ramp)),
+        _Figure("hysteresis", "deg/h", hysteresis, ("rate", "error", heat, ramp)),
         _Figure("bias_stability_10s", "deg/h", short, timed, combine=pooled),
         _Figure("bias_stability_100s", "deg/h", long, timed, combine=pooled),
     ]
@@ -165,23 +168,35 @@ def rows_of_bias(rate):
     return at_rest | (np.count_nonzero(at_rest) < _FEWEST_AT_REST)
 
 
-def hysteresis(error, temperature, temperature_rate) -> float:
-    """Largest gap between mean errors while warming and while cooling, at equal temperature."""
-    sides = [temperature_rate > 0, temperature_rate < 0]
-    if not all(side.any() for side in sides):
+def hysteresis(rate, error, temperature, temperature_rate) -> float:
+    """Largest gap between the biases while warming and while cooling, at equal temperature."""
+    if not temperature_rate.min() < 0 < temperature_rate.max():
         raise ValueError("No hysteresis: the temperature does not both rise and fall.")
-    low = max(temperature[side].min() for side in sides)
-    high = max(low, min(temperature[side].max() for side in sides))
-    edges = np.linspace(low, high, HYSTERESIS_BINS + 1)
-    shared = (temperature >= low) & (temperature <= high) & (temperature_rate != 0)
-    bins = np.digitize(temperature[shared], edges[1:-1]) + HYSTERESIS_BINS * sides[0][shared]
-    counts, sums = (np.bincount(bins, w, 2 * HYSTERESIS_BINS) for w in (None, error[shared]))
-    means = np.where(counts < ROWS_PER_MEAN, np.nan, sums / np.maximum(counts, 1))
-    gaps = np.abs(np.subtract(*means.reshape(2, -1)))
+    edges = np.linspace(temperature.min(), temperature.max(), HYSTERESIS_BINS + 1)
+    gaps = np.ptp(biases_of_branches(edges, rate, error, temperature, temperature_rate), axis=0)
     if np.isnan(gaps).all():
         told = f"warming and cooling share no temperature at which both have {ROWS_PER_MEAN} rows"
         raise ValueError(f"No hysteresis: {told}.")
     return float(PER_HOUR * np.nanmax(gaps))
+
+
+def biases_of_branches(edges, rate, error, temperature, temperature_rate):
+    """Mean errors in bins of temperature while warming, and while cooling, at a rate of zero.
+
+    What the error owes to the rate, an odd polynomial that is linear in temperature, is fitted
+    together with them, and taken off (Frisch, Waugh).
+    """
+    powers = (rate / (np.abs(rate).max() or 1.0))[:, None] ** np.array(_POWERS)
+    columns = np.column_stack([error, powers, powers * _centred(temperature)[:, None]])
+    moving = np.abs(temperature_rate) >= SLOWEST
+    bins, columns = np.digitize(temperature[moving], edges[1:-1]), columns[moving]
+    places = bins + np.where(temperature_rate[moving] > 0, 0, edges.size - 1)
+    by_place = pd.DataFrame(columns).groupby(places)
+    means = by_place.mean()
+    error, *of_rate = (columns - means.loc[places].to_numpy()).T
+    coefficients = np.linalg.lstsq(np.transpose(of_rate), error, rcond=None)[0]
+    at_rest = (means[0] - means.iloc[:, 1:] @ coefficients).where(by_place.size() >= ROWS_PER_MEAN)
+    return at_rest.reindex(range(2 * (edges.size - 1))).to_numpy().reshape(2, -1)
 
 
 def allan_deviation(error, sampling_interval, run=None):
@@ -305,13 +320,19 @@ def _sensitivity(rate, output, temperature):
     return _PPM * by_temperature / slope
 
 
-def _bias_sensitivity(error, column, name, **other):
-    """Slope of the error in a column, fitted together with that in another."""
+def _bias_sensitivity(error, of_bias, column, name, **other):
+    """Slope of the bias in a column, fitted together with that in another.
+
+    Of the rows at rest, as the bias is, where these reach half as far as all rows do.
+    """
+    columns = [column, *other.values()]
+    if any(np.ptp(each[of_bias]) < 0.5 * np.ptp(each) for each in columns):
+        of_bias = np.ones_like(of_bias)
     without = f"{name} never changes"
     if other:
         without = "temperature and temperature_rate do not change independently of each other"
-    design = [_centred(values) for values in (column, *other.values())]
-    return PER_HOUR * _least_squares(design, error, without)[0]
+    design = [_centred(values[of_bias]) for values in columns]
+    return PER_HOUR * _least_squares(design, error[of_bias], without)[0]
 
 
 def _centred(values):

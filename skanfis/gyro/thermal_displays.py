@@ -7,15 +7,12 @@ import pandas as pd
 
 from ._columns import ask, check_column, evenly_chosen
 from .displays import SIDES, GyroDisplay, bins_of, dress, mark_decades, signs, three_digits
-from .metrics import HYSTERESIS_BINS, ROWS_PER_MEAN
+from .metrics import HYSTERESIS_BINS, biases_of_branches
 
 # Bands of temperature; bins of the rate, an odd number, so that rest is in the middle of one; and
 # the part of the largest rate below which a bias, divided by the rate, would hide all else.
 _N_BANDS, _N_RATES, _SMALLEST_SHARE = 3, 41, 0.05
-SLOWEST = 0.05  # degC/min, below which a temperature neither rises nor falls
 _BRANCHES = {"warming": ("^-", "#c8443c"), "cooling": ("v-", "#3a6ea5")}
-# Powers of the rate, odd: what an error of the scale factor adds changes its sign with the rate.
-_POWERS = (1, 3, 5, 7)
 # Of maps: cells and points on each axis, and dots for rows, which beyond so many cover one another.
 _N_CELLS, _N_POINTS, _MOST_DOTS = 24, 96, 2_000
 # How far a map of the coverage goes beyond the data, as a part of their range.
@@ -111,15 +108,12 @@ class HysteresisDisplay(GyroDisplay):
     _PANELS = 2, 1
 
     def _computed(self, rows):
-        bins, edges = bins_of(rows["temperature"], HYSTERESIS_BINS)
-        branch = np.where(rows["temperature_rate"] > 0, *_BRANCHES)
-        rows = rows.assign(bin=bins, branch=branch)
-        moving = rows[rows["temperature_rate"].abs() >= SLOWEST]
+        _, edges = bins_of(rows.dropna(subset="after")["temperature"], HYSTERESIS_BINS)
         table = pd.DataFrame({"temperature [degC]": 0.5 * (edges[:-1] + edges[1:])})
         for side in SIDES:
-            biases = _bias_of_branches(moving.dropna(subset=side), side)
-            for name in _BRANCHES:
-                table[f"bias {side}, {name} [{self._unit}]"] = biases[name]
+            columns = rows.dropna(subset=side)[["rate", side, *self._PER_ROW]].to_numpy().T
+            for name, bias in zip(_BRANCHES, biases_of_branches(edges, *columns), strict=True):
+                table[f"bias {side}, {name} [{self._unit}]"] = bias
         return {"bias": table}
 
     def _draw(self, axes, bias):
@@ -135,20 +129,6 @@ class HysteresisDisplay(GyroDisplay):
             legend = "" if panel is axes[0] else None
             dress(panel, ylabel=f"bias [{self._unit}]", title=title, legend=legend)
         axes[-1].set_xlabel("temperature [°C]")
-
-
-def _bias_of_branches(rows, side):
-    """Mean error at rest by bin and branch, fitted together with the polynomial (Frisch, Waugh)."""
-    ratio = rows["rate"] / (rows["rate"].abs().max() or 1.0)
-    deviation = rows["temperature"] - rows["temperature"].mean()
-    powers = {k: ratio**k for k in _POWERS} | {-k: ratio**k * deviation for k in _POWERS}
-    powers, keys = pd.DataFrame(powers), [rows["branch"], rows["bin"]]
-    design = powers - powers.groupby(keys).transform("mean")
-    left = rows[side] - rows[side].groupby(keys).transform("mean")
-    coefficients = np.linalg.lstsq(design, left, rcond=None)[0]
-    found = (rows[side] - powers @ coefficients).groupby(keys).agg(["mean", "size"])
-    means = found["mean"].where(found["size"] >= ROWS_PER_MEAN).unstack("branch")
-    return means.reindex(index=range(HYSTERESIS_BINS), columns=list(_BRANCHES))
 
 
 class ResidualSurfaceDisplay(GyroDisplay):

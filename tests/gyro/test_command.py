@@ -293,6 +293,10 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
         ("--terms 2 --inputs time output", "has 1 number for 2 inputs: time, output"),
         ("--terms 2,2 --inputs output", "has 2 numbers for 1 input: output."),
         ("--physics --inputs temperature", "needs the output"),
+        (
+            "--write law-line --inputs temperature",
+            "--write law-line: the arcsine law needs the output",
+        ),
         ("--inputs rate", "invalid choice: 'rate'"),
         ("--terms 99999999,1,1,1", "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
         (f"--terms {'9' * 9000}", "must be search, or numbers"),

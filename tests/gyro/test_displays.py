@@ -181,6 +181,10 @@ def test_hysteresis_is_that_of_the_law(log):
     np.testing.assert_allclose(gap[inner], 20.0 * np.sqrt(1 - place[inner] ** 2), rtol=0.05)
     assert gap.max() == pytest.approx(20.0, rel=0.05)
     assert f"largest gap {gap.max():.1f} °/h" in display.axes_[0].get_title(loc="left")
+    # Bins of both, picture and figure of merit, are of the rows that have an answer.
+    planted["after"] = planted["after"].where(planted["temperature"] > 0.0)
+    table = display_of(HysteresisDisplay, planted).tables()["bias"]
+    assert table["temperature [degC]"].min() > 0.0
     assert table.iloc[:, 3:].diff(axis=1).abs().max(axis=None) < 1e-6
     display = display_of(HysteresisDisplay, log.assign(temperature_rate=1.0))
     assert "never meet" in display.axes_[0].get_title(loc="left")

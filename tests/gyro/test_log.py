@@ -56,7 +56,7 @@ def test_runs_of_two_devices_are_told_apart(tmp_path, device, run, labels):
         ("temperature,output,rate\n1,2,3\n\n1,2,3,4,5\n", {}, "line 4: has . values"),
         ('temperature,output,rate\n1,2,"3\n', {}, "is no table"),
         ("temperature,output,rate,run\n1,2,3,\n", {}, "line 2, column 'run': no label"),
-        ("temperature,output,rate\n1,2,3\n", {"columns": {"rate": "output"}}, "two parts"),
+        ("temperature,output,rate\n1,2,3\n", {"columns": {"rate": "output"}}, "'output' cannot"),
         ("temperature,output,rate\n1,2,3\n", {"columns": {"time": "t"}}, "'t' for the time"),
         ("temperature,output,rate,rate\n1,2,3,4\n", {}, "header has 'rate' and 'rate'; which"),
         ('a,temperature,output,rate\n"b,\nc",1,2,x\n', {}, "line 2, column 'rate': 'x' is not"),

@@ -24,6 +24,8 @@ needs_allantools = pytest.mark.skipif(not find_spec("allantools"), reason="it is
 def figure(name, full_scale=100.0, **columns):
     """A figure of the table, of these columns."""
     found = next(each for each in figures_of_merit(full_scale) if each.name == name)
+    if "error" in columns:
+        columns.setdefault("of_bias", np.ones(len(columns["error"]), dtype=bool))
     return found.value({key: np.asarray(column) for key, column in columns.items()})
 
 
@@ -123,10 +125,13 @@ def test_hysteresis_of_a_planted_loop(rng):
     phase = np.linspace(0.0, 2 * np.pi, 4000, endpoint=False)
     temperature, ramp = 20.0 - 30.0 * np.cos(phase), np.sin(phase)
     curve = 0.02 * temperature**2 + 0.05 * rng.normal(size=4000)
+    # A scale factor that changes with temperature, and its cube, are no bias.
+    rate = rng.uniform(-100.0, 100.0, size=4000)
+    curve += HOUR * (1e-4 * temperature * rate - 1e-6 * rate**3)
     # Bins of 3 degC: within one, the curve 0.02 T^2 and the ellipse cost less than 0.1.
-    found = hysteresis((curve + 4.0 * ramp) / HOUR, temperature, ramp)
+    found = hysteresis(rate, (curve + 4.0 * ramp) / HOUR, temperature, ramp)
     assert found == pytest.approx(8.0, abs=0.15)
-    assert hysteresis(curve / HOUR, temperature, ramp) < 0.1
+    assert hysteresis(rate, curve / HOUR, temperature, ramp) < 0.1
 
 
 def read(tau, deviation):
@@ -229,7 +234,7 @@ def test_runs_too_short_for_an_allan_deviation_are_refused():
 
 INDEPENDENT = "do not change independently"
 AT_REST = {"rate": [0.0, 0.0]}
-WARMER = {"error": [1, 2], "temperature": [1, 2]}
+WARMER = {"error": [1, 2], "temperature": [1, 2], **AT_REST}
 
 
 @pytest.mark.parametrize(
@@ -273,6 +278,13 @@ def test_the_bias_is_of_the_rows_at_rest_where_there_are_some():
     found = figure("bias", error=error, of_bias=rows_of_bias(rate))
     assert found == pytest.approx(5.0, rel=1e-2)
     moving = rate != 0.0
+    # Nor do errors of the scale factor at other temperatures change those of the bias.
+    columns = {"temperature": np.tile(np.arange(10.0), 5), "of_bias": rows_of_bias(rate)}
+    columns["error"] = (1e-6 * rate**2 + 2.0 / HOUR) * columns["temperature"]
+    assert figure("bias_temperature_sensitivity", **columns) == pytest.approx(2.0)
+    # Rows at rest at one temperature tell no slope: those of all have the mean 5000 of rate**2.
+    columns["of_bias"] &= columns["temperature"] < 1.0
+    assert figure("bias_temperature_sensitivity", **columns) == pytest.approx(20.0)
     of_line = figure("bias", error=error[moving], of_bias=rows_of_bias(rate[moving]))
     assert of_line == pytest.approx(HOUR * error[moving].mean(), rel=1e-12)
     assert of_line > 50.0

@@ -68,15 +68,17 @@ def test_lines_above_the_header_and_a_clock_past_midnight(tmp_path, truth):
 def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth):
     table = truth[PARTS].astype(object)
     table.loc[5, "output"], table.loc[9, "temperature"], table.loc[200, "rate"] = "---", "", "NaN"
+    table.loc[210] = PARTS  # the header again
     reading = found_in(tmp_path, table)
-    kept = truth.drop(index=[5, 9, 200])
+    kept = truth.drop(index=[5, 9, 200, 210])
     same(reading, kept, PARTS)
-    said = "3 of 300 rows lack a value ('temperature' in 1, 'output' in 1, 'rate' in 1)"
+    told = ", ".join(f"{part!r} in {1 if part == 'time' else 2}" for part in PARTS)
+    said = f"4 of 300 rows lack a value ({told})"
     assert any(said in note and "line 7" in note for note in reading.notes)
     for row in (4, 5, 7, 8, 250):
         line = int(kept.index[row]) + 2
         assert reading.name_row(row).endswith(f"line {line}")
-    with pytest.raises(LogError, match="line 11, column 'temperature': the value is missing"):
+    with pytest.raises(LogError, match="line 212, column 'time': the value is missing"):
         found(tmp_path / "log.csv", guess=False)
     table.loc[100:, "rate"] = ""
     with pytest.raises(LogError, match=r"rows lack a value .* too many to go on"):
@@ -249,7 +251,7 @@ def test_a_file_of_matlab_that_was_cut_or_damaged_is_refused(tmp_path, truth, le
         found(path)
 
 
-@pytest.mark.parametrize("form", ["%Y-%m-%d", "%d.%m.%Y"])
+@pytest.mark.parametrize("form", ["%Y-%m-%d", "%d.%m.%Y", "%d-%b-%Y", "%d-%m-%Y"])
 def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
     """Runs a day apart, by whose hours alone each would go on from the one before."""
     clock = 36_000 + 10 * np.arange(300) + 86_400 * truth["run"].astype(int)

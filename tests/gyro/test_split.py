@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError, group_by_rate_level
-from skanfis.gyro._split import choose_split, cut_legs, find_legs, level_numbers
+from skanfis.gyro._split import choose_split, find_legs, fold_numbers, level_numbers
 
 GRID = np.linspace(-100.8, 100.8, 57)  # steps of 3.6 deg/s
 UNEVEN = np.array([-100.0, -30, -10, -3, -1, -0.3, 0, 0.3, 1, 3, 10, 30, 100])
@@ -187,7 +187,7 @@ def test_every_run_has_legs_of_its_own_and_long_logs_are_thinned():
 def test_pieces_leave_each_temperature_to_the_other_direction():
     temperature = cycle(-30, 60, -30)
     legs = find_legs(temperature)
-    folds = cut_legs(legs)
+    folds = fold_numbers("piece", legs, 1)
     assert set(folds) == set(range(5))
     for fold in range(5):
         up, down = (temperature[(folds == fold) & (legs == leg)] for leg in (0, 1))
@@ -220,11 +220,22 @@ def test_a_row_less_moves_no_other_row_to_another_fold():
         np.testing.assert_array_equal(less, np.delete(whole, lost))
 
 
-@pytest.mark.parametrize(("rates", "n_levels"), [([-50, 50], 1), ([-50, 0, 50], 2), (LEVELS, 5)])
-def test_too_few_levels_to_hold_one_out_are_told(rates, n_levels):
-    log = make_ofog(n_devices=1, n_runs=4, sampling_interval=60.0, rates=rates, random_state=0)
-    split = choose_split(log)
-    assert ("level" in split.kind) == (n_levels >= 5)
-    expected = "the table stood still at 2 rates alone" if n_levels == 2 else ""
-    assert split.caution[: len(expected)] == expected
-    assert bool(split.caution) == (n_levels == 2)
+@pytest.mark.parametrize(
+    ("rates", "n_devices", "expected"),
+    [
+        ([-50, 50], 1, []),
+        ([-50, 0, 50], 1, ["the table stood still at 2 rates alone"]),
+        (LEVELS, 1, []),
+        (LEVELS, 2, ["2 devices share one compensator"]),
+        (LEVELS, 3, []),
+    ],
+)
+def test_too_few_levels_or_devices_to_hold_one_out_are_told(rates, n_devices, expected):
+    n_runs = 4 if n_devices == 1 else 2
+    kinds = {"n_devices": n_devices, "n_runs": n_runs, "rates": rates}
+    log = make_ofog(**kinds, sampling_interval=60.0, random_state=0)
+    split = choose_split(log.assign(run=log.groupby(["device", "run"]).ngroup()))
+    assert ("level" in split.kind) == (rates is LEVELS)
+    assert [
+        told[: len(start)] for told, start in zip(split.cautions, expected, strict=True)
+    ] == expected
