@@ -47,7 +47,7 @@ def fold(estimator: Any) -> TSKModel:
         alone, select columns, impute (SimpleImputer: what is missing stays with who applies the
         model) or encode them (OneHotEncoder), or a ColumnTransformer of these; a
         TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
-        GridSearchCV over these. A TSKModel is returned as it is.
+        GridSearchCV or a FrozenEstimator over these. A TSKModel is returned as it is.
 
     Returns
     -------

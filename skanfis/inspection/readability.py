@@ -124,9 +124,9 @@ class Readability:
     def summary(self) -> Any:
         """The worst of each figure, over outputs."""
         found = self.measures
-        is_known = (found.errors > _ROUNDING).all()
-        ratio = found.printed_errors / found.errors if is_known else np.array([np.nan])
-        figures = {"strongest_alone": found.alone.max(), "text_over_model": ratio.max()}
+        is_known = found.errors > _ROUNDING
+        worst = max(found.printed_errors[is_known] / found.errors[is_known], default=np.nan)
+        figures = {"strongest_alone": found.alone.max(), "text_over_model": worst}
         return pd.Series(figures, name="readability")
 
     @property

@@ -67,6 +67,9 @@ def test_what_is_beyond_a_limit_is_said():
     assert two.summary["strongest_alone"] == 3.0
     (sentence,) = found_of(A_GRID, printed_errors=np.array([1.06])).findings
     assert sentence.startswith("The text as printed errs 1.06 times as much as the model: print")
+    # An output without an error, as one that never changes, hides no other.
+    constant = {"errors": np.array([0.0, 1.0]), "printed_errors": np.array([0.0, 1.06])}
+    assert found_of(two.model, **constant).findings == [sentence]
     (sentence,) = found_of(A_GRID, rule_rows=np.array([*[50.0] * 11, 6.0])).findings
     assert sentence == (
         "Strongest on fewer rows than its sentence has numbers: rule 11 (rows: 6, numbers: 7)."
