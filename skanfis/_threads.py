@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from threading import Lock
 
 from joblib import Parallel, delayed, effective_n_jobs
 from threadpoolctl import ThreadpoolController
@@ -14,11 +15,24 @@ def _thread_pools() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+# BLAS has one number of threads for the whole process: fits in several threads give it back in
+# reverse order, whichever ends first. Of OpenMP every thread has a number of its own.
+_BLAS_LIMITS: list = []
+_LOCK = Lock()
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """One thread of the numerical libraries, and as many as before at the end."""
-    with _thread_pools().limit(limits=1):
-        yield
+    """One thread of the numerical libraries; at the end of the last fit as many as before."""
+    blas, openmp = (_thread_pools().select(user_api=api) for api in ("blas", "openmp"))
+    with _LOCK:
+        _BLAS_LIMITS.append(blas.limit(limits=1))
+    try:
+        with openmp.limit(limits=1):
+            yield
+    finally:
+        with _LOCK:
+            _BLAS_LIMITS.pop().restore_original_limits()
 
 
 def map_in_threads(n_jobs: int | None) -> Callable[[Callable, Iterable], Iterable]:

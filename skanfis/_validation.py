@@ -3,28 +3,44 @@
 import warnings
 from collections import Counter
 from contextlib import contextmanager
+from datetime import date, time, timedelta
 from numbers import Integral
 
 import numpy as np
 from scipy.sparse import issparse
 from sklearn import get_config
+from sklearn.utils import check_array
 
 from .blocks import LARGE_BLOCK_ROWS, row_blocks
 
 # Largest exponent of two of weights that are left as they are: products of two, summed over as many
 # rows as there can be, stay below 2^1023.
 _LARGEST_EXPONENT = 400
+_SECONDS = "Give the time since some moment, such as the power-on, as a number of seconds."
+_IMPUTE = "Drop these rows, or impute them in a Pipeline before (sklearn.impute)."
 
 
 @contextmanager
-def named_refusals(**tables):
+def unchanged_by_failure(estimator):
+    """Leave an estimator as it was, and able to predict, where learning fails or is interrupted."""
+    before = estimator.__dict__.copy()
+    try:
+        yield
+    except BaseException:
+        estimator.__dict__ = before
+        raise
+
+
+@contextmanager
+def named_refusals(*, takes_categories=False, **tables):
     """Let scikit-learn check tables, given by their roles: X=..., y=...
 
-    Text, times, sparse or lazy frames, masked values and two columns of one name are refused first.
+    Text, times, sparse or lazy frames, masked values and two columns of one name are refused by the
+    column's name; in X categories that are numbers, too.
     """
     refuse_lazy(**tables)
     for what, table in tables.items():
-        _check_kind(table, what)
+        _check_kind(table, what, takes_categories or what != "X")
     try:
         yield
     except (TypeError, ValueError) as error:
@@ -47,19 +63,28 @@ def refuse_lazy(**tables):
             )
 
 
+def as_numbers(table, what="X", *, takes_categories=True):
+    """A table as floats, NaN where values are missing; what else it holds is refused by name."""
+    if type(table) is np.ndarray and table.dtype == np.float64 and table.ndim < 3:
+        return table
+    any_form = {"ensure_all_finite": False, "ensure_2d": False, "ensure_min_samples": 0}
+    with named_refusals(takes_categories=takes_categories, **{what: table}):
+        return check_array(table, dtype=np.float64, input_name=what, **any_form)
+
+
 def rows_by_name(X, names):
     """Rows as an array: the columns of a table by their names; ValueError where it lacks any."""
-    is_table = hasattr(X, "columns")
-    lacking = [name for name in names if name not in X.columns] if is_table else []
+    refuse_lazy(X=X)
+    lacking = [name for name in names if name not in getattr(X, "columns", names)]
     if not lacking:
-        X = np.asarray(X[list(names)] if is_table else X, dtype=float)
-    if lacking or X.ndim != 2 or X.shape[1] != len(names):
+        X = as_numbers(X[list(names)] if hasattr(X, "columns") else X)
+    if lacking or X.shape[1:] != (len(names),):
         what = f"lacks the column {lacking[0]!r}" if lacking else f"has the shape {X.shape}"
         raise ValueError(f"X {what}: the model takes {', '.join(map(repr, names))}.")
     return X
 
 
-def _check_kind(table, what):
+def _check_kind(table, what, takes_categories):
     """Raise where a table is sparse or masked, or a column shares its name or holds times."""
     is_frame = hasattr(table, "columns") and hasattr(table, "dtypes")
     names = list(table.columns) if is_frame else [getattr(table, "name", None)]
@@ -79,27 +104,24 @@ def _check_kind(table, what):
             f"{masked.size} rows, first at row {masked.argmax()}: drop these rows"
             + (", or impute X.filled(numpy.nan) in a Pipeline." if what == "X" else ".")
         )
-    for name, dtype in zip(names, dtypes, strict=True):
-        categories = getattr(getattr(dtype, "categories", None), "dtype", None)
-        if what == "X" and getattr(categories, "kind", "O") in "iuf":
-            raise ValueError(
-                f"Column {name!r} of X is a category of numbers: encode it, as by OneHotEncoder in "
-                f"a ColumnTransformer, or take its numbers, X[{name!r}].astype(float)."
-            )
     name, count = Counter(names).most_common(1)[0] if names else ("", 0)
     if count > 1:
         raise ValueError(
             f"{what} has {count} columns of the name {name!r}: rename or drop all but one."
         )
     for name, dtype in zip(names, dtypes, strict=True):
+        categories = getattr(getattr(dtype, "categories", None), "dtype", None)
+        if not takes_categories and getattr(categories, "kind", "O") in "iuf":
+            raise ValueError(
+                f"Column {name!r} of X is a category of numbers: encode it, as by OneHotEncoder in "
+                f"a ColumnTransformer, or take its numbers, X[{name!r}].astype(float)."
+            )
+        dtype = dtype if categories is None else categories
         # Of polars, of NumPy and pandas, a period of pandas.
         is_temporal = getattr(dtype, "is_temporal", lambda: False)()
         if is_temporal or getattr(dtype, "kind", "") in ("m", "M") or hasattr(dtype, "freq"):
             column = "" if name is None else f" in column {name!r}"
-            raise ValueError(
-                f"Input {what} holds times{column} ({dtype}), not numbers. Give the time since "
-                "some moment, such as the power-on, as a number of seconds."
-            )
+            raise ValueError(f"Input {what} holds times{column} ({dtype}), not numbers. {_SECONDS}")
 
 
 def _name_what_is_no_number(table, what, error):
@@ -112,8 +134,13 @@ def _name_what_is_no_number(table, what, error):
     where = "" if name is None else f" in column {name!r}"
     more = ", ".join(repr(other) for other, *_ in found[1:])
     also = f" So do the columns {more}." if more else ""
-    advice = f"A {'target' if what == 'y' else 'weight'} must be a number."
-    if what == "X":
+    if is_missing(value):
+        kind, advice = "a missing value", _IMPUTE if what == "X" else "Drop these rows."
+    elif isinstance(value, date | time | timedelta):
+        advice = _SECONDS
+    elif what != "X":
+        advice = f"A {'target' if what == 'y' else 'weight'} must be a number."
+    else:
         advice = (
             "Drop the column, or encode categories as numbers in a Pipeline before "
             "(OneHotEncoder(drop='if_binary', sparse_output=False) of sklearn.preprocessing)."
@@ -205,9 +232,7 @@ def check_finite(values, what, names):
             value = values[part.start + row, column]
             kind = "NaN" if np.isnan(value) else "infinity"
             n_bad = int(np.count_nonzero(~np.isfinite(values[:, column])))
-            advice = "Drop these rows."
-            if what == "X":
-                advice = "Drop these rows, or impute them in a Pipeline before (sklearn.impute)."
+            advice = _IMPUTE if what == "X" else "Drop these rows."
             raise ValueError(
                 f"Input {what} contains {kind} in column {names[column]!r}, first at row "
                 f"{part.start + row}; {n_bad} of its {values.shape[0]} values are not finite. "

@@ -24,8 +24,9 @@ from ._sklearn import (
     fit_context,
 )
 from ._threads import one_blas_thread
-from ._validation import check_finite, named_refusals
+from ._validation import check_finite, named_refusals, unchanged_by_failure
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
+from .inspection import rules_html
 from .inspection.effects import importances
 from .inspection.readability import readability_of_rows
 from .learning import SOLVERS, Solver, VariableProjection
@@ -36,7 +37,7 @@ from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .policies import OUT_OF_BOUNDS
 from .training import Callbacks, chunk_checks, fit_rules, model_without_rules, validated
 from .training.chunks import RowSums, fitted_weights, inputs_with_slopes, solve
-from .training.data import Fitted
+from .training.data import NUMERIC, Fitted
 from .training.settings import given_weights, solver_of, structure_request
 
 __all__ = ["ANFISRegressor"]
@@ -339,8 +340,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             # How many runs Huber's loss takes is not known before.
             most = max(self.max_iter, 1) if self.loss == "squared_error" else None
             context = self._init_callback_context(max_subtasks=most)
-        before = self.__dict__.copy()
-        try:
+        with unchanged_by_failure(self):
             for option in (self.solver, self.loss, self.early_stopping, self.out_of_bounds):
                 if isinstance(option, BaseEstimator):
                     check_parameters(option)
@@ -353,23 +353,18 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
                 callbacks.begin()
             with one_blas_thread():
                 fitted = fit_rules(self, data, request, callbacks)
-        except BaseException:
-            # What was fitted before keeps its inputs' number and names: it can go on predicting.
-            self.__dict__ = before
-            raise
-        self.model_ = fitted.model
-        self._keep(fitted)
-        self.stiffness_ = fitted.start.penalty.stiffness
-        self.structures_ = fitted.start.candidates
-        self.constraints_ = fitted.constraints
-        self.robust_weights_ = fitted.robust_weights
-        losses = fitted.validation_losses
-        self.validation_loss_curve_ = None if losses is None else np.array(losses)
-        self.readability_ = self._readability(data)
-        for name in ("_sums", "_chunk_settings", "_first_weights", "n_samples_seen_"):
-            self.__dict__.pop(name, None)
-        if callbacks is not None:
-            callbacks.end(self.model_)
+            self.model_ = fitted.model
+            self._keep(fitted)
+            self.stiffness_ = fitted.start.penalty.stiffness
+            self.structures_ = fitted.start.candidates
+            self.constraints_ = fitted.constraints
+            self.robust_weights_ = fitted.robust_weights
+            self.validation_loss_curve_ = fitted.validation_losses
+            self.readability_ = self._readability(data)
+            for name in ("_sums", "_chunk_settings", "_first_weights", "n_samples_seen_"):
+                self.__dict__.pop(name, None)
+            if callbacks is not None:
+                callbacks.end(self.model_)
         return self
 
     @overload
@@ -414,8 +409,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         OutOfBoundsWarning
             With ``out_of_bounds="linear"``, if rows lie outside the training data.
         """
+        model = self._fitted_model().with_out_of_bounds(*policy_of(self.out_of_bounds))
         X = self._check_inputs(X)
-        model = self.model_.with_out_of_bounds(*policy_of(self.out_of_bounds))
         inside = model.in_bounds(X)
         if model.out_of_bounds == "linear" and not inside.all():
             message = f"{model.describe_out_of_bounds(X)} Policy: {model.policy}."
@@ -437,8 +432,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         -------
         inside : ndarray of bool of shape (n_samples,)
         """
-        X = self._check_inputs(X)
-        return self.model_.in_bounds(X)
+        return self._fitted_model().in_bounds(self._check_inputs(X))
 
     def coverage(self, X: ArrayLike) -> np.ndarray:
         """Tell how well the training data cover each row.
@@ -455,8 +449,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         coverage : ndarray of shape (n_samples,)
             From 0, far from the training data, to 1.
         """
-        X = self._check_inputs(X)
-        return self.model_.coverage(X)
+        return self._fitted_model().coverage(self._check_inputs(X))
 
     def strengths(self, X: ArrayLike) -> np.ndarray:
         """Tell how strongly each rule fires on each row, normalised.
@@ -471,8 +464,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             Positive, with sum one in every row. Rows outside the training range are taken at its
             edge.
         """
-        X = self._check_inputs(X)
-        return self.model_.strengths(X)
+        return self._fitted_model().strengths(self._check_inputs(X))
 
     def apply(self, X: ArrayLike) -> np.ndarray:
         """Tell which rule is the strongest on each row.
@@ -494,8 +486,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         >>> ANFISRegressor(n_mfs=2).fit(X, y).apply([[-10.0, -10.0], [10.0, 10.0], [0.0, 10.0]])
         array([0, 3, 1])
         """
-        X = self._check_inputs(X)
-        return self.model_.apply(X)
+        return self._fitted_model().apply(self._check_inputs(X))
 
     @available_if(chunk_checks.can_learn_from_chunks)
     @fit_context(prefer_skip_nested_validation=False)
@@ -552,12 +543,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         120
         """
         chunk_checks.check_forgetting(forgetting)
-        before = self.__dict__.copy()
-        try:
+        with unchanged_by_failure(self):
             self._learn_chunk(X, y, sample_weight, float(forgetting))
-        except BaseException:
-            self.__dict__ = before
-            raise
         return self
 
     def _learn_chunk(self, X, y, sample_weight, forgetting):
@@ -784,32 +771,22 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return bundle
 
     def _rules_html(self):
-        if not hasattr(self, "model_"):
-            return ""
-        # Here, so that pandas is loaded only where there is something to show.
-        from .inspection import rules_html
+        return rules_html(self) if hasattr(self, "model_") else ""
 
-        return rules_html(self)
-
-    def _check_training_data(self, X, y, sample_weight, groups, *, is_chunk=False):
-        return validated(self, X, y, sample_weight, groups, is_chunk=is_chunk)
+    _check_training_data = validated
 
     def _check_inputs(self, X):
         """Rows to predict, as an array."""
-        check_is_fitted(self)
         # Of an array as it should be scikit-learn's checks find nothing, and are half of a call.
         is_plain = (
             type(X) is np.ndarray
             and X.dtype == np.float64
-            and X.ndim == 2
-            and X.shape[0] > 0
-            and X.shape[1] == self.n_features_in_
+            and X.shape[1:] == (self.n_features_in_,)
+            and X.size > 0
             and not hasattr(self, "feature_names_in_")
         )
         if not is_plain:
             with named_refusals(X=X):
-                X = validate_data(
-                    self, X, reset=False, dtype=(np.float64, np.float32), ensure_all_finite=False
-                )
+                X = validate_data(self, X, reset=False, **NUMERIC)
         check_finite(X, "X", self.model_.input_names)
         return X

@@ -1,7 +1,7 @@
 """Everything a user can get wrong: the message says where, what was found and what would do."""
 
 import re
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pandas as pd
@@ -13,6 +13,7 @@ from sklearn.exceptions import NotFittedError
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import ConstantInputWarning
+from skanfis.inspection import explain
 from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 
@@ -170,13 +171,18 @@ TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "Drop the colum
         (TIMES.tz_localize("UTC"), ["X holds times in column 'rate' (datetime64", "UTC"]),
         (TIMES - TIMES[0], ["X holds times in column 'rate' (timedelta64"]),
         (TIMES.to_period(), ["X holds times in column 'rate' (period"]),
+        (TIMES.date.astype(object), ["a date in column 'rate', first at row 0", "of seconds"]),
+        (pd.Categorical(TIMES), ["X holds times in column 'rate' (datetime64", "of seconds"]),
+        ([1.5, pd.NA] * 30, ["a missing value in column 'rate', first at row 1", "impute"]),
     ],
 )
 def test_column_that_is_no_number_is_named(rate, said):
     bad = FRAME.assign(rate=rate)
-    for act in (ANFISRegressor(**QUICK).fit, ANFISRegressor(**QUICK).fit(FRAME, Y).score):
+    model = ANFISRegressor(**QUICK).fit(FRAME, Y)
+    explained, frozen = partial(explain, model), model.model_.predict
+    for act in (ANFISRegressor(**QUICK).fit, model.score, explained, frozen):
         with pytest.raises((TypeError, ValueError)) as refusal:
-            act(bad, Y)
+            act(bad, *[Y] * (act not in (explained, frozen)))
         assert re.search(".*".join(map(re.escape, said)), str(refusal.value))
 
 
@@ -195,8 +201,9 @@ def test_masked_values_are_not_taken_for_what_lies_beneath():
     masked[[7, 9], 1] = np.ma.masked
     with refused(ValueError, "X is a masked array", "2 of 60 rows", "row 7", "filled"):
         ANFISRegressor(**QUICK).fit(masked, Y)
-    with refused(ValueError, "X is a masked array"):
-        model.predict(masked)
+    for act in (model.predict, model.model_.predict, partial(explain, model)):
+        with refused(ValueError, "X is a masked array"):
+            act(masked)
     mask = np.arange(N_ROWS) == 2
     with refused(ValueError, "y is a masked array", "1 of 60 rows", "row 2"):
         ANFISRegressor(**QUICK).fit(X, np.ma.array(Y, mask=mask))
@@ -210,8 +217,9 @@ def test_frames_of_polars():
     model = ANFISRegressor(**QUICK).fit(frame, Y)
     with refused(TypeError, "X is a lazy frame", "X.collect()"):
         ANFISRegressor().fit(frame.lazy(), Y)
-    with refused(TypeError, "X is a lazy frame", "X.collect()"):
-        model.predict(frame.lazy())
+    for act in (model.predict, model.model_.predict, partial(explain, model)):
+        with refused(TypeError, "X is a lazy frame", "X.collect()"):
+            act(frame.lazy())
     for what in ("y", "sample_weight", "groups"):
         with refused(TypeError, f"{what} is a lazy frame"):
             ANFISRegressor().fit(frame, **({"y": Y} | {what: frame.lazy()}))

@@ -7,7 +7,7 @@ import pytest
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from skanfis import ANFISRegressor
-from skanfis._threads import map_in_threads
+from skanfis._threads import map_in_threads, one_blas_thread
 
 
 @pytest.mark.parametrize("n_jobs", [None, 1, 2, 3])
@@ -39,4 +39,16 @@ def test_as_many_as_before_where_a_fit_fails():
         before = blas_threads()
         with pytest.raises(ValueError, match="n_mfs"):
             ANFISRegressor(n_mfs=100).fit(np.arange(15.0).reshape(5, 3), np.arange(5.0))
+        assert blas_threads() == before
+
+
+def test_as_many_as_before_after_the_last_of_fits_side_by_side():
+    with threadpool_limits(2, user_api="blas"):
+        before = blas_threads()
+        first, second = one_blas_thread(), one_blas_thread()
+        first.__enter__()
+        second.__enter__()
+        first.__exit__(None, None, None)
+        assert set(blas_threads()) == {1}
+        second.__exit__(None, None, None)
         assert blas_threads() == before

@@ -7,9 +7,8 @@ from operator import methodcaller
 from typing import Any
 
 import numpy as np
-from sklearn.utils import check_array
 
-from .._validation import check_finite, is_missing, named_refusals, positive_weights
+from .._validation import as_numbers, check_finite, is_missing, positive_weights
 from ..blocks import add_each
 from ..bounds.constraints import Constraints
 from ..learning.data import Scale, StandardisedData, check_scales, column_statistics
@@ -207,10 +206,7 @@ def _numbers(table, what, names, n_columns):
             f"{what} has the columns {', '.join(map(str, found))}; the collection says "
             f"{', '.join(map(str, names))}. Write all parts with the same columns in one order."
         )
-    with named_refusals(**{what: table}):
-        array = check_array(
-            table, dtype=float, ensure_2d=False, ensure_min_samples=0, ensure_all_finite=False
-        )
+    array = as_numbers(table, what, takes_categories=False)
     array = array[:, None] if array.ndim == 1 else array
     if array.shape[1] != n_columns:
         raise ValueError(f"{what} has the shape {array.shape}; {n_columns} columns are expected.")

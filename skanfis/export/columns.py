@@ -5,10 +5,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from sklearn.utils import check_array
 
 from .._sklearn import safe_indexing
-from .._validation import check_finite
+from .._validation import as_numbers, check_finite, refuse_lazy
 
 
 class Level(NamedTuple):
@@ -42,7 +41,7 @@ class Column:
         """The input, in raw units, from the user's table and the outputs of encoders."""
         if self.encode is not None:
             return encoded[self.encode][:, self.place].astype(np.float64)
-        numbers = _as_numbers(part_of(X, [self.source]))[:, 0]
+        numbers = as_numbers(part_of(X, [self.source]))[:, 0]
         return numbers if self.fill is None else np.where(np.isnan(numbers), self.fill, numbers)
 
 
@@ -74,6 +73,7 @@ class Reader:
 
     def __call__(self, X) -> np.ndarray:
         """The rows; ValueError for other columns, and for numbers that are not finite."""
+        refuse_lazy(X=X)
         given, known = getattr(X, "columns", None), ", ".join(map(repr, self.names))
         if self.is_named and given is not None and list(given) != self.names:
             raise ValueError(
@@ -82,18 +82,13 @@ class Reader:
             )
         # What does not reach the model need not be numbers.
         encoders = {one.encode for one in self.inputs if one.encode}
-        table = X if given is not None or encoders else _as_numbers(X)
-        if (n_columns := np.shape(table)[1]) != len(self.names):
-            told = f"X has {n_columns} columns, the estimator takes {len(self.names)}: {known}."
-            raise ValueError(told)
+        table = X if given is not None or encoders else as_numbers(X)
+        if (shape := np.shape(table))[1:] != (len(self.names),) or shape[0] == 0:
+            raise ValueError(f"X has the shape {shape}: the estimator takes rows of {known}.")
         encoded = {encode: encode(table) for encode in encoders}
         rows = np.column_stack([one.values(table, encoded) for one in self.inputs])
         check_finite(rows, "X", [one.name for one in self.inputs])
         return rows
-
-
-def _as_numbers(X):
-    return check_array(X, dtype=np.float64, ensure_all_finite=False, input_name="X")
 
 
 def part_of(X, columns):

@@ -47,7 +47,7 @@ def fold(estimator: Any) -> TSKModel:
         alone, select columns, impute (SimpleImputer: what is missing stays with who applies the
         model) or encode them (OneHotEncoder), or a ColumnTransformer of these; a
         TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
-        GridSearchCV over these. A TSKModel is returned as it is.
+        GridSearchCV or a FrozenEstimator over these. A TSKModel is returned as it is.
 
     Returns
     -------
@@ -150,8 +150,6 @@ def last_step(estimator: Any) -> Any:
 def final_step(estimator: Any, X: Any = None) -> tuple[Any, Any]:
     """The last step, inside searches, frozen estimators and Pipelines; and X as that takes it."""
     estimator = found_by_search(estimator)
-    if isinstance(estimator, FrozenEstimator):
-        return final_step(estimator.estimator, X)
     if not isinstance(estimator, Pipeline):
         return estimator, X
     for _, step in estimator.steps[:-1] if X is not None else ():
@@ -160,10 +158,11 @@ def final_step(estimator: Any, X: Any = None) -> tuple[Any, Any]:
 
 
 def found_by_search(estimator: Any) -> Any:
-    """The estimator that a search, or a search over searches, has kept; any other as it is."""
-    while hasattr(estimator, "best_estimator_"):
-        estimator = estimator.best_estimator_
-    return estimator
+    """What searches have kept, and what is frozen, by itself; any other estimator as it is."""
+    if isinstance(estimator, FrozenEstimator):
+        return found_by_search(estimator.estimator)
+    found = getattr(estimator, "best_estimator_", None)
+    return estimator if found is None else found_by_search(found)
 
 
 def _described(label, step):
@@ -190,6 +189,7 @@ def _steps_of(label, estimator):
 def _columns_after(label, step, columns):
     if not columns or step in (None, "passthrough"):
         return columns
+    step = found_by_search(step)
     if isinstance(step, Pipeline):
         for name, part in step.steps:
             columns = _columns_after(name, part, columns)

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
-from .._validation import check_finite, positive_weights
+from .._validation import as_numbers, check_finite, positive_weights
 from ..export.columns import Level
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
@@ -123,9 +123,9 @@ class Readability:
     def summary(self) -> Any:
         """The worst of each figure, over outputs."""
         found = self.measures
-        is_known = (found.errors > _ROUNDING).all()
-        ratio = found.printed_errors / found.errors if is_known else np.array([np.nan])
-        figures = {"strongest_alone": found.alone.max(), "text_over_model": ratio.max()}
+        is_known = found.errors > _ROUNDING
+        worst = max(found.printed_errors[is_known] / found.errors[is_known], default=np.nan)
+        figures = {"strongest_alone": found.alone.max(), "text_over_model": worst}
         return pd.Series(figures, name="readability")
 
     @property
@@ -247,13 +247,13 @@ def _readability(estimator, X, y, sample_weight):
     def read(part):
         try:
             return reader(take[part])
-        except ValueError:
+        except (TypeError, ValueError):
             # The whole table: the error then names the row by its place in it.
             reader(X)
             raise
 
     if y is not None:
-        y = check_array(y, dtype=float, ensure_2d=False, ensure_all_finite=False, input_name="y")
+        y = as_numbers(y, "y")
         y = y.reshape(-1, 1) if y.ndim == 1 else y
         if y.shape[1] != model.n_outputs:
             raise ValueError(

@@ -17,12 +17,11 @@ from sklearn import get_config
 from sklearn.base import clone
 from sklearn.frozen import FrozenEstimator
 from sklearn.model_selection import GroupKFold, GroupShuffleSplit, KFold, ShuffleSplit, check_cv
-from sklearn.utils import check_array
 from sklearn.utils.metadata_routing import process_routing
 from sklearn.utils.validation import has_fit_parameter
 
 from .._sklearn import check_sample_weight, safe_indexing
-from .._validation import check_finite, group_numbers, named_refusals, positive_weights
+from .._validation import as_numbers, check_finite, group_numbers, positive_weights
 from ..exceptions import OutOfBoundsWarning
 from ..export.folding import final_step
 
@@ -56,10 +55,7 @@ def checked_targets(y, sample_weight, groups):
     """Targets as an array, positive weights or None, numbers of groups or None."""
     if y is None:
         raise ValueError("ConformalRegressor requires y to be passed, but the target y is None.")
-    with named_refusals(y=y):
-        targets = check_array(
-            y, ensure_2d=False, dtype=np.float64, ensure_all_finite=False, input_name="y"
-        )
+    targets = as_numbers(y, "y")
     by_output = targets.reshape(len(targets), -1)
     check_finite(by_output, "y", [f"y{k}" for k in range(by_output.shape[1])])
     if sample_weight is not None:

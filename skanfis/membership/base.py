@@ -47,7 +47,7 @@ class Membership(ABC):
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
-    # mu(x) in the parameters' names, as texts print it; not printed where it is empty.
+    # mu(x), and its floor, in the parameters' names, as texts print it; empty is not printed.
     formula: ClassVar[str] = ""
     # Whether its slope jumps anywhere.
     has_corners: ClassVar[bool] = False

@@ -66,7 +66,7 @@ class _ProfileWithFoot:
 class LinearProfile(_ProfileWithFoot):
     """1 - t."""
 
-    formula = "max(0, 1 - t)"
+    formula = "max(1 - t, 1e-10 * exp(-t^2 / 2))"
 
     @staticmethod
     def value(t):
@@ -84,7 +84,7 @@ class LinearProfile(_ProfileWithFoot):
 class SplineProfile(_ProfileWithFoot):
     """Two parabolas that meet at one half: 1 - 2 t^2, then 2 (1 - t)^2."""
 
-    formula = "2 * max(0, 1 - t)^2 - 4 * max(0, 0.5 - t)^2"
+    formula = "max(2 * max(0, 1 - t)^2 - 4 * max(0, 0.5 - t)^2, 1e-10 * exp(-t^2 / 2))"
 
     @staticmethod
     def value(t):

@@ -164,11 +164,9 @@ def _difference(one, other):
     if not np.array_equal(*inputs):
         names = [", ".join(mine.input_names[j] for j in own) or "none" for own in inputs]
         return f"their consequents are linear in {names[0]} and in {names[1]}"
-    return _difference_of_terms(mine.memberships(), theirs.memberships()) or (
-        ""
-        if np.array_equal(mine.antecedent.rule_terms, theirs.antecedent.rule_terms)
-        else "their rules combine the terms otherwise"
-    )
+    is_same = np.array_equal(mine.antecedent.rule_terms, theirs.antecedent.rule_terms)
+    otherwise = "" if is_same else "their rules combine the terms otherwise"
+    return _difference_of_terms(mine.memberships(), theirs.memberships()) or otherwise
 
 
 def _difference_of_terms(mine, theirs):

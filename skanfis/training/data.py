@@ -24,6 +24,9 @@ from ..model import TSKModel
 from ..naming import default_output_names
 from ..search import Start
 
+# What scikit-learn checks of numbers; whether they are finite is checked by the column's name.
+NUMERIC: dict = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
+
 
 @dataclass(frozen=True, eq=False)
 class ValidatedData:
@@ -63,7 +66,6 @@ class ValidatedData:
 def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
     """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""
     refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
-    numeric = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
     is_first = not (is_chunk and hasattr(estimator, "model_"))
     output_names = _target_names(y)
     with named_refusals(X=X, y=y):
@@ -73,8 +75,8 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
             y,
             reset=is_first,
             validate_separately=(
-                {**numeric, "ensure_min_samples": 1 if is_chunk else 2},
-                {**numeric, "ensure_2d": False},
+                {**NUMERIC, "ensure_min_samples": 1 if is_chunk else 2},
+                {**NUMERIC, "ensure_2d": False},
             ),
         )
     check_consistent_length(X, y)
@@ -124,7 +126,7 @@ class SolverRun:
     problem: SeparableProblem
     premise: Premise
     result: SolverResult
-    validation_losses: tuple[float, ...] | None = None
+    validation_losses: np.ndarray | None = None
 
     @property
     def evaluation(self) -> Evaluation:
@@ -147,5 +149,5 @@ class Fitted:
     start: Start
     redundant_rules: list[dict]
     robust_weights: np.ndarray | None = None
-    validation_losses: tuple[float, ...] | None = None
+    validation_losses: np.ndarray | None = None
     constraints: dict | None = None

@@ -154,7 +154,7 @@ class _Fit:
         if validation is None:
             return SolverRun(start, problem, premise, result)
         result = validation.restored(result)
-        return SolverRun(start, problem, premise, result, tuple(validation.losses))
+        return SolverRun(start, problem, premise, result, np.array(validation.losses))
 
     def robust_run(self) -> tuple[SolverRun, np.ndarray]:
         """Runs and weights in turns, until the weights settle.

@@ -16,14 +16,12 @@ from ..options import EarlyStopping
 def watch_all(*watchers):
     """Several watchers as one: every one sees every iteration, any one can end the run."""
     present = [watcher for watcher in watchers if watcher is not None]
-    if not present:
-        return None
 
     def watch(n_iter, evaluation):
         asked_to_stop = [watcher(n_iter, evaluation) for watcher in present]
         return any(asked_to_stop)
 
-    return watch
+    return watch if present else None
 
 
 class Printer:

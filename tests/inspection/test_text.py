@@ -83,6 +83,16 @@ def test_the_text_of_a_fit_errs_as_the_last_line_says(partition):
     assert f"\n{cost} numbers; the text as printed errs {told} the" in text
 
 
+@pytest.mark.parametrize("mf", ["triangular", "pi_shaped"])
+def test_rows_beyond_the_feet_of_all_terms_are_told_too(mf):
+    x = np.repeat([0.0, 1.0, 5.0], 20) + np.tile(np.linspace(0.0, 0.2, 20), 3)
+    clusters = KMeans(2, n_init=1, random_state=0)
+    model = ANFISRegressor(partition=clusters, mf=mf, max_iter=0).fit(x[:, None], x**2)
+    rows = np.linspace(0.0, 5.2, 50)[:, None]
+    text = export_text(model, precision=17)
+    assert_allclose(predicted(text, rows, ["x0"])[:, 0], model.predict(rows), rtol=1e-7)
+
+
 @pytest.mark.parametrize("name", ["grid", "rule table"])
 @pytest.mark.parametrize("n_outputs", [1, 2])
 def test_slopes_in_common_are_told_once(name, n_outputs):

@@ -12,7 +12,7 @@ from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from skanfis import ANFISRegressor
+from skanfis import ANFISRegressor, regressor
 from skanfis.datasets import make_jang_sinc
 from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
@@ -133,18 +133,23 @@ class TestCallbacks:
         assert np.isfinite(search.best_score_)
 
 
-def test_an_estimator_that_is_interrupted_is_as_before(monkeypatch):
-    """By Ctrl-C at the end of an iteration, as a terminal would send it."""
+@pytest.mark.parametrize(
+    ("where", "name"),
+    [(watching.Printer, "__call__"), (regressor, "readability_of_rows")],
+    ids=["at the end of an iteration", "once the model is there"],
+)
+def test_an_estimator_that_is_interrupted_is_as_before(monkeypatch, where, name):
+    """By Ctrl-C, as a terminal would send it."""
 
-    def interrupt(self, iteration, evaluation):
+    def interrupt(*_):
         raise KeyboardInterrupt
 
     model = quick(verbose=True).fit(X, Y)
-    before = model.predict(X)
-    monkeypatch.setattr(watching.Printer, "__call__", interrupt)
+    before = dict(vars(model), n_mfs=3)
+    monkeypatch.setattr(where, name, interrupt)
     with pytest.raises(KeyboardInterrupt):
-        model.set_params(n_mfs=3).fit(X, Y)
-    assert_array_equal(model.predict(X), before)
+        model.set_params(n_mfs=3).fit(X[:, :1], Y)
+    assert vars(model) == before
     with pytest.raises(KeyboardInterrupt):
         quick(n_mfs=3, verbose=True).fit(X, Y)
 
