@@ -147,11 +147,10 @@ class Antecedent(ABC):
         """
         from .rule_table import RuleTableAntecedent  # which is built on this module
 
-        table = np.delete(self.rule_terms, rules, axis=0)
-        terms = np.unique(table[table >= 0])
-        place = np.full(self.n_terms + 1, -1)
-        place[terms] = np.arange(terms.size)
-        return RuleTableAntecedent(self._groups_with(terms), place[table]), terms
+        table, every = np.delete(self.rule_terms, rules, axis=0), np.arange(self.n_terms)
+        unused = np.setdiff1d(every, table)
+        left = RuleTableAntecedent(self.groups, table).without_terms(unused)
+        return left, np.delete(every, unused)
 
     def _groups_with(self, terms):
         """The groups with these terms alone."""

@@ -4,38 +4,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .base import Antecedent, TermGroup, softmax_in_place
+from .base import TermGroup
+from .rule_table import RuleTableAntecedent
 
 
 @dataclass(frozen=True, eq=False)
-class ScatteredAntecedent(Antecedent):
-    """Rules with terms of their own, one per premise input; terms are in rule-major order.
+class ScatteredAntecedent(RuleTableAntecedent):
+    """Rules with terms of their own, each on some of the premise inputs."""
 
-    w = softmax over rules of the sum over inputs of log mu.
-    """
-
-    n_premise_inputs: int = 0
     is_ordered = False
 
     @classmethod
     def build(cls, family, inputs, theta):
-        """``inputs`` the premise inputs; theta (n_parameters, n_rules, n_premise_inputs)."""
-        n_parameters, n_rules, n_premise_inputs = theta.shape
-        group = TermGroup(family, np.tile(inputs, n_rules), theta.reshape(n_parameters, -1))
-        return cls((group,), n_premise_inputs=n_premise_inputs)
+        """Of one family, in the order of the rules.
 
-    @property
-    def n_rules(self):
-        return self.n_terms // self.n_premise_inputs
-
-    @property
-    def rule_terms(self):
-        return np.arange(self.n_terms).reshape(self.n_rules, self.n_premise_inputs)
-
-    def normalise(self, log_mu):
-        strengths = log_mu.reshape(self.n_rules, self.n_premise_inputs, -1).sum(axis=1)
-        softmax_in_place(strengths)
-        return strengths, strengths
-
-    def sum_over_rules(self, values):
-        return np.repeat(values, self.n_premise_inputs, axis=0)
+        ``inputs`` are the premise inputs; theta is (n_parameters, n_rules, n_premise_inputs), NaN
+        where a rule has no term.
+        """
+        has_term = np.isfinite(theta[0])
+        table = np.where(has_term, np.cumsum(has_term).reshape(has_term.shape) - 1, -1)
+        on = np.broadcast_to(inputs, has_term.shape)[has_term]
+        return cls((TermGroup(family, on, theta[:, has_term]),), table)

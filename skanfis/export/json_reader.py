@@ -350,14 +350,15 @@ def rule_base(kind, groups, table):
         antecedent = GridAntecedent(groups, counts=counts)
         fits = prod(counts) == len(table) and len(counts) == np.unique(inputs).size
     elif kind == "scattered":
-        antecedent = ScatteredAntecedent(groups, n_premise_inputs=table.shape[1])
-        fits = 0 < table.size == inputs.size
+        antecedent = ScatteredAntecedent(groups, table)
+        fits = 0 < inputs.size == np.count_nonzero(table >= 0)
     elif kind == "tree":
         antecedent = _tree(groups, table)
     if not fits or not np.array_equal(antecedent.rule_terms, table):
         raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
-    if kind == "scattered" and (inputs[table] != inputs[table[0]]).any():
-        raise ValueError("the terms at one place of the rules are of different inputs.")
+    for column in table.T if kind == "scattered" else ():
+        if np.unique(inputs[column[column >= 0]]).size > 1:
+            raise ValueError("the terms at one place of the rules are of different inputs.")
     for r, row in enumerate(table):
         terms = row[row >= 0]
         if np.unique(terms).size < terms.size:

@@ -8,7 +8,7 @@ those that have learnt where these leave most.
 
 import numpy as np
 
-from ..antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from ..antecedent import GridAntecedent, ScatteredAntecedent
 from ..learning.data import StandardisedData
 from .grid import terms_by_input
 from .sample import counting_weight, representative_rows
@@ -45,7 +45,7 @@ def grown_antecedent(families, tuned, label, premise_inputs):
     """What a smaller rule base has learnt, and a rule for every cluster of what it has not.
 
     Clusters are sought on the ``premise_inputs``, rows being weighted by their squared residuals.
-    On inputs that its rules have no terms on yet, these stand where the rules fire.
+    On inputs that none of its rules has a term on yet, these stand where the rules fire.
     """
     rows, smaller = tuned.problem.rows, tuned.evaluation.antecedent
     weight = counting_weight(rows)
@@ -55,7 +55,11 @@ def grown_antecedent(families, tuned, label, premise_inputs):
     added = _terms_at(families, premise_inputs, rows.X, masses)
     strengths, _ = smaller.strengths_and_shares(np.ascontiguousarray(rows.X.T))
     learnt = _terms_at(families, premise_inputs, rows.X, weight * strengths)
-    learnt |= terms_by_input(smaller)
+    groups, table = smaller.groups, smaller.rule_terms
+    for j, terms in terms_by_input(smaller).items():
+        on_input = np.append(smaller.term_inputs == j, False)[table]
+        learnt[j] = np.full_like(learnt[j], np.nan)
+        learnt[j][:, on_input.any(axis=1)] = terms
     terms = {j: np.concatenate([learnt[j], added[j]], axis=1) for j in premise_inputs}
     return _scattered(families, terms)
 
@@ -73,11 +77,14 @@ def _terms_at(families, inputs, table, masses):
 
 
 def _scattered(families, terms):
-    """Rules that have one term on each input, of parameters (n_parameters, n_rules) by input."""
+    """Rules with terms of parameters (n_parameters, n_rules) by input; NaN is no term."""
     inputs, thetas = np.array(list(terms)), list(terms.values())
-    n_rules = thetas[0].shape[1]
     if len({families[j] for j in inputs}) == 1:
         return ScatteredAntecedent.build(families[inputs[0]], inputs, np.stack(thetas, axis=2))
-    groups = tuple(TermGroup(families[j], np.full(n_rules, j), theta) for j, theta in terms.items())
-    first = n_rules * np.arange(inputs.size)
-    return RuleTableAntecedent(groups, np.arange(n_rules)[:, None] + first)
+    own = [
+        ScatteredAntecedent.build(families[j], [j], theta[:, :, None]) for j, theta in terms.items()
+    ]
+    groups = tuple(one.groups[0] for one in own)
+    first = np.cumsum([0, *(one.n_terms for one in own[:-1])])
+    table = np.hstack([one.table for one in own])
+    return ScatteredAntecedent(groups, np.where(table < 0, -1, table + first))

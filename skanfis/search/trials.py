@@ -22,6 +22,7 @@ from ..membership import Membership
 from ..model import TSKModel
 from ..policies import TargetRange
 from .candidates import Candidate, TermScores, rule_base
+from .conditions import with_fewer_conditions
 from .grid import Spacing
 from .lasso import lasso_inputs
 from .sample import effective_weight, to_six_digits, unit_scale
@@ -186,6 +187,8 @@ class Trials:
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 begun = self._begun[candidate]
                 found = self._train(begun.problem, turns, begun=begun)
+                if candidate.n_clusters:
+                    found = with_fewer_conditions(found, self.plan.free)
             self._found[candidate] = found
         return self._found[candidate]
 

@@ -131,7 +131,7 @@ def tune(
     if "stiffness" in free:
         stiffness = start.posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
         penalty = replace(penalty, stiffness=stiffness)
-    first = _turned(start, premise, penalty, free, steps)
+    first = turned(start, premise, penalty, free, steps)
     return _risen(first, premise, free, turns - 1, steps)
 
 
@@ -146,7 +146,7 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: fl
     evaluation = problem.evaluate(premise.parameters(x))
     start = _improved(problem, evaluation, x, penalty, 0, free, n_rows)
     steps, far = FIRST_STEPS, _UNBOUNDED_ITERATIONS
-    first = _turned(start, premise, penalty, free, steps, far, has_least=False)
+    first = turned(start, premise, penalty, free, steps, far, has_least=False)
     return _risen(first, premise, free, MOST_TURNS - 1, _STEPS, has_least=False)
 
 
@@ -154,7 +154,7 @@ def _risen(tuned: Tuned, premise, free, turns, steps, has_least=True) -> Tuned:
     """The turn of the largest evidence, of so many more."""
     best = last = tuned
     for _ in range(turns):
-        last = _turned(last, premise, last.penalty, free, steps, has_least=has_least)
+        last = turned(last, premise, last.penalty, free, steps, has_least=has_least)
         gain = best.posterior.minus_twice_log - last.posterior.minus_twice_log
         best = last if gain > 0.0 else best
         if not gain > WORTH:
@@ -162,8 +162,8 @@ def _risen(tuned: Tuned, premise, free, turns, steps, has_least=True) -> Tuned:
     return best
 
 
-def _turned(
-    tuned: Tuned, premise, penalty, free, steps, iterations=_ITERATIONS, has_least=True
+def turned(
+    tuned: Tuned, premise, penalty, free, steps=_STEPS, iterations=_ITERATIONS, has_least=True
 ) -> Tuned:
     """One turn from where the last one ended: premises down the cost, then weights up.
 
@@ -240,7 +240,7 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, room: float) -> Tu
         if agreement < _LEAST_RAISE * best.penalty.agreement:
             break
         penalty = replace(best.penalty, agreement=agreement)
-        found = _turned(best, premise, penalty, others, steps=0)
+        found = turned(best, premise, penalty, others, steps=0)
         if found.expected_error <= most:
             best, agreement = found, 0.0
         else:
