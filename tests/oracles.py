@@ -387,6 +387,8 @@ def random_scattered(rng, family, n_rules, inputs):
     centers = rng.normal(size=(n_rules, inputs.size))
     theta = family.from_center_and_width(centers, rng.uniform(0.7, 1.5, centers.shape))
     theta[1:] += 0.2 * rng.normal(size=theta[1:].shape)
+    # One of the rules looks at fewer inputs.
+    theta[:, 0, 1:2] = np.nan
     return ScatteredAntecedent.build(family, inputs, theta)
 
 

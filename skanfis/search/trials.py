@@ -187,7 +187,8 @@ class Trials:
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 begun = self._begun[candidate]
                 found = self._train(begun.problem, turns, begun=begun)
-                if candidate.n_clusters:
+                # To be held in order, all rules need a term on an input.
+                if candidate.n_clusters and self.plan.held is None:
                     found = with_fewer_conditions(found, self.plan.free)
             self._found[candidate] = found
         return self._found[candidate]

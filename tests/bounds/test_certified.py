@@ -43,7 +43,7 @@ def test_two_rules_of_order_zero_are_a_sigmoid():
     theta[0] = OFFSET[0] + np.array([-1.0, 1.0]) * SCALE[0]
     theta[1] = np.log(SCALE[0])
     group = TermGroup(Gaussian, np.zeros(2, dtype=int), theta)
-    antecedent = replace(model.antecedent, groups=(group,), n_premise_inputs=1)
+    antecedent = replace(model.antecedent, groups=(group,), table=np.array([[0], [1]]))
     model = replace(
         model,
         antecedent=antecedent,

@@ -1,0 +1,86 @@
+"""Conditions that are left out: what they are worth, against another solution, and where they go."""
+
+import numpy as np
+from numpy.testing import assert_allclose, assert_array_equal
+
+from skanfis.antecedent import ScatteredAntecedent
+from skanfis.consequent import basis
+from skanfis.learning.data import StandardisedData
+from skanfis.learning.evidence import FREE
+from skanfis.learning.objective import SeparableProblem
+from skanfis.learning.premise import Premise
+from skanfis.membership import Gaussian
+from skanfis.search import conditions, tuning
+
+from .. import oracles
+
+
+def tuned_rules(rng, n_outputs=1):
+    """Five rules on two of three inputs, trained a little, of rows with weights."""
+    X, weight = rng.normal(size=(200, 3)), rng.uniform(0.5, 2.0, 200)
+    y = np.sin(2.0 * X[:, [0]]) * X[:, [1]] + 0.1 * rng.normal(size=(200, n_outputs))
+    rows = StandardisedData.of(X, y, weight)
+    antecedent = oracles.random_scattered(rng, Gaussian, 5, [0, 1])
+    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    premise = Premise.of(antecedent, *rows.inputs.box)
+    return tuning.tune(problem, premise, FREE, 200.0, turns=2)
+
+
+def test_what_a_condition_is_worth_is_the_rise_of_the_cost(rng):
+    """Of a target less the change, solved for anew with the same design and penalty."""
+    tuned = tuned_rules(rng, n_outputs=2)
+    problem, rows, evaluation = tuned.problem, tuned.problem.rows, tuned.evaluation
+    antecedent, weight = evaluation.antecedent, rows.weights / rows.total_weight
+    Z, target, _ = rows.read(slice(None))
+
+    def design(rules):
+        return np.einsum("rn,bn->nrb", rules.strengths(Z), basis(Z)).reshape(len(Z.T), -1)
+
+    phi = design(antecedent) @ problem.local.to_global(np.eye(problem.n_columns))
+    matrix = phi.T @ (weight[:, None] * phi) + evaluation.normal.penalty
+
+    def twice_cost(y):
+        slope = phi.T @ (weight[:, None] * y)
+        return weight @ np.sum(y**2, axis=1) - np.vdot(slope, np.linalg.solve(matrix, slope))
+
+    rule_of = np.nonzero(antecedent.table >= 0)[0]
+    found = conditions._losses(tuned, rule_of)
+    unit = tuned.posterior.noise_variance / tuned.posterior.n_rows
+    for t, loss in enumerate(found):
+        change = design(antecedent.without_terms([t])) - design(antecedent)
+        left = target.T - change @ evaluation.coefficients
+        assert_allclose(unit * loss, twice_cost(left) - twice_cost(target.T), rtol=1e-6, atol=1e-12)
+
+
+def test_the_condition_that_a_rule_does_not_have_goes(rng):
+    """Where x0 is low, the place along x1 makes no difference."""
+    X = rng.uniform(-2.0, 2.0, (500, 2))
+    centers = np.array([[-1.0, 0.0], [1.0, -1.0], [1.0, 1.0]])
+    theta = np.stack([centers, np.full((3, 2), -0.5)])
+    theta[1, 0, 1] = 1.0
+    rules = ScatteredAntecedent.build(Gaussian, [0, 1], theta)
+    firing = rules.without_terms([1]).strengths(X.T)
+    values = np.array([[0.0, 1.0, 0.0], [2.0, 0.0, 1.0], [-2.0, 1.0, 1.0]]) @ basis(X.T)
+    y = np.sum(firing * values, axis=0) + 0.1 * rng.normal(size=500)
+    rows = StandardisedData.of(X, y[:, None])
+    start = rules.change_units(-rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale)
+    problem = SeparableProblem(rows, start, 1, tuning.FIRST_PENALTY)
+    tuned = tuning.tune(problem, Premise.of(start, *rows.inputs.box), FREE, 500.0)
+    found = conditions.with_fewer_conditions(tuned, FREE)
+    assert_array_equal(found.evaluation.antecedent.table, [[0, -1], [1, 2], [3, 4]])
+    assert found.expected_error < 1.02 * tuned.expected_error
+
+
+def test_every_rule_keeps_a_condition_and_the_evidence_rises(rng):
+    tuned = tuned_rules(rng)
+    # Of noise no condition is worth anything.
+    noise = rng.normal(size=tuned.problem.rows.y.shape)
+    rows = StandardisedData.of(tuned.problem.rows.X, noise)
+    problem = SeparableProblem(rows, tuned.problem.antecedent, 1, tuned.penalty)
+    premise = Premise.of(problem.antecedent, *rows.inputs.box)
+    tuned = tuning.tune(problem, premise, FREE, 200.0, turns=1)
+    found = conditions.with_fewer_conditions(tuned, FREE)
+    assert found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
+    assert_array_equal((found.evaluation.antecedent.table >= 0).sum(axis=1), 1)
+    moved = Premise.of(found.problem.antecedent, *rows.inputs.box).parameters(found.displacement)
+    assert_allclose(moved, found.evaluation.antecedent.parameters)
