@@ -55,7 +55,7 @@ def grown_antecedent(families, tuned, label, premise_inputs):
     added = _terms_at(families, premise_inputs, rows.X, masses)
     strengths, _ = smaller.strengths_and_shares(np.ascontiguousarray(rows.X.T))
     learnt = _terms_at(families, premise_inputs, rows.X, weight * strengths)
-    groups, table = smaller.groups, smaller.rule_terms
+    table = smaller.rule_terms
     for j, terms in terms_by_input(smaller).items():
         on_input = np.append(smaller.term_inputs == j, False)[table]
         learnt[j] = np.full_like(learnt[j], np.nan)

@@ -9,8 +9,8 @@ and twice the cost, once the consequents are solved for anew, by
 
     |delta|^2 - 2 <residual, delta> - |L^-1 Phi' delta|^2 ,
 
-L being the factor of their normal equations. Relative to the noise's variance that is what the
-evidence loses, in -2 log p. Half of the conditions that lose least are left out at a time.
+L being the factor of their normal equations. Over the noise's variance, that is what the evidence
+loses, in -2 log p.
 """
 
 from dataclasses import replace
@@ -30,7 +30,8 @@ _FARTHEST = 300.0
 def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
     """The same without conditions that are worth less than a number, and trained on.
 
-    Every rule keeps one. It is the same as it was where the evidence says so in the end.
+    Half of them go at a time, as what is left is worth more then. If the evidence is less in the
+    end, all stay.
     """
     found = tuned
     while (terms := _needless(found)).size:
@@ -39,37 +40,34 @@ def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
         return tuned
     premise = Premise.of(found.problem.antecedent, *found.problem.rows.inputs.box)
     found = turned(found, premise, found.penalty, free)
-    has_more = found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
-    return found if has_more else tuned
+    is_better = found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
+    return found if is_better else tuned
 
 
 def _needless(tuned):
-    """Terms that may go next."""
-    antecedent = tuned.evaluation.antecedent
-    rules, places = np.nonzero(antecedent.rule_terms >= 0)
-    terms = antecedent.rule_terms[rules, places]
-    rule_of = rules[np.argsort(terms)]
-    loss = _losses(tuned, rule_of)
-    # The last of a rule stays.
-    for r in range(antecedent.n_rules):
-        own = np.flatnonzero(rule_of == r)
+    """Half of the terms that are worth less than a number; every rule keeps one."""
+    table = tuned.evaluation.antecedent.rule_terms
+    loss = term_losses(tuned)
+    for own in (row[row >= 0] for row in table):
         loss[own[np.argmax(loss[own])]] = np.inf
-    needless = np.flatnonzero(loss < WORTH * tuned.problem.n_outputs)
-    order = np.argsort(loss[needless], kind="stable")
-    return needless[order[: (needless.size + 1) // 2]]
+    order = np.argsort(loss, kind="stable")
+    n_needless = np.count_nonzero(loss < WORTH * tuned.problem.n_outputs)
+    return order[: (n_needless + 1) // 2]
 
 
-def _losses(tuned, rule_of):
+def term_losses(tuned):
     """What the evidence loses where each term is left out, in -2 log p, (n_terms,)."""
-    problem, evaluation, rows = tuned.problem, tuned.evaluation, tuned.problem.rows
-    antecedent, weight = evaluation.antecedent, rows.weights / rows.total_weight
-    by_rule = evaluation.coefficients.reshape(antecedent.n_rules, problem.n_basis, -1)
+    problem, solved, rows = tuned.problem, tuned.solved, tuned.problem.rows
+    antecedent, weight = solved.antecedent, rows.weights / rows.total_weight
+    has_term = antecedent.rule_terms >= 0
+    rule_of = np.nonzero(has_term)[0][np.argsort(antecedent.rule_terms[has_term])]
     Z, target, _ = rows.read(slice(None))
     strengths, functions = antecedent.strengths(Z), problem.basis(Z)
-    design = (strengths[:, None] * functions).reshape(problem.n_columns, -1)
     more = np.expm1(np.minimum(-antecedent.log_memberships(Z), _FARTHEST))
     more /= 1.0 + more * strengths[rule_of]
-    root = problem.local.to_global(evaluation.normal.factor.root.T).T
+    design = (strengths[:, None] * functions).reshape(problem.n_columns, -1)
+    root = problem.local.to_global(solved.normal.factor.root.T).T
+    by_rule = solved.coefficients.reshape(len(strengths), problem.n_basis, -1)
     found = np.zeros(antecedent.n_terms)
     for k, y in enumerate(target):
         outputs, prediction = rule_outputs(by_rule[:, :, k], strengths, functions)
@@ -80,17 +78,9 @@ def _losses(tuned, rule_of):
 
 
 def _without(tuned, terms):
-    """The same without some terms, the premises that are left where they stand."""
+    """The same without some terms; the others stand where they did."""
     problem, now = tuned.problem, tuned.evaluation.antecedent.without_terms(terms)
     start, inputs = problem.antecedent.without_terms(terms), problem.consequent_inputs
-    problem = SeparableProblem(
-        problem.rows, start, problem.order, tuned.penalty, consequent_inputs=inputs
-    )
-    premise = Premise.of(start, *problem.rows.inputs.box)
-    evaluation = problem.evaluate(now.parameters)
-    return replace(
-        tuned,
-        problem=problem,
-        evaluation=evaluation,
-        displacement=premise.displacement(now.parameters),
-    )
+    fewer = SeparableProblem(problem.rows, start, tuned.penalty, consequent_inputs=inputs)
+    at = Premise.of(start, *problem.rows.inputs.box).displacement(now.parameters)
+    return replace(tuned, problem=fewer, evaluation=fewer.evaluate(now.parameters), displacement=at)

@@ -188,7 +188,8 @@ class Trials:
                 begun = self._begun[candidate]
                 found = self._train(begun.problem, turns, begun=begun)
                 # To be held in order, all rules need a term on an input.
-                if candidate.n_clusters and self.plan.held is None:
+                is_free = self.plan.premises_move and self.plan.held is None
+                if candidate.n_clusters and is_free:
                     found = with_fewer_conditions(found, self.plan.free)
             self._found[candidate] = found
         return self._found[candidate]

@@ -1,4 +1,4 @@
-"""Conditions that are left out: what they are worth, against another solution, and where they go."""
+"""Conditions that are left out: what they are worth by another solution, and which they are."""
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
@@ -21,7 +21,7 @@ def tuned_rules(rng, n_outputs=1):
     y = np.sin(2.0 * X[:, [0]]) * X[:, [1]] + 0.1 * rng.normal(size=(200, n_outputs))
     rows = StandardisedData.of(X, y, weight)
     antecedent = oracles.random_scattered(rng, Gaussian, 5, [0, 1])
-    problem = SeparableProblem(rows, antecedent, 1, tuning.FIRST_PENALTY)
+    problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     premise = Premise.of(antecedent, *rows.inputs.box)
     return tuning.tune(problem, premise, FREE, 200.0, turns=2)
 
@@ -29,7 +29,7 @@ def tuned_rules(rng, n_outputs=1):
 def test_what_a_condition_is_worth_is_the_rise_of_the_cost(rng):
     """Of a target less the change, solved for anew with the same design and penalty."""
     tuned = tuned_rules(rng, n_outputs=2)
-    problem, rows, evaluation = tuned.problem, tuned.problem.rows, tuned.evaluation
+    problem, rows, evaluation = tuned.problem, tuned.problem.rows, tuned.solved
     antecedent, weight = evaluation.antecedent, rows.weights / rows.total_weight
     Z, target, _ = rows.read(slice(None))
 
@@ -43,8 +43,7 @@ def test_what_a_condition_is_worth_is_the_rise_of_the_cost(rng):
         slope = phi.T @ (weight[:, None] * y)
         return weight @ np.sum(y**2, axis=1) - np.vdot(slope, np.linalg.solve(matrix, slope))
 
-    rule_of = np.nonzero(antecedent.table >= 0)[0]
-    found = conditions._losses(tuned, rule_of)
+    found = conditions.term_losses(tuned)
     unit = tuned.posterior.noise_variance / tuned.posterior.n_rows
     for t, loss in enumerate(found):
         change = design(antecedent.without_terms([t])) - design(antecedent)
@@ -64,7 +63,7 @@ def test_the_condition_that_a_rule_does_not_have_goes(rng):
     y = np.sum(firing * values, axis=0) + 0.1 * rng.normal(size=500)
     rows = StandardisedData.of(X, y[:, None])
     start = rules.change_units(-rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale)
-    problem = SeparableProblem(rows, start, 1, tuning.FIRST_PENALTY)
+    problem = SeparableProblem(rows, start, tuning.FIRST_PENALTY)
     tuned = tuning.tune(problem, Premise.of(start, *rows.inputs.box), FREE, 500.0)
     found = conditions.with_fewer_conditions(tuned, FREE)
     assert_array_equal(found.evaluation.antecedent.table, [[0, -1], [1, 2], [3, 4]])
@@ -76,7 +75,7 @@ def test_every_rule_keeps_a_condition_and_the_evidence_rises(rng):
     # Of noise no condition is worth anything.
     noise = rng.normal(size=tuned.problem.rows.y.shape)
     rows = StandardisedData.of(tuned.problem.rows.X, noise)
-    problem = SeparableProblem(rows, tuned.problem.antecedent, 1, tuned.penalty)
+    problem = SeparableProblem(rows, tuned.problem.antecedent, tuned.penalty)
     premise = Premise.of(problem.antecedent, *rows.inputs.box)
     tuned = tuning.tune(problem, premise, FREE, 200.0, turns=1)
     found = conditions.with_fewer_conditions(tuned, FREE)
