@@ -23,13 +23,7 @@ from typing import Self
 import numpy as np
 
 from ._validation import rows_by_name
-from .antecedent import (
-    Antecedent,
-    RuleTableAntecedent,
-    TreeAntecedent,
-    by_group,
-    strongest_rules,
-)
+from .antecedent import Antecedent, RuleTableAntecedent, TreeAntecedent, by_group, strongest_rules
 from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names

@@ -141,10 +141,6 @@ class SeparableProblem:
         slopes = rows.inputs.varying(self.consequent_inputs)
         self.common_line = CommonLine(self.local, self._extent(antecedent), antecedent, slopes)
 
-    def basis(self, Z):
-        """Basis functions of the consequents at a block of rows."""
-        return self._design.basis(Z)
-
     def _extent(self, antecedent):
         """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
         farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))

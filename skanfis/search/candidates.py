@@ -35,7 +35,6 @@ class Candidate:
     counts: tuple[int, ...]
     n_clusters: int = 0  # of scattered rules
     inputs: tuple[int, ...] = ()  # on which these have terms
-    is_grown: bool = False  # whether they go on from fewer
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
     slope_worth: float | None = None  # of slopes that are kept (``sparse_slopes``); None: all are
     has_all_slopes: bool = False  # also where rows are few (``lasso``)
@@ -86,14 +85,14 @@ class Candidate:
         """Half as many scattered rules again, two at least, with terms on these inputs too."""
         number = max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters)))
         inputs = tuple(sorted({*self.inputs, *inputs}))
-        return replace(self, n_clusters=number, inputs=inputs, is_grown=False)
+        return replace(self, n_clusters=number, inputs=inputs)
 
 
 def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = None):
     """The antecedent that a candidate begins with.
 
-    A grid, a tree and scattered rules that are grown go on from what a ``smaller`` candidate has
-    learnt; other scattered rules begin at clusters of the ``rows``.
+    All go on from what a ``smaller`` candidate has learnt, but for the first scattered rules, which
+    begin at clusters of the ``rows``.
     """
     known: Any = None if smaller is None else smaller.evaluation.antecedent
     if candidate.splits:
@@ -102,8 +101,8 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
         return tree.split(last.leaf, last.input, last.cut, last.log_width)
     if not candidate.n_clusters:
         return grid_antecedent(families, candidate.counts, spacing, known=known)
-    n_clusters = candidate.n_clusters - (known.n_rules if candidate.is_grown else 0)
-    clusterer = KMeans(n_clusters, n_init=1, random_state=seed)
+    n_known = 0 if known is None or known.n_rules == 1 else known.n_rules
+    clusterer = KMeans(candidate.n_clusters - n_known, n_init=1, random_state=seed)
 
     def label(table, weight):
         # It begins at some of the rows: the order of columns is to have no part in which, and
@@ -116,7 +115,7 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
         return labels[np.argsort(order)]
 
     inputs = np.array(candidate.inputs)
-    if candidate.is_grown:
+    if n_known:
         return grown_antecedent(families, smaller, label, inputs)
     return clustered_antecedent(families, rows, label, inputs)
 

@@ -78,13 +78,12 @@ def _terms_at(families, inputs, table, masses):
 
 def _scattered(families, terms):
     """Rules with terms of parameters (n_parameters, n_rules) by input; NaN is no term."""
-    inputs, thetas = np.array(list(terms)), list(terms.values())
-    if len({families[j] for j in inputs}) == 1:
-        return ScatteredAntecedent.build(families[inputs[0]], inputs, np.stack(thetas, axis=2))
-    own = [
-        ScatteredAntecedent.build(families[j], [j], theta[:, :, None]) for j, theta in terms.items()
-    ]
-    groups = tuple(one.groups[0] for one in own)
-    first = np.cumsum([0, *(one.n_terms for one in own[:-1])])
-    table = np.hstack([one.table for one in own])
-    return ScatteredAntecedent(groups, np.where(table < 0, -1, table + first))
+    groups, tables, n_terms = [], [], 0
+    for family in dict.fromkeys(families[j] for j in terms):
+        inputs = [j for j in terms if families[j] is family]
+        theta = np.stack([terms[j] for j in inputs], axis=2)
+        own = ScatteredAntecedent.build(family, inputs, theta)
+        groups += own.groups
+        tables.append(np.where(own.table < 0, -1, own.table + n_terms))
+        n_terms += own.n_terms
+    return ScatteredAntecedent(tuple(groups), np.hstack(tables))

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..consequent import rule_outputs
+from ..consequent import basis, rule_outputs
 from ..learning.evidence import WORTH
 from ..learning.objective import SeparableProblem
 from ..learning.premise import Premise
@@ -62,7 +62,7 @@ def term_losses(tuned):
     has_term = antecedent.rule_terms >= 0
     rule_of = np.nonzero(has_term)[0][np.argsort(antecedent.rule_terms[has_term])]
     Z, target, _ = rows.read(slice(None))
-    strengths, functions = antecedent.strengths(Z), problem.basis(Z)
+    strengths, functions = antecedent.strengths(Z), basis(Z[problem.consequent_inputs])
     more = np.expm1(np.minimum(-antecedent.log_memberships(Z), _FARTHEST))
     more /= 1.0 + more * strengths[rule_of]
     design = (strengths[:, None] * functions).reshape(problem.n_columns, -1)

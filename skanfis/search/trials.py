@@ -123,11 +123,9 @@ class Trials:
         smaller = self.tuned(candidate)
         tried = filter(self._is_small, self._tried(kind, candidate, smaller))
         problems = {one: self._problem(one, smaller) for one in tried}
-        # Clusters anew have learnt nothing yet: beside rules that go on they take some turns first.
-        turns = FEW_TURNS if kind == "scattered" else 0
         # Of rows that are alike but for a few, there are fewer clusters than were asked for.
         begun = {
-            one: self._train(problem, turns)
+            one: self._train(problem, turns=0)
             for one, problem in problems.items()
             if problem.antecedent.n_rules == one.n_rules
         }
@@ -145,10 +143,8 @@ class Trials:
             values = scores.of([(j, candidate.counts[j] + _TERMS - 1) for j in self.bell_inputs])
             best = np.argsort(-values, kind="stable")[:_TRIED]
             return [candidate.with_more_terms(self.bell_inputs[k]) for k in best]
-        anew = candidate.with_more_clusters(self._significant_inputs(candidate, scores))
-        if not anew.inputs:
-            return []
-        return [anew, replace(anew, is_grown=True)] if candidate.n_clusters else [anew]
+        more = candidate.with_more_clusters(self._significant_inputs(candidate, scores))
+        return [more] if more.inputs else []
 
     def _inputs_with_slopes(self, candidate):
         """Inputs that the consequents of a candidate are linear in."""
@@ -185,8 +181,7 @@ class Trials:
                 # Terms of a grid serve many rules. After more turns they tell apart runs that lie
                 # far from one another, and the rules are wild between these.
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
-                begun = self._begun[candidate]
-                found = self._train(begun.problem, turns, begun=begun)
+                found = self._train(self._begun[candidate].problem, turns)
                 # To be held in order, all rules need a term on an input.
                 is_free = self.plan.premises_move and self.plan.held is None
                 if candidate.n_clusters and is_free:
@@ -214,12 +209,12 @@ class Trials:
         inputs = self._inputs_with_slopes(candidate)
         return SeparableProblem(rows, antecedent, penalty, consequent_inputs=inputs)
 
-    def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE, begun=None):
+    def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE):
         free, weight = self.plan.free, effective_weight(problem.rows)
         if turns and not self.plan.premises_move:
             turns, first_steps = 0, ARRIVING
         premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
-        return tune(problem, premise, free, weight, turns, first_steps, begun)
+        return tune(problem, premise, free, weight, turns, first_steps)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
         """Of rows that were not trained on, as predict answers; summed over outputs."""

@@ -107,23 +107,20 @@ def tune(
     n_rows: float,
     turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
-    begun: Tuned | None = None,
 ) -> Tuned:
     """Find the ``free`` weights, of ``evidence.FREE``, and the premises that go with them.
 
     The weights start at those of the problem's penalty and take ``first_steps`` before the premises
     move, in so many ``turns`` at most; with 0 these stay where they are. ``n_rows`` are rows by
-    weight; ``begun`` is a training to go on from, which has taken no turn or ``FEW_TURNS``.
+    weight.
     """
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
         first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
-    if begun is not None and begun.displacement.any():
-        return _risen(begun, premise, free, turns - FEW_TURNS, steps)
     x = np.zeros(premise.size)
-    evaluation = begun.evaluation if begun else problem.evaluate(premise.parameters(x))
+    evaluation = problem.evaluate(premise.parameters(x))
     start = _improved(problem, evaluation, x, problem.penalty, first_steps, free, n_rows)
     if premise.size == 0 or turns == 0:
         return start
