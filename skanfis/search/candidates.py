@@ -2,9 +2,9 @@
 
 All kinds begin with one rule, a line. A grid grows by one term at a time, beside those that have
 learnt already (``trials`` knows on which input); an input that asks for no terms gets none. Of a
-tree, one leaf at a time is split (``splits``). Scattered rules stand on the clusters of k-means,
-half as many again each time, with terms on the inputs that smaller ones have asked for: all anew,
-or those that are added, where the residual of the others is.
+tree, one leaf at a time is split (``splits``). Scattered rules are half as many again each time,
+on clusters of k-means where the residual of the others is, with terms on the inputs that smaller
+ones have asked for (``conditions`` says which of these may go).
 """
 
 import warnings

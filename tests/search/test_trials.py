@@ -156,7 +156,7 @@ class TestSequences:
         trials = trials_of(X, y + X[:, 1] ** 2)
         two = trials.tuned(trials.larger("scattered", trials.one_rule))
         learnt = two.evaluation.antecedent
-        three = Candidate((1, 1, 1), 3, (0, 1, 2), is_grown=True)
+        three = Candidate((1, 1, 1), 3, (0, 1, 2))
         found = rule_base(three, None, [Gaussian] * 3, trials.spacing, 0, two)
         centers, log_widths = found.groups[0].theta.reshape(2, 3, 3)
         Z, square = two.problem.rows.X, two.residual[:, 0] ** 2
@@ -169,19 +169,6 @@ class TestSequences:
         assert_array_equal(kept.reshape(2, -1), learnt.groups[0].theta)
         strengths = learnt.strengths(Z.T)
         assert_allclose(centers[:2, 2], strengths @ Z[:, 2] / strengths.sum(axis=1))
-
-    def test_clusters_anew_or_more_of_them_whichever_leaves_less_is_taken(self):
-        rng = np.random.default_rng(1)
-        X = rng.uniform(-1.0, 1.0, (400, 2))
-        peaks = sum(np.exp(-20.0 * ((X - at) ** 2).sum(axis=1)) for at in (-0.5, 0.5))
-        trials, ways = trials_of(X, peaks + 0.05 * rng.normal(size=400)), []
-        one = trials.larger("scattered", trials.one_rule)
-        for _ in range(2):
-            one = trials.larger("scattered", one)
-            other = trials.tuned(replace(one, is_grown=not one.is_grown))
-            assert trials.expected(trials.tuned(one)) < trials.expected(other)
-            ways.append(one.is_grown)
-        assert ways == [False, True]
 
     def test_a_weak_input_is_asked_for_once_the_strong_one_is_told(self, rng):
         X = rng.uniform(-1.0, 1.0, (600, 4))
