@@ -12,7 +12,6 @@ import numpy as np
 from skanfis.antecedent import (
     GridAntecedent,
     RuleTableAntecedent,
-    ScatteredAntecedent,
     TermGroup,
     TreeAntecedent,
 )
@@ -389,7 +388,7 @@ def random_scattered(rng, family, n_rules, inputs):
     theta[1:] += 0.2 * rng.normal(size=theta[1:].shape)
     # One of the rules looks at fewer inputs.
     theta[:, 0, 1:2] = np.nan
-    return ScatteredAntecedent.build(family, inputs, theta)
+    return RuleTableAntecedent.of_own_terms(family, inputs, theta)
 
 
 def random_table(rng, n_rules=5, inputs=3, families=(Gaussian, Bell, Gaussian)):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skanfis.antecedent import RuleTableAntecedent, ScatteredAntecedent, TermGroup
+from skanfis.antecedent import RuleTableAntecedent, TermGroup
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 
 from . import oracles
@@ -23,9 +23,13 @@ def scattered(family, n_rules, inputs, is_listed=True):
     g, inputs = np.random.default_rng(2), np.array(inputs)
     centers = g.uniform(LOW[inputs], HIGH[inputs], (n_rules, inputs.size))
     theta = family.from_center_and_width(centers, g.uniform(0.5, 1.5, centers.shape))
-    own = ScatteredAntecedent.build(family, inputs, theta)
-    # The same listed one by one, whose terms are in order on each input.
-    return RuleTableAntecedent(own.groups, own.rule_terms) if is_listed else own
+    own = RuleTableAntecedent.of_own_terms(family, inputs, theta)
+    if not is_listed:
+        return own
+    # With a rule that has terms of the others, those of each input are in order.
+    every = np.arange(inputs.size)
+    shared = own.table[(every + 1) % n_rules, every]
+    return RuleTableAntecedent(own.groups, np.vstack([own.table, shared]))
 
 
 def shared_places(family):

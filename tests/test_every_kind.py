@@ -14,7 +14,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.antecedent import GridAntecedent, ScatteredAntecedent, TreeAntecedent
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, TreeAntecedent
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, gradient_bounds, monotonicity
 from skanfis.exceptions import ForgottenRowsWarning
 from skanfis.export import export_json, fold, read_json
@@ -22,7 +22,7 @@ from skanfis.export.json_reader import parse_json
 from skanfis.learning import VariableProjection
 
 N_ROWS = 160
-KINDS = {"grid": GridAntecedent, "tree": TreeAntecedent, "scattered": ScatteredAntecedent}
+KINDS = {"grid": GridAntecedent, "tree": TreeAntecedent, "scattered": RuleTableAntecedent}
 pytestmark = [pytest.mark.parametrize("kind", KINDS)]
 # Weights that are given are not sought: a fit takes a tenth of the time.
 GIVEN = {"agreement": 0.01, "alpha": 1e-4, "solver": VariableProjection(stiffness=1e-3)}

@@ -3,14 +3,12 @@
 from .base import Antecedent, TermGroup, by_group, by_parameter, strongest_rules
 from .grid import GridAntecedent
 from .rule_table import RuleTableAntecedent
-from .scattered import ScatteredAntecedent
 from .tree import TreeAntecedent
 
 __all__ = [
     "Antecedent",
     "GridAntecedent",
     "RuleTableAntecedent",
-    "ScatteredAntecedent",
     "TermGroup",
     "TreeAntecedent",
     "by_group",

@@ -34,6 +34,11 @@ class TermGroup:
     theta: np.ndarray
 
     @property
+    def is_ordered(self) -> bool:
+        """Whether rules share the terms of an input, which then can be kept in order."""
+        return True
+
+    @property
     def n_terms(self):
         """Number of terms in the group."""
         return self.inputs.size
@@ -77,14 +82,17 @@ class Antecedent(ABC):
     """The IF parts of a set of rules over a sequence of terms; immutable."""
 
     groups: tuple[TermGroup, ...]
-    # Whether rules share the terms of an input, which then can be kept in order.
-    is_ordered: ClassVar[bool] = True
     # Of a term, in standardised units; what is narrower is crisp, and does not move.
     least_width: ClassVar[float] = 0.0
 
     def without_implied(self, tolerance) -> "Antecedent":
         """The same without terms that other terms of the same rule imply, but for so little."""
         return self
+
+    @property
+    def is_ordered(self) -> bool:
+        """Whether rules share the terms of an input, which then can be kept in order."""
+        return True
 
     @property
     def n_terms(self):

@@ -33,6 +33,22 @@ class RuleTableAntecedent(Antecedent):
 
     table: np.ndarray
 
+    @classmethod
+    def of_own_terms(cls, family, inputs, theta):
+        """Scattered rules: each with terms of its own, of one family, in the order of the rules.
+
+        ``inputs`` are the premise inputs; theta is (n_parameters, n_rules, n_premise_inputs), NaN
+        where a rule has no term.
+        """
+        has_term = np.isfinite(theta[0])
+        table = np.where(has_term, np.cumsum(has_term).reshape(has_term.shape) - 1, -1)
+        on = np.broadcast_to(inputs, has_term.shape)[has_term]
+        return cls((TermGroup(family, on, theta[:, has_term]),), table)
+
+    @property
+    def is_ordered(self):
+        return bool((self._contains.sum(axis=0) > 1.0).any())
+
     @property
     def n_rules(self):
         return self.table.shape[0]

@@ -29,7 +29,6 @@ TRUSTED_TYPES = [
     "skanfis.antecedent.base.TermGroup",
     "skanfis.antecedent.grid.GridAntecedent",
     "skanfis.antecedent.rule_table.RuleTableAntecedent",
-    "skanfis.antecedent.scattered.ScatteredAntecedent",
     "skanfis.antecedent.tree.TreeAntecedent",
     "skanfis.cluster.fuzzy_cmeans.FuzzyCMeans",
     "skanfis.cluster.subtractive.SubtractiveClustering",

@@ -15,7 +15,6 @@ from ..antecedent import (
     Antecedent,
     GridAntecedent,
     RuleTableAntecedent,
-    ScatteredAntecedent,
     TreeAntecedent,
 )
 from ..membership import FAMILIES
@@ -31,7 +30,6 @@ FORMAT = "skanfis-model"
 VERSION = 2
 KINDS: dict[type[Antecedent], str] = {
     GridAntecedent: "grid",
-    ScatteredAntecedent: "scattered",
     RuleTableAntecedent: "table",
     TreeAntecedent: "tree",
 }
@@ -349,16 +347,10 @@ def rule_base(kind, groups, table):
         counts = tuple(len(list(run)) for _, run in groupby(inputs))
         antecedent = GridAntecedent(groups, counts=counts)
         fits = prod(counts) == len(table) and len(counts) == np.unique(inputs).size
-    elif kind == "scattered":
-        antecedent = ScatteredAntecedent(groups, table)
-        fits = 0 < inputs.size == np.count_nonzero(table >= 0)
     elif kind == "tree":
         antecedent = _tree(groups, table)
     if not fits or not np.array_equal(antecedent.rule_terms, table):
         raise ValueError(f'the rules are not those of "rule_base": "{kind}".')
-    for column in table.T if kind == "scattered" else ():
-        if np.unique(inputs[column[column >= 0]]).size > 1:
-            raise ValueError("the terms at one place of the rules are of different inputs.")
     for r, row in enumerate(table):
         terms = row[row >= 0]
         if np.unique(terms).size < terms.size:

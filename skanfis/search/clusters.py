@@ -8,7 +8,7 @@ those that have learnt where these leave most.
 
 import numpy as np
 
-from ..antecedent import GridAntecedent, ScatteredAntecedent
+from ..antecedent import GridAntecedent, RuleTableAntecedent
 from ..learning.data import StandardisedData
 from .grid import terms_by_input
 from .sample import counting_weight, representative_rows
@@ -82,8 +82,8 @@ def _scattered(families, terms):
     for family in dict.fromkeys(families[j] for j in terms):
         inputs = [j for j in terms if families[j] is family]
         theta = np.stack([terms[j] for j in inputs], axis=2)
-        own = ScatteredAntecedent.build(family, inputs, theta)
+        own = RuleTableAntecedent.of_own_terms(family, inputs, theta)
         groups += own.groups
         tables.append(np.where(own.table < 0, -1, own.table + n_terms))
         n_terms += own.n_terms
-    return ScatteredAntecedent(tuple(groups), np.hstack(tables))
+    return RuleTableAntecedent(tuple(groups), np.hstack(tables))

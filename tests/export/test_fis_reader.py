@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, ScatteredAntecedent
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.export import read_fis
 from skanfis.export.fis.reader import parse_fis
 
@@ -62,7 +62,7 @@ def test_means_what_was_written_by_hand():
         ([2, 2], [(1, 1), (1, 2), (2, 1), (2, 2)], GridAntecedent),
         ([2, 2], [(2, 1), (1, 1), (1, 2), (2, 2)], GridAntecedent),  # in another order
         ([2, 0, 2], [(1, 0, 1), (1, 0, 2), (2, 0, 1), (2, 0, 2)], GridAntecedent),
-        ([2, 2], [(1, 1), (2, 2)], ScatteredAntecedent),
+        ([2, 2], [(1, 1), (2, 2)], RuleTableAntecedent),
         ([2, 2], [(1, 1), (1, 2), (2, 1)], RuleTableAntecedent),
     ],
 )

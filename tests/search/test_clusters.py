@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
-from skanfis.antecedent import ScatteredAntecedent
+from skanfis.antecedent import RuleTableAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 from skanfis.search.clusters import clustered_antecedent
@@ -56,7 +56,7 @@ class TestRules:
         X, y, labels, _ = blobs(rng)
         rows = StandardisedData.of(X, y)
         antecedent = rules_of(MEMBERSHIPS[name], rows, by_k_means)
-        assert isinstance(antecedent, ScatteredAntecedent)
+        assert isinstance(antecedent, RuleTableAntecedent)
         strongest = antecedent.strengths(rows.read(slice(None))[0]).argmax(axis=0)
         # The same partition under other names.
         assert len(set(zip(strongest.tolist(), labels.tolist(), strict=True))) == 3

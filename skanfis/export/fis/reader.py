@@ -290,8 +290,6 @@ def _model(inputs, outputs, antecedents, consequents):
     premises = np.flatnonzero(antecedents.any(axis=0))
     # Input and number of each term that a rule looks at, input by input.
     places: list = [(j, k) for j, own in enumerate(antecedents.T) for k in np.unique(own) if k > 0]
-    if kind == "scattered":
-        places = [(j, rule[j]) for rule in antecedents for j in premises if rule[j] > 0]
     groups = groups_of((j, *inputs[j].terms[k - 1]) for j, k in places)
     table = np.full(antecedents.shape, -1)
     for t, (j, k) in enumerate(places):
@@ -329,7 +327,7 @@ def _kind_and_order(inputs, antecedents):
     """Which rule base the rules are, and where its first, second, ... stand in the file.
 
     A grid: all combinations, in C order, of two or more terms of one family, in order, on every
-    input that rules look at. Scattered: all rules have terms of their own, of one family.
+    input that rules look at.
     """
     every = np.arange(len(antecedents))
     used = [(one, own) for one, own in zip(inputs, antecedents.T, strict=True) if own.any()]
@@ -344,6 +342,4 @@ def _kind_and_order(inputs, antecedents):
         order = np.unique(antecedents, axis=0, return_index=True)[1]
         if every.size == order.size == prod(map(len, terms)):
             return "grid", order
-    n_used = sum(map(len, terms))
-    is_own = n_used == np.count_nonzero(antecedents) and len(set().union(*families)) == 1
-    return "scattered" if is_own and n_used else "table", every
+    return "table", every
