@@ -153,12 +153,20 @@ class Antecedent(ABC):
 
         Those that are left are listed one by one. Terms that no rule uses go too.
         """
-        from .rule_table import RuleTableAntecedent  # which is built on this module
-
         table, every = np.delete(self.rule_terms, rules, axis=0), np.arange(self.n_terms)
         unused = np.setdiff1d(every, table)
-        left = RuleTableAntecedent(self.groups, table).without_terms(unused)
-        return left, np.delete(every, unused)
+        return self._listed(table, unused), np.delete(every, unused)
+
+    def without_terms(self, terms) -> "Antecedent":
+        """The same rules without some terms, by position; listed one by one."""
+        return self._listed(self.rule_terms, terms)
+
+    def _listed(self, table, terms):
+        from .rule_table import RuleTableAntecedent  # which is built on this module
+
+        kept, place = np.delete(np.arange(self.n_terms), terms), np.full(self.n_terms + 1, -1)
+        place[kept] = np.arange(kept.size)
+        return RuleTableAntecedent(self._groups_with(kept), place[table])
 
     def _groups_with(self, terms):
         """The groups with these terms alone."""

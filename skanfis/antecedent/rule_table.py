@@ -1,6 +1,6 @@
 """Rules listed one by one over terms that they share: imported, pruned, of mixed families."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -100,13 +100,6 @@ class RuleTableAntecedent(Antecedent):
         place, columns = {key: k for k, key in enumerate(order)}, sorted({j for j, _ in order})
         table = [[place[j, rule[j]] if j in rule else -1 for j in columns] for rule in rules]
         return RuleTableAntecedent(tuple(groups), np.array(table)), [terms for _, terms in order]
-
-    def without_terms(self, terms):
-        """The same rules without some terms, by position."""
-        kept = np.delete(np.arange(self.n_terms), terms)
-        place = np.full(self.n_terms + 1, -1)
-        place[kept] = np.arange(kept.size)
-        return replace(self, groups=self._groups_with(kept), table=place[self.table])
 
     def normalise(self, log_mu):
         strengths = self._contains @ log_mu

@@ -33,13 +33,19 @@ def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
     Half of them go at a time, as what is left is worth more then. If the evidence is less in the
     end, all stay.
     """
-    found = tuned
+    rows, inputs, found = tuned.problem.rows, tuned.problem.consequent_inputs, tuned
     while (terms := _needless(found)).size:
-        found = _without(found, terms)
+        start, now = (
+            one.antecedent.without_terms(terms) for one in (found.problem, found.evaluation)
+        )
+        problem = SeparableProblem(rows, start, tuned.penalty, consequent_inputs=inputs)
+        premise = Premise.of(start, *rows.inputs.box)
+        evaluation = problem.evaluate(now.parameters)
+        at = premise.displacement(now.parameters)
+        found = replace(found, problem=problem, evaluation=evaluation, displacement=at)
     if found is tuned:
         return tuned
-    premise = Premise.of(found.problem.antecedent, *found.problem.rows.inputs.box)
-    found = turned(found, premise, found.penalty, free)
+    found = turned(found, premise, tuned.penalty, free)
     is_better = found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
     return found if is_better else tuned
 
@@ -75,12 +81,3 @@ def term_losses(tuned):
         half = root @ (design @ (change * weight).T)
         found += (change * (change - 2.0 * (y - prediction))) @ weight - np.sum(half**2, axis=0)
     return found * tuned.posterior.n_rows / tuned.posterior.noise_variance
-
-
-def _without(tuned, terms):
-    """The same without some terms; the others stand where they did."""
-    problem, now = tuned.problem, tuned.evaluation.antecedent.without_terms(terms)
-    start, inputs = problem.antecedent.without_terms(terms), problem.consequent_inputs
-    fewer = SeparableProblem(problem.rows, start, tuned.penalty, consequent_inputs=inputs)
-    at = Premise.of(start, *problem.rows.inputs.box).displacement(now.parameters)
-    return replace(tuned, problem=fewer, evaluation=fewer.evaluate(now.parameters), displacement=at)

@@ -285,8 +285,9 @@ def _numbers_of_terms(entry, text, variables, kind, lowest):
 
 
 def _model(inputs, outputs, antecedents, consequents):
-    kind, rows = _kind_and_order(inputs, antecedents)
-    antecedents, consequents = antecedents[rows], consequents[rows]
+    order = _places_of_grid(inputs, antecedents)
+    if order is not None:
+        antecedents, consequents = antecedents[order], consequents[order]
     premises = np.flatnonzero(antecedents.any(axis=0))
     # Input and number of each term that a rule looks at, input by input.
     places: list = [(j, k) for j, own in enumerate(antecedents.T) for k in np.unique(own) if k > 0]
@@ -294,7 +295,8 @@ def _model(inputs, outputs, antecedents, consequents):
     table = np.full(antecedents.shape, -1)
     for t, (j, k) in enumerate(places):
         table[antecedents[:, j] == k, j] = t
-    antecedent = rule_base(kind, groups, table if kind == "table" else table[:, premises])
+    kind = "table" if order is None else "grid"
+    antecedent = rule_base(kind, groups, table[:, premises])
     names = [distinct(variable.names) for variable in inputs]
     # Constants beside linear consequents have no slopes.
     n_basis = max(len(term) for output in outputs for term in output.terms)
@@ -323,23 +325,17 @@ def _model(inputs, outputs, antecedents, consequents):
     )
 
 
-def _kind_and_order(inputs, antecedents):
-    """Which rule base the rules are, and where its first, second, ... stand in the file.
+def _places_of_grid(inputs, antecedents):
+    """Where the first, second, ... rule of a grid stands in the file; None where it is none.
 
-    A grid: all combinations, in C order, of two or more terms of one family, in order, on every
+    A grid has all combinations, in C order, of two or more terms of one family, in order, on every
     input that rules look at.
     """
-    every = np.arange(len(antecedents))
     used = [(one, own) for one, own in zip(inputs, antecedents.T, strict=True) if own.any()]
     terms = [[one.terms[k - 1] for k in np.unique(own) if k > 0] for one, own in used]
-    families = [{family for family, _ in of_input} for of_input in terms]
-    places = [[theta[0] for _, theta in of_input] for of_input in terms]
-    has_all = all(own.min() > 0 for _, own in used)
-    if has_all and all(
-        len(own) > 1 and len(of_input) == 1 and np.all(np.diff(own) > 0.0)
-        for own, of_input in zip(places, families, strict=True)
-    ):
-        order = np.unique(antecedents, axis=0, return_index=True)[1]
-        if every.size == order.size == prod(map(len, terms)):
-            return "grid", order
-    return "table", every
+    for of_input, (_, own) in zip(terms, used, strict=True):
+        places, families = [theta[0] for _, theta in of_input], {family for family, _ in of_input}
+        if not own.all() or len(places) < 2 or len(families) > 1 or np.any(np.diff(places) <= 0.0):
+            return None
+    order = np.unique(antecedents, axis=0, return_index=True)[1]
+    return order if len(antecedents) == order.size == prod(map(len, terms)) else None
