@@ -32,9 +32,6 @@ class _Boxes(NamedTuple):
     def of(self, chosen):
         return _Boxes(*(one[..., chosen] for one in self))
 
-    def with_others(self, others):
-        return _Boxes(*(np.concatenate(pair, -1) for pair in zip(self, others, strict=True)))
-
     @property
     def is_point(self):
         """Which boxes cannot be split any more."""
@@ -84,11 +81,12 @@ def largest(
         if attained[top] > best:
             best, where = float(attained[top]), points[:, top].copy()
         found = _Boxes(lows, highs, bound, gain)
-        waiting = found if waiting is None else waiting.with_others(found)
+        if waiting is not None:
+            found = _Boxes(*(np.concatenate(both, -1) for both in zip(waiting, found, strict=True)))
         enough = best + tolerance if until is None else max(best + tolerance, until)
-        done = (waiting.bound <= enough) | waiting.is_point
-        discarded = max(discarded, np.max(waiting.bound[done], initial=-np.inf))
-        waiting = waiting.of(~done)
+        done = (found.bound <= enough) | found.is_point
+        discarded = max(discarded, np.max(found.bound[done], initial=-np.inf))
+        waiting = found.of(~done)
         is_decided = until is not None and best > until
         if waiting.bound.size == 0 or n_boxes >= max_boxes or is_decided:
             break

@@ -55,11 +55,10 @@ def grown_antecedent(families, tuned, label, premise_inputs):
     added = _terms_at(families, premise_inputs, rows.X, masses)
     strengths, _ = smaller.strengths_and_shares(np.ascontiguousarray(rows.X.T))
     learnt = _terms_at(families, premise_inputs, rows.X, weight * strengths)
-    table = smaller.rule_terms
     for j, terms in terms_by_input(smaller).items():
-        on_input = np.append(smaller.term_inputs == j, False)[table]
-        learnt[j] = np.full_like(learnt[j], np.nan)
-        learnt[j][:, on_input.any(axis=1)] = terms
+        has_term = np.append(smaller.term_inputs == j, False)[smaller.rule_terms].any(axis=1)
+        learnt[j][:] = np.nan
+        learnt[j][:, has_term] = terms
     terms = {j: np.concatenate([learnt[j], added[j]], axis=1) for j in premise_inputs}
     return _scattered(families, terms)
 

@@ -1,16 +1,8 @@
 r"""Conditions that scattered rules can do without, as far as the evidence tells.
 
-Without a condition of truth mu, rule r is 1 / mu times as strong before strengths are normalised.
-With q = 1 / mu - 1 the prediction changes by
-
-    delta = q w_r (f_r - y) / (1 + q w_r) ,
-
-and twice the cost, once the consequents are solved for anew, by
-
-    |delta|^2 - 2 <residual, delta> - |L^-1 Phi' delta|^2 ,
-
-L being the factor of their normal equations. Over the noise's variance, that is what the evidence
-loses, in -2 log p.
+Without a condition of truth mu, rule r is 1 / mu times as strong before strengths are normalised:
+with q = 1 / mu - 1 the prediction changes by delta = q w_r (f_r - y) / (1 + q w_r). The cost of
+that, once the consequents are solved for anew, is what the condition is worth.
 """
 
 from dataclasses import replace
@@ -35,9 +27,8 @@ def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
     """
     rows, inputs, found = tuned.problem.rows, tuned.problem.consequent_inputs, tuned
     while (terms := _needless(found)).size:
-        start, now = (
-            one.antecedent.without_terms(terms) for one in (found.problem, found.evaluation)
-        )
+        start = found.problem.antecedent.without_terms(terms)
+        now = found.evaluation.antecedent.without_terms(terms)
         problem = SeparableProblem(rows, start, tuned.penalty, consequent_inputs=inputs)
         premise = Premise.of(start, *rows.inputs.box)
         evaluation = problem.evaluate(now.parameters)

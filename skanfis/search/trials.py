@@ -121,14 +121,12 @@ class Trials:
     def larger(self, kind, candidate) -> Candidate | None:
         """The next of a kind: of those that are tried, the one that promises most; or None."""
         smaller = self.tuned(candidate)
-        tried = filter(self._is_small, self._tried(kind, candidate, smaller))
-        problems = {one: self._problem(one, smaller) for one in tried}
-        # Of rows that are alike but for a few, there are fewer clusters than were asked for.
-        begun = {
-            one: self._train(problem, turns=0)
-            for one, problem in problems.items()
-            if problem.antecedent.n_rules == one.n_rules
-        }
+        begun = {}
+        for one in filter(self._is_small, self._tried(kind, candidate, smaller)):
+            problem = self._problem(one, smaller)
+            # Of rows that are alike but for a few, there are fewer clusters than were asked for.
+            if problem.antecedent.n_rules == one.n_rules:
+                begun[one] = self._train(problem, turns=0)
         self._begun |= begun
         return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
 
@@ -171,10 +169,11 @@ class Trials:
 
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
+        plan = self.plan
         if candidate not in self._found:
-            if candidate.slope_worth is not None:
-                trained = self.tuned(replace(candidate, slope_worth=None))
-                found = with_sparse_slopes(trained, self.plan.free, candidate.slope_worth)
+            if candidate.has_fewer_slopes:
+                trained = self.tuned(replace(candidate, has_fewer_slopes=False))
+                found = with_sparse_slopes(trained, plan.free)
             elif candidate.n_rules == 1:
                 found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
@@ -183,9 +182,8 @@ class Trials:
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 found = self._train(self._begun[candidate].problem, turns)
                 # To be held in order, all rules need a term on an input.
-                is_free = self.plan.premises_move and self.plan.held is None
-                if candidate.n_clusters and is_free:
-                    found = with_fewer_conditions(found, self.plan.free)
+                if candidate.n_clusters and plan.premises_move and plan.held is None:
+                    found = with_fewer_conditions(found, plan.free)
             self._found[candidate] = found
         return self._found[candidate]
 
