@@ -50,7 +50,7 @@ _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
 # The first turn of terms without bounds goes far.
 _UNBOUNDED_ITERATIONS = 25
 # Of agreement: less of a rise is not worth a training.
-_HALVINGS, _LEAST_RAISE = 8, 2.0
+_MOST_RAISES, _HALVINGS, _LEAST_RAISE = 3, 8, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,19 +224,25 @@ def cost_of(tuned: Tuned) -> int:
 def with_most_agreement(tuned: Tuned, premise: Premise, free, room: float) -> Tuned:
     """The same with as much agreement as keeps the squared error within ``room`` times itself.
 
-    The consequents alone tell how much that is; then the premises follow.
+    The consequents alone tell how much that is at least; then the premises follow, which makes room
+    for more, or for less.
     """
     is_known = np.isfinite(tuned.expected_error)
     if "agreement" not in free or not tuned.displacement.size or room <= 1.0 or not is_known:
         return tuned
-    most = room * tuned.expected_error
-    agreement = _most_agreement(tuned, most)
-    if agreement < _LEAST_RAISE * tuned.penalty.agreement:
-        return tuned
     others = [key for key in free if key != "agreement"]
-    penalty = replace(tuned.penalty, agreement=agreement)
-    found = turned(tuned, premise, penalty, others, steps=0)
-    return found if found.expected_error <= most else tuned
+    most, best, agreement = room * tuned.expected_error, tuned, 0.0
+    for _ in range(_MOST_RAISES):
+        agreement = agreement or _most_agreement(best, most)
+        if agreement < _LEAST_RAISE * best.penalty.agreement:
+            break
+        penalty = replace(best.penalty, agreement=agreement)
+        found = turned(best, premise, penalty, others, steps=0)
+        if found.expected_error <= most:
+            best, agreement = found, 0.0
+        else:
+            agreement = float(np.sqrt(best.penalty.agreement * agreement))
+    return best
 
 
 def with_sparse_slopes(tuned: Tuned, free) -> Tuned:

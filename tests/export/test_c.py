@@ -284,13 +284,13 @@ def test_grid_takes_an_exponential_per_term(rng):
 
 def test_scattered_rules_take_an_exponential_per_rule_and_what_their_terms_do():
     model = MODELS["scattered on two inputs, order 0, 2 outputs"]
-    # Three rules of two bells: a logarithm of |u| and one of 1 + exp; u, twice log |u|, the
+    # Three rules of five bells: a logarithm of |u| and one of 1 + exp; u, twice log |u|, the
     # exponent. The shares; two values.
-    inside = np.array([3 + 6, 2 * 6, 0, 6 * 3 + 3 + 3 * 2, 1])
+    inside = np.array([3 + 5, 2 * 5, 0, 5 * 3 + 3 + 3 * 2, 1])
     np.testing.assert_array_equal(cost_of(model, "nan"), inside)
     # Of a slope the sigmoid takes one exponential and a division, by u another; u, twice log |u|,
     # the exponent, three more and the way ahead; then the mean, and values twice.
-    outside = [6, 6, 0, 6 * 7 + 3 + 2 * 3 * 2 + 3 + 2, 2 * 6 + 3]
+    outside = [5, 5, 0, 5 * 7 + 3 + 2 * 3 * 2 + 3 + 2, 2 * 5 + 3]
     np.testing.assert_array_equal(cost_of(model, "linear"), inside + outside)
 
 
