@@ -79,7 +79,9 @@ def grid_antecedent(families, counts, spacing: Spacing, known=None):
             thetas.append(terms[j])
             continue
         if j in terms:
-            centers = _with_one_more(np.sort(terms[j][0]))
+            places = np.sort(terms[j][0])
+            widest = int(np.argmax(np.diff(places)))
+            centers = np.insert(places, widest + 1, places[widest : widest + 2].mean())
         else:
             centers = spacing.centers(j, counts[j])
         thetas.append(families[j].start(centers, _distance(np.diff(centers)), OVERLAP))
@@ -99,9 +101,3 @@ def terms_by_input(antecedent):
         for group in antecedent.groups
         for j in np.unique(group.inputs)
     }
-
-
-def _with_one_more(places):
-    """Places, and the middle of the widest gap."""
-    widest = int(np.argmax(np.diff(places)))
-    return np.insert(places, widest + 1, 0.5 * (places[widest] + places[widest + 1]))

@@ -12,14 +12,14 @@ from sklearn.utils.validation import has_fit_parameter
 
 from .._validation import warn_user
 from ..exceptions import ConstantInputWarning, UnderdeterminedWarning
-from ..learning.data import StandardisedData
+from ..learning.data import StandardisedData, fingerprint
 from ..membership import Gaussian
 from ..model import TSKModel
 from ..naming import default_term_names
 from .candidates import KINDS
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
-from .sample import effective_weight, n_distinct_inputs
+from .sample import effective_weight
 from .search import StructureSearch
 from .size import check_columns_fit, check_grid_fits, check_rules_fit, term_counts
 from .start import Start, imported_antecedent, tuned_start
@@ -150,7 +150,7 @@ class StructureRequest(Plan):
         """Warn where there is less than one distinct row per consequent parameter."""
         n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant[self.consequent_inputs])
         n_columns = n_rules * n_basis
-        n_distinct = n_distinct_inputs(rows, enough=n_columns)
+        n_distinct = np.unique(rows.numbers(lambda Z, _: fingerprint(Z))).size
         if n_distinct < n_columns:
             warn_user(
                 f"{n_rules} rule{'s' if n_rules > 1 else ''} with {n_basis} coefficients each are "

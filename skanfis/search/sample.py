@@ -8,22 +8,11 @@ apart: calibration tables repeat their inputs, and each repeat is information on
 
 import numpy as np
 
-from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import Scale, StandardisedData, fingerprint, place_in_sample
 from ..learning.sampling import SAMPLE_ROWS
 
 # Of standardised rows, digits that rounding leaves alone where units change.
 DIGITS = 9
-
-
-def n_distinct_inputs(rows: StandardisedData, enough: int) -> int:
-    """How many different inputs the rows have, counted up to ``enough``."""
-    inputs = np.empty(0)
-    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
-        inputs = np.union1d(inputs, fingerprint(rows.read(part)[0]))
-        if inputs.size >= enough:
-            return enough
-    return inputs.size
 
 
 def effective_weight(rows: StandardisedData):

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.learning.data import StandardisedData
 from skanfis.search import representative_rows
-from skanfis.search.sample import effective_weight, n_distinct_inputs, search_sample
+from skanfis.search.sample import effective_weight, search_sample
 
 
 def many(rng, n_rows=300):
@@ -53,16 +53,6 @@ class TestRepresentativeRows:
 
 
 class TestCounts:
-    def test_inputs_are_counted_once_as_far_as_enough(self, rng):
-        X, y, times = many(rng)
-        rows = StandardisedData.of(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0))
-        n_distinct = len(np.unique(X, axis=0))
-        assert n_distinct_inputs(rows, 10_000) == n_distinct
-        assert n_distinct_inputs(rows, n_distinct - 5) == n_distinct - 5
-        X = np.tile(rng.normal(size=3), (40, 1))
-        X[:, 1] += 1e-9 * np.arange(40)
-        assert n_distinct_inputs(StandardisedData.of(X, np.zeros((40, 1))), 100) == 40
-
     @pytest.mark.parametrize("unit", [1e-300, 1e-6, 0.5])
     def test_weights_below_one_count_by_the_precision_they_leave(self, rng, unit):
         # Kish: of equal weights every row counts; of a half with next to none, half of them.
