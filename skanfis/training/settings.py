@@ -5,7 +5,7 @@ from sklearn.utils.validation import has_fit_parameter
 
 from .._validation import feature_indices
 from ..learning import SOLVERS, Solver
-from ..membership import membership_families
+from ..membership import Gaussian, membership_families
 from ..model import TSKModel
 from ..search import StructureRequest, check_inputs
 
@@ -28,7 +28,8 @@ def given_weights(estimator):
 def structure_request(estimator, names, sample_weight=None):
     """What training starts from, with all names of columns and families resolved."""
     partition = _partition(estimator, names, sample_weight)
-    is_default = isinstance(estimator.mf, str) and estimator.mf == "gaussian"
+    families = membership_families(estimator.mf, names)
+    is_default = all(family is Gaussian for family in families)
     if isinstance(partition, str) and partition == "tree" and not is_default:
         raise ValueError(
             f"mf={estimator.mf!r} means nothing to partition='tree', whose rules are sides of "
@@ -45,7 +46,7 @@ def structure_request(estimator, names, sample_weight=None):
     return StructureRequest(
         n_mfs=estimator.n_mfs,
         partition=partition,
-        families=membership_families(estimator.mf, names),
+        families=families,
         order=estimator.order,
         premise_inputs=feature_indices(estimator.premise_features, names, "premise_features"),
         consequent_inputs=consequent if estimator.order == 1 else consequent[:0],
