@@ -23,7 +23,7 @@ from typing import Self
 import numpy as np
 
 from ._validation import rows_by_name
-from .antecedent import Antecedent, RuleTableAntecedent, TreeAntecedent, by_group, strongest_rules
+from .antecedent import Antecedent, RuleTableAntecedent, by_group, strongest_rules
 from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import rule_outputs
 from .naming import default_output_names, default_term_names
@@ -342,8 +342,7 @@ class TSKModel:
         if not isinstance(self.antecedent, RuleTableAntecedent):
             return self
         table, made = self.antecedent.with_one_term_each(self.input_names)
-        is_tree = isinstance(self.antecedent, TreeAntecedent)
-        if not is_tree and max(map(len, made), default=1) == 1:
+        if type(self.antecedent) is RuleTableAntecedent and max(map(len, made), default=1) == 1:
             return self
         names = tuple(" and ".join(self.term_names[t] for t in terms) for terms in made)
         changes = {"antecedent": table, "initial_antecedent": table, "term_names": names}

@@ -155,17 +155,15 @@ class Antecedent(ABC):
         """
         table, every = np.delete(self.rule_terms, rules, axis=0), np.arange(self.n_terms)
         unused = np.setdiff1d(every, table)
-        return self._listed(table, unused), np.delete(every, unused)
+        return self.without_terms(unused, table), np.delete(every, unused)
 
-    def without_terms(self, terms) -> "Antecedent":
-        """The same rules without some terms, by position; listed one by one."""
-        return self._listed(self.rule_terms, terms)
-
-    def _listed(self, table, terms):
+    def without_terms(self, terms, table=None) -> "Antecedent":
+        """The same rules, or those of a table, listed one by one without some terms."""
         from .rule_table import RuleTableAntecedent  # which is built on this module
 
         kept, place = np.delete(np.arange(self.n_terms), terms), np.full(self.n_terms + 1, -1)
         place[kept] = np.arange(kept.size)
+        table = self.rule_terms if table is None else table
         return RuleTableAntecedent(self._groups_with(kept), place[table])
 
     def _groups_with(self, terms):

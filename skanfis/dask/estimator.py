@@ -149,13 +149,10 @@ class DaskANFISRegressor(ANFISRegressor):
         # Nothing is asked of the posterior, which is most of a model's bytes.
         printed = Sentences.of(self.model_).printed
         model, printed = (replace(one, posterior=None) for one in (self.model_, printed))
-        of_rows = partial(_rule_sums, model=model, printed=printed)
-        sums = rows.reduce(of_rows, add_each)
+        sums = rows.reduce(
+            lambda own: rule_sums(model, printed, own.targets, own.X, own.y, own.weights), add_each
+        )
         return Readability(self.model_, measures_of(rows.targets, sums))
-
-
-def _rule_sums(rows, model, printed):
-    return rule_sums(model, printed, rows.targets, rows.X, rows.y, rows.weights)
 
 
 def _predicted(block, model, names, is_deviation):

@@ -226,17 +226,15 @@ class ClusterRows:
 
     def reduce(self, of_rows, merge):
         """What ``of_rows`` makes of the rows of every partition, merged two by two."""
-        of_loaded = partial(_on_scales, inputs=self.inputs, targets=self.targets, of_rows=of_rows)
-        return reduce_partitions(self.partitions, of_loaded, merge)
+        scales = {"inputs": self.inputs, "targets": self.targets}
+        return reduce_partitions(
+            self.partitions, lambda rows: of_rows(replace(rows, **scales)), merge
+        )
 
     def sum(self, one_pass, block_rows, map_ordered=map):
         """Sums of a pass over all rows; the workers are the cluster's, not ``map_ordered``."""
         del map_ordered
         return self.reduce(methodcaller("sum", one_pass, block_rows), add_each)
-
-
-def _on_scales(rows, inputs, targets, of_rows):
-    return of_rows(replace(rows, inputs=inputs, targets=targets))
 
 
 def _describe(rows, layout):

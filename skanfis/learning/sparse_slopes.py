@@ -15,12 +15,15 @@ from scipy import linalg
 
 from .evidence import WORTH, Laplace
 
+# What a slope that is kept must be worth, in -2 log p: anything, or as much as other numbers.
+SLOPE_WORTHS = (0.0, WORTH)
 
-def sparse_slopes(posterior: Laplace, coefficients):
+
+def sparse_slopes(posterior: Laplace, coefficients, worth):
     """Inputs, and the rules that have one slope by each; and those that have none.
 
     They are ``Penalty.common`` and ``Penalty.absent``; ``coefficients`` are the local ones,
-    (n_columns, n_outputs). A slope that is kept is worth as much as other numbers.
+    (n_columns, n_outputs), and ``worth`` is what a slope that is kept must be worth.
     """
     line, unit = posterior.line, posterior.noise_variance / posterior.n_rows
     identity, n_outputs = np.eye(len(coefficients)), coefficients.shape[1]
@@ -35,7 +38,7 @@ def sparse_slopes(posterior: Laplace, coefficients):
         while rules.size > 1:
             slopes = line.of_slopes(j, rules)
             contrasts = linalg.helmert(rules.size) @ slopes
-            if _loss(state, contrasts) < WORTH * contrasts.shape[0] * n_outputs:
+            if _loss(state, contrasts) < worth * contrasts.shape[0] * n_outputs:
                 break
             rules = np.delete(rules, _farthest(state, slopes))
         if rules.size > 1:
@@ -45,7 +48,7 @@ def sparse_slopes(posterior: Laplace, coefficients):
             alone = [_loss(state, line.of_slopes(j, rule)) for rule in every[:, None]]
             rules = every[[int(np.argmin(alone))]]
         slope = line.of_slopes(j, rules[:1])
-        if _loss(state, slope) < WORTH * n_outputs:
+        if _loss(state, slope) < worth * n_outputs:
             absent.append((j, tuple(rules.tolist())))
             state = _given(state, slope)
         elif rules.size > 1:

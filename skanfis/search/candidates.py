@@ -36,7 +36,7 @@ class Candidate:
     n_clusters: int = 0  # of scattered rules
     inputs: tuple[int, ...] = ()  # on which these have terms
     splits: tuple[Split, ...] = ()  # of a tree, one after the other
-    has_fewer_slopes: bool = False  # those that are worth a number (``sparse_slopes``)
+    slope_worth: float | None = None  # of slopes that are kept (``sparse_slopes``); None: all are
     has_all_slopes: bool = False  # also where rows are few (``lasso``)
 
     @property
@@ -71,7 +71,9 @@ class Candidate:
         elif self.n_rules == 1:
             words = "one rule"
         words += ", slopes by all inputs" if self.has_all_slopes else ""
-        return words + (", fewer slopes" if self.has_fewer_slopes else "")
+        if self.slope_worth is not None:
+            words += ", fewest slopes" if self.slope_worth else ", fewer slopes"
+        return words
 
     def with_more_terms(self, j):
         """The grid with one more term on an input."""

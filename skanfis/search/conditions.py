@@ -22,11 +22,18 @@ _FARTHEST = 300.0
 def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
     """The same without conditions that are worth less than a number, and trained on.
 
-    Half of them go at a time, as what is left is worth more then. If the evidence is less in the
-    end, all stay.
+    Half of them go at a time, as what is left is worth more then; every rule keeps one. If the
+    evidence is less in the end, all stay.
     """
     rows, inputs, found = tuned.problem.rows, tuned.problem.consequent_inputs, tuned
-    while (terms := _needless(found)).size:
+    while True:
+        loss = term_losses(found)
+        for own in (row[row >= 0] for row in found.evaluation.antecedent.rule_terms):
+            loss[own[np.argmax(loss[own])]] = np.inf
+        n_needless = np.count_nonzero(loss < WORTH * tuned.problem.n_outputs)
+        if n_needless == 0:
+            break
+        terms = np.argsort(loss, kind="stable")[: (n_needless + 1) // 2]
         start = found.problem.antecedent.without_terms(terms)
         now = found.evaluation.antecedent.without_terms(terms)
         problem = SeparableProblem(rows, start, tuned.penalty, consequent_inputs=inputs)
@@ -39,17 +46,6 @@ def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
     found = turned(found, premise, tuned.penalty, free)
     is_better = found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
     return found if is_better else tuned
-
-
-def _needless(tuned):
-    """Half of the terms that are worth less than a number; every rule keeps one."""
-    table = tuned.evaluation.antecedent.rule_terms
-    loss = term_losses(tuned)
-    for own in (row[row >= 0] for row in table):
-        loss[own[np.argmax(loss[own])]] = np.inf
-    order = np.argsort(loss, kind="stable")
-    n_needless = np.count_nonzero(loss < WORTH * tuned.problem.n_outputs)
-    return order[: (n_needless + 1) // 2]
 
 
 def term_losses(tuned):

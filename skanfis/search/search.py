@@ -13,6 +13,7 @@ import numpy as np
 
 from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_PER_CONSEQUENT
+from ..learning.sparse_slopes import SLOPE_WORTHS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, judging_folds, n_groups
 from .start import Start, started
@@ -90,11 +91,16 @@ class StructureSearch:
 
     def _judge_sparse_slopes(self, one, variance):
         """Judge a candidate with fewer slopes; it counts if there are, and its rules hold alone."""
-        fewer = [replace(each, has_fewer_slopes=True) for each in (one.candidate, *one.in_folds)]
-        simpler = self._judge(fewer[0], fewer[1:])
         most = max((1.0 + self.simplicity) ** 2 * one.squared_error_of_rules, variance)
-        if simpler.cost >= one.cost or simpler.squared_error_of_rules > most:
-            self.judged.remove(simpler)
+        soonest = one
+        for worth in SLOPE_WORTHS:
+            in_folds = [replace(like, slope_worth=worth) for like in one.in_folds]
+            simpler = self._judge(replace(one.candidate, slope_worth=worth), in_folds)
+            holds = simpler.cost < one.cost and simpler.squared_error_of_rules <= most
+            if holds and simpler is chosen([simpler, soonest], variance):
+                soonest = simpler
+            else:
+                self.judged.remove(simpler)
 
     def _judge(self, candidate, in_folds):
         """What a candidate leaves of the rows that its like in the folds have not seen."""

@@ -16,6 +16,7 @@ from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
+from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
 from .sample import effective_weight, search_sample
@@ -94,12 +95,13 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best, is_unbounded = freed, True
-    room, sparse = 1.0, with_sparse_slopes(best, free) if turns else best
-    error = min(best.expected_error, sparse.expected_error)
+    room, worths = 1.0, SLOPE_WORTHS if turns else ()
+    sparse = [with_sparse_slopes(best, free, worth) for worth in worths]
+    error = min(one.expected_error for one in (best, *sparse))
     if turns and 0.0 < error < np.inf:
         variance = float(np.count_nonzero(~rows.targets.is_constant))
         most = tolerated(error, variance, simplicity)
-        best = sparse if sparse.expected_error <= most else best
+        best = next(one for one in (*sparse[::-1], best) if one.expected_error <= most)
         room = most / best.expected_error
     return started(best, plan, room, [_as_given(best)], is_unbounded)
 

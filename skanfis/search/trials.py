@@ -169,11 +169,10 @@ class Trials:
 
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""
-        plan = self.plan
         if candidate not in self._found:
-            if candidate.has_fewer_slopes:
-                trained = self.tuned(replace(candidate, has_fewer_slopes=False))
-                found = with_sparse_slopes(trained, plan.free)
+            if candidate.slope_worth is not None:
+                trained = self.tuned(replace(candidate, slope_worth=None))
+                found = with_sparse_slopes(trained, self.plan.free, candidate.slope_worth)
             elif candidate.n_rules == 1:
                 found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
@@ -182,8 +181,8 @@ class Trials:
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 found = self._train(self._begun[candidate].problem, turns)
                 # To be held in order, all rules need a term on an input.
-                if candidate.n_clusters and plan.premises_move and plan.held is None:
-                    found = with_fewer_conditions(found, plan.free)
+                if candidate.n_clusters and self.plan.premises_move and self.plan.held is None:
+                    found = with_fewer_conditions(found, self.plan.free)
             self._found[candidate] = found
         return self._found[candidate]
 

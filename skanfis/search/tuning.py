@@ -245,12 +245,12 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, room: float) -> Tu
     return best
 
 
-def with_sparse_slopes(tuned: Tuned, free) -> Tuned:
-    """The same with slopes that are worth a number: else one for several rules, or none."""
+def with_sparse_slopes(tuned: Tuned, free, worth) -> Tuned:
+    """The same with slopes that are worth so much alone: else one for several rules, or none."""
     problem, posterior, x = tuned.problem, tuned.posterior, tuned.displacement
     if not {"alpha", "slope"} <= set(free) or problem.n_columns > MANY_COLUMNS:
         return tuned
-    common, absent = sparse_slopes(posterior, tuned.solved.normal.coefficients)
+    common, absent = sparse_slopes(posterior, tuned.solved.normal.coefficients, worth)
     penalty = replace(tuned.penalty, common=common, absent=absent)
     n_rows, curvature = posterior.n_rows, posterior.curvature
     return _improved(problem, tuned.evaluation, x, penalty, 0, free, n_rows, curvature)

@@ -307,6 +307,17 @@ def test_candidates_are_listed_from_the_best(rng):
             assert one["reading_cost"] == most
 
 
+def test_slopes_are_left_out_in_two_steps(rng):
+    """Where the fewest cost too much, those are left that the evidence would rather not have."""
+    X = rng.normal(size=(100, 12))
+    y = X @ np.linspace(0.0, 1.0, 12) + 2.0 * rng.normal(size=100)
+    model = ANFISRegressor(max_rules=1).fit(X, y)
+    costs = {one["structure"]: one["reading_cost"] for one in model.structures_}
+    fewer, fewest = (costs[f"one rule, {much} slopes"] for much in ("fewer", "fewest"))
+    assert costs["one rule"] == 13 > fewer > fewest
+    assert chosen(model)["structure"] == "one rule, fewer slopes"
+
+
 def test_what_is_chosen_costs_least_of_what_is_within_the_tolerance(rng):
     X, y = bumps(rng)
     model = ANFISRegressor(max_rules=4)
