@@ -21,7 +21,7 @@ from skanfis.export import export_json, fold, read_json
 from skanfis.export.json_reader import parse_json
 from skanfis.learning import VariableProjection
 
-N_ROWS = 160
+N_ROWS = 200
 KINDS = {"grid": GridAntecedent, "tree": TreeAntecedent, "scattered": RuleTableAntecedent}
 pytestmark = [pytest.mark.parametrize("kind", KINDS)]
 # Weights that are given are not sought: a fit takes a tenth of the time.
@@ -44,7 +44,7 @@ def searched(kind, **settings):
 def fitted(kind):
     """One fit of each kind for all that only read it."""
     estimator = searched(kind).fit(X, Y)
-    assert estimator.n_rules_ > 1
+    assert estimator.n_rules_ > 2
     return estimator
 
 

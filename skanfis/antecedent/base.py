@@ -161,9 +161,9 @@ class Antecedent(ABC):
         """The same rules, or those of a table, listed one by one without some terms."""
         from .rule_table import RuleTableAntecedent  # which is built on this module
 
+        table = self.rule_terms if table is None else table
         kept, place = np.delete(np.arange(self.n_terms), terms), np.full(self.n_terms + 1, -1)
         place[kept] = np.arange(kept.size)
-        table = self.rule_terms if table is None else table
         return RuleTableAntecedent(self._groups_with(kept), place[table])
 
     def _groups_with(self, terms):

@@ -35,10 +35,9 @@ class RuleTableAntecedent(Antecedent):
 
     @classmethod
     def of_own_terms(cls, family, inputs, theta):
-        """Scattered rules: each with terms of its own, of one family, in the order of the rules.
+        """Scattered rules: each with terms of its own, of one family.
 
-        ``inputs`` are the premise inputs; theta is (n_parameters, n_rules, n_premise_inputs), NaN
-        where a rule has no term.
+        Of theta, (n_parameters, n_rules, n_premise_inputs), NaN is no term.
         """
         has_term = np.isfinite(theta[0])
         table = np.where(has_term, np.cumsum(has_term).reshape(has_term.shape) - 1, -1)

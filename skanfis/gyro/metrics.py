@@ -87,6 +87,9 @@ def figures_of_merit(full_scale=1.0):
             raise ValueError("No repeatability: fewer than two runs have rows at rest.")
         return np.std(known, ddof=1)
 
+    def relative_spread(slopes):
+        return _PPM * spread(slopes) / abs(np.mean(slopes))
+
     from_run_to_run = partial(_Figure, fewest_runs=2)
     return [
         _Figure("residual_rms", "deg/s", rms, residual),
@@ -100,11 +103,7 @@ def figures_of_merit(full_scale=1.0):
         _Figure("scale_factor_nonlinearity_rms", full, root, rates),
         _Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
         from_run_to_run(
-            "scale_factor_repeatability",
-            "ppm",
-            scale_factor,
-            rates,
-            combine=lambda slopes: _PPM * spread(slopes) / abs(np.mean(slopes)),
+            "scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread
         ),
         _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
         _Figure("bias", "deg/h", bias, of_bias),

@@ -44,8 +44,7 @@ def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
     if found is tuned:
         return tuned
     found = turned(found, premise, tuned.penalty, free)
-    is_better = found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
-    return found if is_better else tuned
+    return min(tuned, found, key=lambda one: one.posterior.minus_twice_log)
 
 
 def term_losses(tuned):

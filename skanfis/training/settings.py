@@ -29,8 +29,7 @@ def structure_request(estimator, names, sample_weight=None):
     """What training starts from, with all names of columns and families resolved."""
     partition = _partition(estimator, names, sample_weight)
     families = membership_families(estimator.mf, names)
-    is_default = all(family is Gaussian for family in families)
-    if isinstance(partition, str) and partition == "tree" and not is_default:
+    if isinstance(partition, str) and partition == "tree" and set(families) != {Gaussian}:
         raise ValueError(
             f"mf={estimator.mf!r} means nothing to partition='tree', whose rules are sides of "
             "cuts: leave mf at 'gaussian', its default, or use another partition."

@@ -326,10 +326,9 @@ def _model(inputs, outputs, antecedents, consequents):
 
 
 def _places_of_grid(inputs, antecedents):
-    """Where the first, second, ... rule of a grid stands in the file; None where it is none.
+    """Where the rules of a grid, in C order, stand in the file; None where they are none.
 
-    A grid has all combinations, in C order, of two or more terms of one family, in order, on every
-    input that rules look at.
+    These are all combinations of two or more terms of one family on every input that they look at.
     """
     used = [(one, own) for one, own in zip(inputs, antecedents.T, strict=True) if own.any()]
     terms = [[one.terms[k - 1] for k in np.unique(own) if k > 0] for one, own in used]
