@@ -1,4 +1,4 @@
-"""Rules listed one by one over terms that they share: imported, pruned, of mixed families."""
+"""Rules listed one by one: scattered, with terms of their own, or over terms that they share."""
 
 from dataclasses import dataclass
 from functools import cached_property
