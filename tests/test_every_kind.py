@@ -20,6 +20,7 @@ from skanfis.exceptions import ForgottenRowsWarning
 from skanfis.export import export_json, fold, read_json
 from skanfis.export.json_reader import parse_json
 from skanfis.learning import VariableProjection
+from skanfis.membership import Gaussian
 
 N_ROWS = 200
 KINDS = {"grid": GridAntecedent, "tree": TreeAntecedent, "scattered": RuleTableAntecedent}
@@ -88,6 +89,7 @@ class TestAnswers:
 class TestFits:
     def test_families_are_of_grids_and_scattered_rules(self, kind):
         if kind == "tree":
+            assert_is(searched(kind, mf=Gaussian).fit(X, Y), kind)
             for mf in ("bell", ["gaussian", "bell", "gaussian"]):
                 with pytest.raises(ValueError, match=r"mf=.* means nothing to partition='tree'"):
                     searched(kind, mf=mf).fit(X, Y)

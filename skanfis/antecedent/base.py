@@ -34,11 +34,6 @@ class TermGroup:
     theta: np.ndarray
 
     @property
-    def is_ordered(self) -> bool:
-        """Whether rules share the terms of an input, which then can be kept in order."""
-        return True
-
-    @property
     def n_terms(self):
         """Number of terms in the group."""
         return self.inputs.size
