@@ -59,7 +59,8 @@ def best_splits(tuned: Tuned, inputs, crossed, n_most):
                 log_width = np.log(_width(rows.X[:, j], own, cuts[best]))
                 split = Split(leaf, int(j), float(cuts[best]), float(log_width))
                 found.append((statistics[best], split))
-    found.sort(key=lambda pair: -to_six_digits(pair[0]))
+    # Two inputs may part the rows alike: not the order of columns decides then.
+    found.sort(key=lambda pair: (-to_six_digits(pair[0]), pair[1].cut))
     return [split for _, split in found[:n_most]]
 
 
