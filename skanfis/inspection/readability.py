@@ -289,9 +289,11 @@ def _on_signs(said):
             if up.size and down.size:
                 name, of_output = model.input_names[j], f" (of {output})" * (model.n_outputs > 1)
                 level = said.levels.get(name)
-                cause = f"by {name}" if level is None else f"if {level.said(True)},"
+                cause = f"by {name}{of_output}"
+                if level is not None:
+                    cause = f"if {level.said(True)}{of_output},"
                 rises, falls = map(_rules, (up, down))
-                found.append(f"{cause}{of_output} up in {rises} and down in {falls}")
+                found.append(f"{cause} up in {rises} and down in {falls}")
     named = _named(found, "; ")
     return [f"Rules go different ways, beyond chance: {named}."] if found else []
 

@@ -72,7 +72,10 @@ def readability_in_training(estimator, model, levels):
         return None
     measures = found.measures
     # Sorted: columns that were only moved keep their numbers.
-    own, fitted = (np.sort(one.coefficients, axis=1) for one in (model, found.model))
+    own, fitted = (
+        np.append(np.sort(one.coefficients, axis=1), np.sort(one.antecedent.parameters))
+        for one in (model, found.model)
+    )
     if not np.array_equal(own, fitted):
         measures = replace(measures, printed_errors=np.full(model.n_outputs, np.nan))
     return replace(found, model=model, measures=measures, levels=levels)
