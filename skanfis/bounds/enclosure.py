@@ -119,10 +119,11 @@ class Enclosure:
                 np.isfinite(by_bends), bends[1] - bends[0], self._gain_of_slope(parts, j)
             )
             bound = np.fmin(natural, by_bends)
-            # Where the output may be held its slope may be zero.
-            lowest, highest = self._natural(parts)
-            is_free = (lowest >= self.lowest) & (highest <= self.highest)
-            bound = np.where(is_free, bound, np.maximum(bound, 0.0))
+            if np.isfinite([self.lowest, self.highest]).any():
+                # Where the output may be held its slope may be zero.
+                lowest, highest = self._natural(parts)
+                is_free = (lowest >= self.lowest) & (highest <= self.highest)
+                bound = np.where(is_free, bound, np.maximum(bound, 0.0))
             said = self.say(points.T)
             attained = np.where(said == self.hold(said), least, 0.0)
         return bound, points, attained, gain * (high - low)

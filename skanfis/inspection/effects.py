@@ -239,12 +239,13 @@ class Study:
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
                 if not own >= set(found.pop(other)):
                     raise ValueError(f"groups[{label!r}] has some columns of {other!r}, not all.")
+            outside = [name for j, name in enumerate(model.input_names) if j not in own]
+            if label in (*found, *outside):
+                raise ValueError(f"groups[{label!r}] has the name of a column outside of it.")
             found[label] = tuple(sorted(own))
         taken = {j for inputs in found.values() for j in inputs}
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}
         labels, inputs = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
-        if sum(map(len, inputs)) != model.n_inputs:
-            raise ValueError("groups: a group may not have the name of a column outside of it.")
         is_shown = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
         blocks = _known(model, inputs, rows)
         anova = _anova(model, k, blocks)
