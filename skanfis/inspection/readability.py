@@ -106,13 +106,7 @@ class Readability:
     @property
     def rule_errors(self) -> np.ndarray:
         """RMSE of each rule alone where it is the strongest, in units of the target."""
-        return self._unit * self.measures.rule_errors
-
-    @property
-    def _unit(self):
-        """A standard deviation of the target, of each output."""
-        target = self.model.target
-        return self.measures.deviation if target is None else target.spread
+        return self.measures.deviation * self.measures.rule_errors
 
     @property
     def reading_cost(self) -> int:
@@ -170,7 +164,7 @@ class Readability:
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
             both = found.rule_errors[r, k], found.rule_spreads[r, k]
-            errs, spread = (number(self._unit[k] * one, 2) for one in both)
+            errs, spread = (number(found.deviation[k] * one, 2) for one in both)
             named.append(f"{rule} (errs by {errs}, a constant by {spread})")
         what = "Errs more on its own rows than a constant would: rule"
         return [f"{what} {_named(named)}."] if named else []

@@ -70,7 +70,8 @@ def readability_in_training(estimator, model, levels):
     found = getattr(last_step(estimator), "readability_", None)
     if found is None:
         return None
-    measures = found.measures
+    scale = 1.0 if model.target is None else model.target.spread / found.model.target.spread
+    measures = replace(found.measures, deviation=scale * found.measures.deviation)
     # Sorted: columns that were only moved keep their numbers.
     own, fitted = (
         np.append(np.sort(one.coefficients, axis=1), np.sort(one.antecedent.parameters))
