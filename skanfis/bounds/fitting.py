@@ -226,7 +226,7 @@ class _ConstrainedFit:
         with_points = f" together with the {points}" if n_points else ""
         return InfeasibleConstraintsError(
             f"No consequents of {rules} keep {names}{with_points}. Drop a constraint, or use "
-            "order=1 or more rules."
+            f"{'' if self.model.order else 'order=1 or '}more rules."
         )
 
     @property
