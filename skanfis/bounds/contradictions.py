@@ -9,6 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from .enclosure import reach_of
+
 # Ratio of squared errors, with the constraint over without, below which nothing is said.
 _WORTH_SAYING = 1.01**2
 # Standard deviations that make certain; and the part of all slopes by an input that has the wrong
@@ -31,7 +33,7 @@ def contradicted(free, held, inequalities, fixed, rows, raised):
     gap = np.zeros(values.shape)
     if len(points):
         # A point beyond the range is predicted as the nearest point from which nothing changes.
-        reach = free.max_extrapolation * free.spread if free.out_of_bounds == "linear" else 0.0
+        reach = reach_of(free)
         answered = np.clip(points, free.minimum - reach, free.maximum + reach)
         gap = np.abs(free.predict(points) - values) - _CERTAIN * _deviation(free, answered).T
     for k, output in enumerate(free.output_names):

@@ -56,9 +56,15 @@ class Enclosure:
 
     def __init__(self, model: TSKModel, output: int, sign: float):
         self.model, self.output, self.sign = model, output, sign
-        self.factors = model.antecedent.factor_terms()
-        self.counts = model.antecedent.share_counts if self.factors else (1,)
+        factors = model.antecedent.factor_terms()
+        self.counts = model.antecedent.share_counts if factors else (1,)
         self.axes = tuple(range(len(self.counts)))
+        # The terms of a factor's shares along an axis of its own.
+        shapes = np.where(np.eye(len(self.counts), dtype=bool), self.counts, 1).tolist()
+        self.factors = [
+            {j: terms.reshape(*shape, terms.shape[-1]) for j, terms in one.items()}
+            for one, shape in zip(factors, shapes, strict=False)
+        ]
         coefficients = sign * model.coefficients[:, :, output]
         self.height = coefficients[:, :1]
         self.slopes = np.zeros((model.n_rules, model.n_inputs))
@@ -113,18 +119,14 @@ class Enclosure:
                 np.isfinite(by_bends), bends[1] - bends[0], self._gain_of_slope(parts, j)
             )
             bound = np.fmin(natural, by_bends)
-            # Where the output may be held its slope may be zero.
-            bound = np.where(self._may_be_held(parts), np.maximum(bound, 0.0), bound)
+            if np.isfinite([self.lowest, self.highest]).any():
+                # Where the output may be held its slope may be zero.
+                lowest, highest = self._natural(parts)
+                is_free = (lowest >= self.lowest) & (highest <= self.highest)
+                bound = np.where(is_free, bound, np.maximum(bound, 0.0))
             said = self.say(points.T)
             attained = np.where(said == self.hold(said), least, 0.0)
         return bound, points, attained, gain * (high - low)
-
-    def _may_be_held(self, parts):
-        """Where what the rules say may pass the limits, (n_boxes,)."""
-        if np.isinf([self.lowest, self.highest]).all():
-            return np.zeros(parts.slack.size, dtype=bool)
-        least, most = self._natural(parts)
-        return ~((most <= self.highest) & (least >= self.lowest))
 
     def _gain_of_slope(self, parts, j):
         """About how much of the range of dP/dx_j goes with each input's width, (n_inputs, n)."""
@@ -135,7 +137,7 @@ class Enclosure:
         return gain
 
     def _largest_strengths(self, parts):
-        return prod(self._placed(one.high, place) for place, one in enumerate(parts.shares))
+        return prod(one.high for one in parts.shares)
 
     def _parts(self, low, high):
         model, ends = self.model, np.stack([low, high])
@@ -144,15 +146,12 @@ class Enclosure:
         middle, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0]) * (1.0 + 4.0 * EPS)
         terms = term_ranges(model.antecedent, *box)
         at_middle = term_ranges(model.antecedent, middle, middle)
-        shares = [enclosed(one, terms, at_middle, half) for one in self.factors]
-        departure, curvature = (
-            {
-                j: self._placed(ends, place)
-                for place, one in enumerate(shares)
-                for j, ends in getattr(one, name).items()
-            }
-            for name in ("departure", "curvature")
-        )
+        shares = [
+            enclosed(one, place - len(self.counts) - 1, terms, at_middle, half)
+            for place, one in enumerate(self.factors)
+        ]
+        departure = {j: ends for one in shares for j, ends in one.departure.items()}
+        curvature = {j: ends for one in shares for j, ends in one.curvature.items()}
         centre = self.height + self.slopes @ (middle - model.reference[:, None])
         radius = np.abs(self.slopes) @ half
         value = self._shaped(np.stack([centre - radius, centre + radius]))
@@ -169,13 +168,12 @@ class Enclosure:
         # What the errors of the strengths move the output by, rule by rule.
         moved = np.zeros(parts.middle.shape)
         for place, one in enumerate(parts.shares):
-            error = self._placed(np.fmin(one.error, 1.0), place)
+            error = np.fmin(one.error, 1.0)
             moved += 2.0 * strength * error * size(self._centred(parts, place))
         slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
         for j, ends in parts.departure.items():
             # Where one rule speaks alone D is zero, and yet its slope has been rounded.
-            steepness = self._placed(parts.shares[self.place[j]].steepness[j], self.place[j])
-            steepness = np.maximum(steepness, size(ends))
+            steepness = np.maximum(parts.shares[self.place[j]].steepness[j], size(ends))
             slopes[j] += part * (strength * steepness).sum(axis=self.axes) * largest
             slopes[j] += 2.0 * (size(ends) * moved).sum(axis=self.axes)
         ahead = size(parts.way)
@@ -185,12 +183,6 @@ class Enclosure:
     def _shaped(self, by_rule):
         """Values by rule along the axes of all factors."""
         return by_rule.reshape(*by_rule.shape[:-2], *self.counts, by_rule.shape[-1])
-
-    def _placed(self, by_share, place):
-        """Values of a factor's shares along its own axis."""
-        shape = [1] * len(self.counts)
-        shape[place] = by_share.shape[-2]
-        return by_share.reshape(*by_share.shape[:-2], *shape, by_share.shape[-1])
 
     def _tangent(self, parts, j):
         """Range of b_j + D_j (f - phi) by rule."""
@@ -211,20 +203,17 @@ class Enclosure:
 
     def _less_means(self, parts, values, places):
         for place in places:
-            weight = self._placed(parts.shares[place].middle, place)
-            axis = place - len(self.counts) - 1
-            values = values - (weight * values).sum(axis=axis, keepdims=True)
+            one = parts.shares[place]
+            values = values - (one.middle * values).sum(axis=one.axis, keepdims=True)
         return values
 
-    def _off_mean(self, parts, place):
-        """Range of f less its mean along the axis of a factor, whatever the shares."""
-        ends, axis = self._centred(parts, place), place - len(self.counts) - 1
-        mean = mean_range(np.moveaxis(ends, axis, -2), [parts.shares[place]])
-        return ends - np.expand_dims(mean[::-1], axis)
+    def _mean(self, parts, ends):
+        """Range of the mean over rules, (2, n_boxes)."""
+        return mean_range(ends, parts.shares).reshape(2, -1)
 
     def _natural(self, parts):
         """Range of what the rules say, E f + sum_j h_j dy/dx_j, (2, n_boxes)."""
-        found = mean_range(parts.value, parts.shares)
+        found = self._mean(parts, parts.value)
         for j in self._ways_out(parts):
             slope = self._steepness(self._there(parts, j), j)
             found = found + product(parts.way[:, j], slope)
@@ -243,7 +232,7 @@ class Enclosure:
 
     def _steepness(self, parts, j):
         """Range of the slope by x_j where the model is that of its rules."""
-        return widened(mean_range(self._tangent(parts, j), parts.shares), parts.slope_slack[j])
+        return widened(self._mean(parts, self._tangent(parts, j)), parts.slope_slack[j])
 
     def _ways_out(self, parts):
         """Inputs along which some box leaves the range."""
@@ -261,11 +250,12 @@ class Enclosure:
             inside = inside + product(parts.way[:, j], self._mixed(self._there(parts, j), i, j))
         first, last = model.minimum[i], model.maximum[i]
         furthest = first - self.reach[i], last + self.reach[i]
+        is_below = (low[i] < first) & (high[i] >= furthest[0])
+        is_above = (high[i] > last) & (low[i] <= furthest[1])
         down, up = np.full(inside.shape[1:], np.inf), np.full(inside.shape[1:], -np.inf)
         for is_there, ends in (
             ((low[i] <= last) & (high[i] >= first), inside),
-            ((low[i] < first) & (high[i] >= furthest[0]), beyond),
-            ((high[i] > last) & (low[i] <= furthest[1]), beyond),
+            (is_below | is_above, beyond),
             ((low[i] < furthest[0]) | (high[i] > furthest[1]), np.zeros((2, 1))),
         ):
             down = np.where(is_there, np.minimum(down, ends[0]), down)
@@ -282,15 +272,17 @@ class Enclosure:
                 own = self._less_means(parts, own, [self.place[one]])
                 found = found + product(parts.departure[one], (own, own))
         if i in parts.departure and j in parts.departure:
-            places = self.place[i], self.place[j]
-            same = places[0] == places[1]
-            off = self._off_mean(parts, places[0]) if same else self._centred(parts, *places)
+            places = dict.fromkeys((self.place[i], self.place[j]))
             both = product(parts.departure[i], parts.departure[j])
             if i == j:
                 both = square(parts.departure[i]) + parts.curvature[i]
+            off = self._centred(parts, *places)
+            if len(places) == 1:
+                # Of one factor f is less its mean whatever the shares, for E D_i D_j is not zero.
+                off = off - mean_range(off, [parts.shares[self.place[i]]])[::-1]
             found = found + product(both, off)
         slack = EPS * ROUNDINGS * prod(self.counts) * size(found).max(axis=self.axes)
-        return widened(mean_range(found, parts.shares), slack)
+        return widened(self._mean(parts, found), slack)
 
 
 def _best_centres(slopes, low, high):

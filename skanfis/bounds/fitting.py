@@ -42,14 +42,6 @@ _POINTS_A_ROUND, _MARGIN = 20, 0.01
 
 
 @dataclass(frozen=True, eq=False)
-class Ordered:
-    """Local consequents of rules in order, or of one line for all rules."""
-
-    local: np.ndarray  # (n_columns, n_outputs)
-    is_line: bool
-
-
-@dataclass(frozen=True, eq=False)
 class Kept:
     """Consequents that keep all constraints, for certain, and the free ones of these premises."""
 
@@ -66,19 +58,20 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     that contradict a constraint.
     """
     fit = _ConstrainedFit(model, evaluation, problem, constraints)
-    ordered, before = fit.in_order(), float(evaluation.mean_squared_error)
-    local, drawn = ordered.local, float(ordered.is_line)
-    if fit.error(local) > _COSTLY * before:
-        other, way = fit.drawn(ordered)
-        if fit.error(other) < fit.error(local):
-            local, drawn = other, way
-    kept = fit.kept(ordered, local)
-    after = float(kept.evaluation.mean_squared_error)
+    ordered, is_line = fit.in_order()
+    local, ended, drawn = ordered, fit.ended(ordered), float(is_line)
+    before = float(evaluation.mean_squared_error)
+    if ended.mean_squared_error > _COSTLY * before:
+        nearer, way = fit.drawn(ordered)
+        ended_nearer = fit.ended(nearer)
+        if ended_nearer.mean_squared_error < ended.mean_squared_error:
+            local, ended, drawn = nearer, ended_nearer, way
+    held = fit.with_local(local, is_line and local is ordered)
+    after = float(ended.mean_squared_error)
     # Of data without noise the free fit may have no error at all.
     raised = after / before if before else np.inf
     report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
     if rows is not None:
-        held = replace(fit.model, coefficients=kept.coefficients)
         free = replace(model, target=None)
         fixed = constraints.points, constraints.values
         for message in contradicted(free, held, fit.inequalities, fixed, rows, raised):
@@ -87,14 +80,14 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         names = ", ".join(one.name for one in fit.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
-        end = "one line" if ordered.is_line else "rules in order"
+        end = "one line" if is_line else "rules in order"
         warn_user(
             f"To be certain of {names}, the rules were drawn {drawn:.0%} of the way to {end}: that "
             f"raises the training error by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or leave a "
             "constraint out.",
             ConstraintWarning,
         )
-    return kept, report
+    return Kept(fit.free, ended, held.coefficients, fit.known_points), report
 
 
 def at_equal_widths(problem, evaluation, constraints: Constraints):
@@ -107,15 +100,15 @@ def at_equal_widths(problem, evaluation, constraints: Constraints):
 
 
 def ways_in_order(problem, evaluation, constraints: Constraints, equal, equal_to):
-    """Yield the nearest rules in order, then the nearest line; InfeasibleError if neither exists.
+    """Yield the nearest rules in order, then the nearest line, and whether it is one.
 
-    Of the equalities E u = e for local consequents u, ``equal`` is E, ``equal_to`` e by output.
+    InfeasibleError if neither exists. Of the equalities E u = e for local consequents u, ``equal``
+    is E, ``equal_to`` e by output.
     """
     failure = InfeasibleError(False)
     for is_line in (False, True):
         try:
-            local = _nearest(problem, evaluation, constraints, equal, equal_to, is_line)
-            yield Ordered(local, is_line)
+            yield _nearest(problem, evaluation, constraints, equal, equal_to, is_line), is_line
         except InfeasibleError as error:
             failure = error
     raise failure
@@ -135,8 +128,8 @@ def held_in_search(constraints: Constraints | None):
     def held(problem, evaluation):
         no_points = np.empty((0, problem.n_columns)), np.empty((0, problem.n_outputs))
         evaluation = at_equal_widths(problem, evaluation, signs)
-        ordered = next(ways_in_order(problem, evaluation, signs, *no_points))
-        return evaluation.antecedent, problem.local.to_global(ordered.local)
+        local, _ = next(ways_in_order(problem, evaluation, signs, *no_points))
+        return evaluation.antecedent, problem.local.to_global(local)
 
     return held
 
@@ -175,8 +168,7 @@ class _ConstrainedFit:
         # The best at premises for which there is an order.
         self.free = at_equal_widths(problem, evaluation, constraints)
         # That outputs are held on top is monotone: what rules keep, predictions do.
-        self.model = replace(model.with_out_of_bounds("clip"), target=None)
-        self.policy = model.out_of_bounds, model.max_extrapolation
+        self.model = replace(model, target=None)
         # A model with an output for each local consequent: what it adds to the standardised target.
         n_columns = problem.n_columns
         as_it_is = Scale(*np.array([[0.0], [1.0], [0.0], [1.0]]).repeat(n_columns, axis=1))
@@ -194,20 +186,19 @@ class _ConstrainedFit:
         # E and e of the fixed points, for the local consequents.
         targets = problem.rows.targets
         values = (constraints.values - targets.offset) / targets.scale
-        at_points = self.columns.with_out_of_bounds(*self.policy).predict(constraints.points)
-        self.fixed = at_points, values
+        self.fixed = self.columns.predict(constraints.points), values
 
-    def in_order(self) -> Ordered:
-        """Rules in order, or a line; an error that says which constraints cannot be kept."""
+    def in_order(self):
+        """Rules in order, or a line, and which; an error says what constraints cannot be kept."""
         try:
             ways = ways_in_order(self.problem, self.free, self.constraints, *self.fixed)
             # Of rules rounding may be larger than the margin, of a line there is next to none.
-            return next(way for way in ways if self._is_certified(way))
+            return next(way for way in ways if self._is_certified(*way))
         except InfeasibleError as failure:
             raise self._refused(failure.by_equalities) from None
 
-    def _is_certified(self, ordered):
-        model, constraints = self._model(ordered.local, ordered.is_line), self.constraints
+    def _is_certified(self, local, is_line):
+        model, constraints = self.with_local(local, is_line), self.constraints
         limits = zip(constraints.lower, constraints.upper, strict=True)
         return self._meets_points(model) and all(
             is_in_order(model, k, signs, of_output)
@@ -216,8 +207,8 @@ class _ConstrainedFit:
 
     def _meets_points(self, model):
         """Whether it predicts all fixed points, to rounding."""
-        found = model.with_out_of_bounds(*self.policy).predict(self.constraints.points)
-        off = np.abs(found - self.constraints.values) / self.problem.rows.targets.scale
+        off = np.abs(model.predict(self.constraints.points) - self.constraints.values)
+        off /= self.problem.rows.targets.scale
         return bool((off <= _OFF).all())
 
     def _refused(self, by_equalities):
@@ -235,35 +226,29 @@ class _ConstrainedFit:
         with_points = f" together with the {points}" if n_points else ""
         return InfeasibleConstraintsError(
             f"No consequents of {rules} keep {names}{with_points}. Drop a constraint, or use "
-            "order=1 or more rules."
+            f"{'' if self.model.order else 'order=1 or '}more rules."
         )
 
-    def error(self, local):
-        """Mean squared error of training."""
-        return self._ended(local).mean_squared_error
-
-    def kept(self, ordered, local) -> Kept:
-        """What the fit ends with, if it is these consequents."""
+    @property
+    def known_points(self):
+        """The fixed points, in the range."""
         model, points = self.model, self.constraints.points
-        if self.policy[0] == "linear":
+        if model.out_of_bounds == "linear":
             # Beyond, a tangent is known, which is more than a value: it is not counted.
             points = points[self.is_inside]
-        points = np.clip(points, model.minimum, model.maximum)
-        is_line = ordered.is_line and local is ordered.local
-        coefficients = self._model(local, is_line).coefficients
-        return Kept(self.free, self._ended(local), coefficients, points)
+        return np.clip(points, model.minimum, model.maximum)
 
     def drawn(self, ordered):
         """The nearest that is proven on the way from near the free fit, 0, to those in order, 1."""
-        local, drawn = ordered.local, 1.0
+        local, drawn = ordered, 1.0
         if not all(is_known(group.family) for group in self.free.antecedent.groups):
             return local, drawn
         near = self._nearest_at_points(ordered)
         halves = 0.5 ** np.arange(1, 1 + _HALVINGS)
         # First all of the way back, then the least step of it: where that fails others will too.
         for step in (1.0, halves[-1], *halves[:-1]):
-            now = near + (drawn - step) * (ordered.local - near)
-            if self._is_proven(self._model(now)):
+            now = near + (drawn - step) * (ordered - near)
+            if self._is_proven(self.with_local(now)):
                 local, drawn = now, float(drawn - step)
             elif step == halves[-1]:
                 break
@@ -279,12 +264,12 @@ class _ConstrainedFit:
         normal, (equal, equal_to) = self.free.normal, self.fixed
         sample = spread_points(self.model.minimum, self.model.maximum)
         # An output stays in order where not even the fixed points can be met otherwise.
-        local = ordered.local.copy()
+        local = ordered.copy()
         nothing = np.empty((0, self.problem.n_columns)), np.empty(0)
 
         def violated(u, k):
             local[:, k] = u
-            now = self._model(local)
+            now = self.with_local(local)
             own = [one for one in self.inequalities if one.output == k]
             worst = [_worst(one.excess(now, sample), sample) for one in own]
             if not any(map(len, worst)) and self.n_boxes <= _ALL_BOXES * self.part:
@@ -329,7 +314,7 @@ class _ConstrainedFit:
         found, until = self._proof(one, model)
         return found.point[None][: int(found.attained > until)]
 
-    def _ended(self, local):
+    def ended(self, local):
         """The evaluation of the free fit, with other local consequents in its place."""
         normal = self.free.normal
         change, weighed = local - normal.coefficients, normal.gram + normal.penalty
@@ -343,7 +328,8 @@ class _ConstrainedFit:
             normal=replace(normal, coefficients=local),
         )
 
-    def _model(self, local, is_line=False):
+    def with_local(self, local, is_line=False):
+        """The model with other local consequents."""
         model = self._with(local, self.problem.rows.targets)
         if is_line:
             # To the last bit.

@@ -62,24 +62,19 @@ def ranges(group: TermGroup, low, high):
     """The :class:`TermRanges` of a group of terms over boxes (n_inputs, n_boxes)."""
     family, theta = group.family, group.theta
     lo, hi = low[group.inputs], high[group.inputs]
-    place = theta[0][:, None]
-    off = np.abs(place) + _plateau(group)
+    off = np.abs(theta[0][:, None]) + _plateau(group)
     reach = ROUNDINGS * EPS * (np.maximum(np.abs(lo), np.abs(hi)) + off)
     lo, hi = lo - reach, hi + reach
     at_lo, by_lo = family.log_value_and_gradient(lo, theta)
     at_hi, by_hi = family.log_value_and_gradient(hi, theta)
-    # Memberships depend on x - location: the slope is minus the derivative by the location.
-    slope = np.stack([-by_hi[0], -by_lo[0]])
-    if family in _PRODUCTS:
-        # Its top is not at its place: it lies below its tangents at the ends.
-        rising, falling = np.maximum(slope[1], 0.0), np.maximum(-slope[0], 0.0)
-        top = np.minimum(at_lo + rising * (hi - lo), at_hi + falling * (hi - lo))
-    elif family in _SIDES:
-        top = np.maximum(at_lo, at_hi)
-    else:
-        top = family.log_value(np.clip(place, lo, hi), theta)
     if family in _BY_SIDES:
         slope = _slope_by_sides(group, lo, hi)
+    else:
+        # Memberships depend on x - location: the slope is minus the derivative by the location.
+        slope = np.stack([-by_hi[0], -by_lo[0]])
+    rising, falling = np.maximum(slope[1], 0.0), np.maximum(-slope[0], 0.0)
+    top = np.minimum(at_lo + rising * (hi - lo), at_hi + falling * (hi - lo))
+    top = np.minimum(top, 0.0)
     log_mu = widened([np.minimum(at_lo, at_hi), top], ROUNDINGS * EPS)
     slope, curve = widened(slope), widened(_curvature(group, lo, hi))
     with np.errstate(invalid="ignore"):
@@ -104,33 +99,28 @@ def _slope_by_sides(group, lo, hi):
         flanks = {family.side: widths[0]}
     else:
         flanks = {-1.0: widths[0], 1.0: widths[0] if family is Bell else widths[1]}
-    found, reaches = [], []
+    found = np.zeros((2, *lo.shape))
     for side, flank in flanks.items():
         begin = theta[0] + side * _plateau(group)
-        ends = np.sort([side * (lo - begin) / flank, side * (hi - begin) / flank], axis=0)
-        t = np.maximum(ends, 0.0)
+        t = np.sort([side * (lo - begin) / flank, side * (hi - begin) / flank], axis=0)
+        t = np.maximum(t, 0.0)
         sizes = _fall_of_bell(theta, *t) if family is Bell else _fall(family, *t)
-        found.append(np.sort([-side * one / flank for one in sizes], axis=0))
-        reaches.append(ends[1] > 0.0)
-    slopes = np.array(found)
-    low = np.min(slopes[:, 0], axis=0, where=reaches, initial=np.inf)
-    high = np.max(slopes[:, 1], axis=0, where=reaches, initial=-np.inf)
-    # On the plateau alone it is zero; a flank that is not left is so at t = 0.
-    return np.where(low > high, 0.0, [low, high])
+        # One side falls at a time: of the other one, zero is among its sizes.
+        found += np.sort([-side * one / flank for one in sizes], axis=0)
+    return found
 
 
 def _fall_of_bell(theta, near, far):
-    """Range of |d log mu / dt| = 2b t^(2b - 1) / (1 + t^(2b)), which rises to one peak."""
-    b = np.exp(theta[2])
+    """Range of |d log mu / dt| = 2b t^(2b - 1) / (1 + t^(2b)), with one peak; zero at t = 0."""
+    double = 2.0 * np.exp(theta[2])
     # Below 2b = 1 it is at the centre, and has no bound.
-    peak = np.maximum(2.0 * b - 1.0, 0.0) ** (0.5 / b)
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        log_t = np.log([near, np.clip(peak, near, far), far])
-        log_size = (2.0 * b - 1.0) * log_t - np.logaddexp(0.0, 2.0 * b * log_t)
-        sizes = 2.0 * b * np.exp(log_size)
-    # 0 log 0, of 2b = 1 at the centre.
-    sizes = np.where(np.isnan(sizes), 2.0 * b, sizes)
-    return sizes.min(axis=0), sizes.max(axis=0)
+    peak = np.maximum(double - 1.0, 0.0) ** (1.0 / double)
+    t = np.array([near, np.clip(peak, near, far), far])
+    small, large = np.minimum(t, 1.0), np.maximum(t, 1.0)
+    with np.errstate(divide="ignore"):
+        sizes = double * small ** (double - 1.0) / (large * (1.0 + (small / large) ** double))
+    least, most = sizes.min(axis=0), sizes.max(axis=0)
+    return np.where(near > 0.0, least, 0.0), np.where(far > 0.0, most, 0.0)
 
 
 def _fall(family, near, far):
@@ -155,15 +145,18 @@ def _curvature(group, lo, hi):
         return -(per_width[0] ** 2), -(per_width[0] ** 2)
     if family is TwoSidedGaussian:
         return -(per_width[:2].max(axis=0) ** 2), 0.0
-    if family in _SIDES:
-        bend = _sigmoid_curve((lo - theta[0]) * per_width[0], (hi - theta[0]) * per_width[0])
-        return tuple(-one * per_width[0] ** 2 for one in bend)
-    if family in (SigmoidDifference, *_PRODUCTS):
-        left, right = per_width[1], per_width[-1]
-        width = np.exp(theta[1])
-        rise = _sigmoid_curve((lo - theta[0] + width) * left, (hi - theta[0] + width) * left)
-        fall = _sigmoid_curve((theta[0] + width - hi) * right, (theta[0] + width - lo) * right)
-        return tuple(-a * left**2 - b * right**2 for a, b in zip(rise, fall, strict=True))
+    if family in (SigmoidDifference, *_PRODUCTS, *_SIDES):
+        cuts = [(theta[0], theta[1])]
+        if family not in _SIDES:
+            width = np.exp(theta[1])
+            cuts = [(theta[0] - width, theta[2]), (theta[0] + width, theta[-1])]
+        found = 0.0
+        for cut, log_length in cuts:
+            # Of each it is -s (1 - s) / length^2: the larger, the nearer x is to the cut.
+            length, furthest = np.exp(log_length), np.maximum(np.abs(lo - cut), np.abs(hi - cut))
+            odds = np.exp(-np.stack([np.abs(np.clip(cut, lo, hi) - cut), furthest]) / length)
+            found = found - odds / (length * (1.0 + odds)) ** 2
+        return found
     if family is Bell:
         # With p = t^(2b) it is -(2b / w^2) p^(1 - 1/b) (2b - 1 - p) / (1 + p)^2.
         b = np.exp(theta[2])
@@ -172,30 +165,25 @@ def _curvature(group, lo, hi):
     return nothing, nothing
 
 
-def _sigmoid_curve(lo, hi):
-    """Largest and smallest s(u) (1 - s(u)) over [lo, hi], which falls with |u|."""
-
-    def bend(u):
-        small = np.exp(-np.abs(u))
-        return small / (1.0 + small) ** 2
-
-    return bend(np.clip(0.0, lo, hi)), np.minimum(bend(lo), bend(hi))
-
-
 def _along(factor, by_term):
-    """By input, sums over the terms of each share, (..., n_shares, n_boxes)."""
+    """By input, sums over the terms of each share."""
     return {j: by_term[..., places, :].sum(axis=-2) for j, places in factor.items()}
 
 
 def _total(factor, by_term):
-    """Sums over the terms of each share on all inputs, (..., n_shares, n_boxes)."""
+    """Sums over the terms of each share on all inputs."""
     return sum(_along(factor, by_term).values())
 
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """The shares of one factor in every box, (n_shares, n_boxes); ranges are (2, ...)."""
+    """The shares of one factor in every box.
 
+    Arrays have an axis for each factor, all of length one but its own, and one of boxes at the end;
+    ranges have both ends in front.
+    """
+
+    axis: int  # its own, from the end
     middle: np.ndarray  # at the middle of the box
     low: np.ndarray
     high: np.ndarray
@@ -213,20 +201,21 @@ def term_ranges(antecedent: Antecedent, low, high):
     return TermRanges(*(np.concatenate(one, axis=-2) for one in zip(*parts, strict=True)))
 
 
-def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, half):
+def enclosed(factor: dict, axis: int, terms: TermRanges, at_middle: TermRanges, half):
     """The :class:`Shares` of a factor, from the ranges of its terms over boxes and at the middles.
 
-    A factor has, by input, the terms (n_shares, n) whose log mu add up; the last place is none.
+    A factor has, by input, the terms whose log mu add up to that of a share, along the last axis;
+    the last place is none.
     """
-    middle = softmax(_total(factor, at_middle.log_mu.mean(axis=0)), axis=0)
-    least, most = _by_range(*_total(factor, terms.log_mu))
+    middle = softmax(_total(factor, at_middle.log_mu.mean(axis=0)), axis=axis)
+    least, most = _by_range(_total(factor, terms.log_mu), axis)
     error = _total(factor, terms.error)
     # The mean error of all counts for each: the sum of the softmax.
-    common = np.minimum((most * error).sum(axis=0), error.max(axis=0))
-    error = error + common + EPS * (ROUNDINGS + least.shape[0])
+    mean, largest = (most * error).sum(axis=axis, keepdims=True), _largest(error, axis)
+    error = error + np.minimum(mean, largest) + EPS * (ROUNDINGS + least.shape[axis])
     slopes, curvature = _along(factor, terms.slope), _along(factor, terms.curve)
     steepness = {j: size(ends) for j, ends in slopes.items()}
-    shares = Shares(middle, least, most, error, steepness, curvature, {})
+    shares = Shares(axis, middle, least, most, error, steepness, curvature, {})
     departure = _departures(shares, slopes)
     away = np.exp(4.0 * error)
     there = _departures(
@@ -240,16 +229,14 @@ def enclosed(factor: dict, terms: TermRanges, at_middle: TermRanges, half):
     return shares
 
 
-def _by_range(low, high):
-    """Shares from the ranges of their logarithms alone."""
-    top = high.max(axis=0)
-    down, up = np.exp(low - top), np.exp(high - top)
-    n = down.shape[0]
-    slack = (n + ROUNDINGS) * EPS
-    others_up, others_down = up.sum(axis=0) - up, down.sum(axis=0) - down
+def _by_range(logarithms, axis):
+    """Ranges of shares from those of their logarithms alone."""
+    down, up = np.exp(logarithms - _largest(logarithms[1], axis))
+    slack = (down.shape[axis] + ROUNDINGS) * EPS
+    all_up, all_down = (one.sum(axis=axis, keepdims=True) for one in (up, down))
     # What the subtraction has lost counts as being there.
-    least = down / (down + np.maximum(others_up, 0.0) + 2.0 * slack * up.sum(axis=0))
-    spare = np.maximum(others_down - 2.0 * slack * down.sum(axis=0), 0.0)
+    least = down / (down + np.maximum(all_up - up, 0.0) + 2.0 * slack * all_up)
+    spare = np.maximum(all_down - down - 2.0 * slack * all_down, 0.0)
     most = np.minimum(up / (up + spare) * (1.0 + slack), 1.0)
     # 0 / 0: all that is known of the share is that it lies from 0 to 1.
     return np.nan_to_num(least * (1.0 - slack), nan=0.0), np.nan_to_num(most, nan=1.0)
@@ -258,10 +245,11 @@ def _by_range(low, high):
 def _departures(shares, slopes):
     found = {}
     for j, ends in slopes.items():
+        total = (shares.high * size(ends)).sum(axis=shares.axis, keepdims=True)
         # A slope is off by so many roundings, and its mean by those of the sum besides.
-        slack, total = 4.0 * ROUNDINGS * EPS * size(ends), (shares.high * size(ends)).sum(axis=0)
-        slack = slack + EPS * (5.0 * ROUNDINGS + ends.shape[1]) * total
-        found[j] = widened(ends - mean_range(ends, [shares])[::-1, None], slack)
+        slack = EPS * (5.0 * ROUNDINGS + ends.shape[shares.axis]) * total
+        slack = slack + 4.0 * ROUNDINGS * EPS * size(ends)
+        found[j] = widened(ends - mean_range(ends, [shares])[::-1], slack)
     return found
 
 
@@ -272,9 +260,10 @@ def _by_mean_value(departure, at_middle, shares, half):
         change = 0.0
         for i, others in departure.items():
             both = square(ends) if i == j else product(ends, others)
-            curve = shares.curvature[j] if i == j else np.zeros((2, 1, 1))
-            slack = EPS * (ROUNDINGS + ends.shape[1]) * (size(both) + size(curve)).max(axis=0)
-            rate = size(curve - mean_range(both + curve, [shares])[::-1, None]) + 2.0 * slack
+            curve = shares.curvature[j] if i == j else np.zeros_like(ends)
+            largest = _largest(size(both) + size(curve), shares.axis)
+            slack = EPS * (ROUNDINGS + ends.shape[shares.axis]) * largest
+            rate = size(curve - mean_range(both + curve, [shares])[::-1]) + 2.0 * slack
             change = change + half[i] * rate
         low, high = widened(at_middle[j], change)
         # Where the curvature is not known neither is a change: NaN.
@@ -283,17 +272,22 @@ def _by_mean_value(departure, at_middle, shares, half):
 
 
 def mean_range(ends, every):
-    """Range of the mean, under all factors' shares, of values (n_shares, ..., n_boxes)."""
+    """Range of the mean, under all factors' shares, of values with an axis for each factor."""
     return np.stack([-largest_mean(-ends[0], every), largest_mean(ends[1], every)])
 
 
 def largest_mean(values, every):
-    """Upper bound of the mean of ``values`` (n_shares, ..., n_boxes) under all factors' shares."""
+    """Upper bound of the mean of values under all factors' shares."""
     for shares in reversed(every):
-        middle = (shares.middle * values).sum(axis=-2)
-        off = values - middle[..., None, :]
-        values = middle + np.where(off > 0.0, shares.high * off, shares.low * off).sum(axis=-2)
-    return values if every else values[0]
+        middle = (shares.middle * values).sum(axis=shares.axis, keepdims=True)
+        off = values - middle
+        beyond = np.where(off > 0.0, shares.high * off, shares.low * off)
+        values = middle + beyond.sum(axis=shares.axis, keepdims=True)
+    return values
+
+
+def _largest(values, axis):
+    return values.max(axis=axis, keepdims=True)
 
 
 def product(one, other):

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from .._validation import checked_position
-from ..export.columns import by_column
+from ..export.columns import Level, by_column
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
@@ -216,6 +216,7 @@ class Study:
     labels: list[str]
     blocks: list[Block]
     is_shown: list[bool]  # whether pictures show it: one input, or a category
+    levels: Mapping[str, Level]  # as ``Reader.levels``
     rows: np.ndarray | None
     anova: ProductAnova | DrawnAnova
 
@@ -230,7 +231,7 @@ class Study:
         if not isinstance(groups, Mapping | None):
             raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
         place, categories = model.input_names.index, by_column(read.levels)[0].items()
-        found = {name: tuple(map(place, own)) for name, own in categories if len(own) > 1}
+        found = {name: tuple(map(place, own)) for name, own in categories}
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):
                 raise ValueError(f"groups[{label!r}] is {columns!r}: a list of columns is needed.")
@@ -238,15 +239,17 @@ class Study:
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
                 if not own >= set(found.pop(other)):
                     raise ValueError(f"groups[{label!r}] has some columns of {other!r}, not all.")
+            outside = [name for j, name in enumerate(model.input_names) if j not in own]
+            if label in (*found, *outside):
+                raise ValueError(f"groups[{label!r}] has the name of a column outside of it.")
             found[label] = tuple(sorted(own))
         taken = {j for inputs in found.values() for j in inputs}
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}
         labels, inputs = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
-        if sum(map(len, inputs)) != model.n_inputs:
-            raise ValueError("groups: a group may not have the name of a column outside of it.")
         is_shown = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
         blocks = _known(model, inputs, rows)
-        return cls(model, k, labels, blocks, is_shown, rows, _anova(model, k, blocks))
+        anova = _anova(model, k, blocks)
+        return cls(model, k, labels, blocks, is_shown, read.levels, rows, anova)
 
     def pairs(self):
         """Pairs of blocks by their positions, but those that are zero for want of terms."""

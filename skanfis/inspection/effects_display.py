@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._validation import check_count
+from ..export.columns import by_column
 from .anova import N_SHARED, draw
 from .displays import BINS, BRIGHTEST, panels_or_new, pyplot
 from .effects import Study
@@ -20,6 +21,7 @@ _LEAST = 0.005
 _MOST_LETTERS = 24
 # Above and below the curves, as a part of what they span: below stand the data.
 _ROOM = 0.2
+_ROUNDING = 1e-9  # of the part of the rows that have a level without an indicator
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -114,11 +116,14 @@ class EffectsDisplay:
 
 def _along(study, g, n_points):
     """Rows along a block, the others at their means: "input", "points", and "levels" if any."""
-    name, own, model = study.labels[g], study.blocks[g].inputs, study.model
-    values, levels = np.unique(study.blocks[g].values, axis=0), None
-    if len(own) > 1:
-        values = np.eye(len(own))
-        levels = [model.input_names[j].removeprefix(f"{name}_") for j in own]
+    name, block, model = study.labels[g], study.blocks[g], study.model
+    values, levels, own = np.unique(block.values, axis=0), None, list(block.inputs)
+    indicated = [study.levels.get(model.input_names[j]) for j in own]
+    if indicated[0] is not None:
+        values, levels = np.eye(len(own)), [one.level for one in indicated]
+        if np.average(~block.values.any(axis=1), weights=block.weight) > _ROUNDING:
+            values = np.vstack([values, np.zeros(len(own))])
+            levels.append(" or ".join(by_column(study.levels)[1][indicated[0].column]))
     elif len(values) <= 2:
         levels = [f"{value:.6g}" for value in values[:, 0]]
     else:

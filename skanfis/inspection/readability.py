@@ -106,13 +106,7 @@ class Readability:
     @property
     def rule_errors(self) -> np.ndarray:
         """RMSE of each rule alone where it is the strongest, in units of the target."""
-        return self._unit * self.measures.rule_errors
-
-    @property
-    def _unit(self):
-        """A standard deviation of the target, of each output."""
-        target = self.model.target
-        return self.measures.deviation if target is None else target.spread
+        return self.measures.deviation * self.measures.rule_errors
 
     @property
     def reading_cost(self) -> int:
@@ -170,7 +164,7 @@ class Readability:
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
             both = found.rule_errors[r, k], found.rule_spreads[r, k]
-            errs, spread = (number(self._unit[k] * one, 2) for one in both)
+            errs, spread = (number(found.deviation[k] * one, 2) for one in both)
             named.append(f"{rule} (errs by {errs}, a constant by {spread})")
         what = "Errs more on its own rows than a constant would: rule"
         return [f"{what} {_named(named)}."] if named else []
@@ -289,9 +283,11 @@ def _on_signs(said):
             if up.size and down.size:
                 name, of_output = model.input_names[j], f" (of {output})" * (model.n_outputs > 1)
                 level = said.levels.get(name)
-                cause = f"by {name}" if level is None else f"if {level.said(True)},"
+                cause = f"by {name}{of_output}"
+                if level is not None:
+                    cause = f"if {level.said(True)}{of_output},"
                 rises, falls = map(_rules, (up, down))
-                found.append(f"{cause}{of_output} up in {rises} and down in {falls}")
+                found.append(f"{cause} up in {rises} and down in {falls}")
     named = _named(found, "; ")
     return [f"Rules go different ways, beyond chance: {named}."] if found else []
 

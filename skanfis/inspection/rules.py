@@ -70,9 +70,13 @@ def readability_in_training(estimator, model, levels):
     found = getattr(last_step(estimator), "readability_", None)
     if found is None:
         return None
-    measures = found.measures
+    scale = 1.0 if model.target is None else model.target.spread / found.model.target.spread
+    measures = replace(found.measures, deviation=scale * found.measures.deviation)
     # Sorted: columns that were only moved keep their numbers.
-    own, fitted = (np.sort(one.coefficients, axis=1) for one in (model, found.model))
+    own, fitted = (
+        np.append(np.sort(one.coefficients, axis=1), np.sort(one.antecedent.parameters))
+        for one in (model, found.model)
+    )
     if not np.array_equal(own, fitted):
         measures = replace(measures, printed_errors=np.full(model.n_outputs, np.nan))
     return replace(found, model=model, measures=measures, levels=levels)

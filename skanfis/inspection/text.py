@@ -33,10 +33,10 @@ _ROUNDING = 1e-9  # of a sum of shares
 # How to compute a prediction; the parts in braces are left out where there is no such thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
-    "AND multiplies. {terms}A rule says its value{line}, plus its own slopes.{errs}"
+    "AND multiplies. {terms}A rule says its value{line}{slopes}.{errs}"
 )
 _ERRS = " What a rule errs by is its RMSE, used alone, on the rows on which it is the strongest."
-_HOW_OF_ONE = "A prediction is what the rule says: its value, plus its slopes."
+_HOW_OF_ONE = "A prediction is what the rule says: its value{slopes}."
 # How true a condition is that is written out, by what stands before its place.
 _WRITTEN = {
     ">": "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; x < c ± h is "
@@ -45,6 +45,7 @@ _WRITTEN = {
 }
 _TERM = "The truth of {} terms is {}. "
 _LINE = ", less the common line's part in it, plus the common line"
+_SLOPES = ", plus its own slopes"
 _IN_PLACE = (
     "Every value has a part of this line in it; a rule's own slope stands in place of the line's."
 )
@@ -342,9 +343,9 @@ def _legend(said, found, precision):
     formulas = {family.name: family.formula for family in families}
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
     line, errs = _LINE if said.common.any() else "", _ERRS if found else ""
-    how = _HOW.format(terms="".join(terms), line=line, errs=errs)
-    if model.n_rules == 1 and not model.antecedent.n_terms:
-        how = _HOW_OF_ONE
+    how = _HOW_OF_ONE if model.n_rules == 1 and not model.antecedent.n_terms else _HOW
+    slopes = _SLOPES if said.is_own.any() else ""
+    how = how.format(terms="".join(terms), line=line, slopes=slopes, errs=errs)
     return "\n".join([*lines, "", _wrapped(how)])
 
 

@@ -316,7 +316,7 @@ def test_there_is_always_a_line(rng):
         (
             # There is no room for the margin between both.
             {"constraints": [FixedPoint([0.0, 0.0], 1.0), OutputLimits(upper=1.0 + 1e-9)]},
-            "9 rules keep the upper limit 1 of 'y' together with the 1 fixed point. Drop",
+            "limit 1 of 'y' together with the 1 fixed point. Drop a constraint, or use more rules",
         ),
     ],
 )

@@ -77,3 +77,13 @@ def test_ranges_of_curvature_hold(case):
         # 2b < 1: the slope jumps at the centre.
         assert ((found.curve[0] <= curve + slack) | ~is_bounded).all()
         assert ((curve - slack <= found.curve[1]) | ~is_bounded).all()
+
+
+def test_slopes_of_bells_hold_far_off(rng):
+    """However large the exponents are there."""
+    group, x = a_group(rng, Bell), 1e8 * rng.normal(size=(1, N_BOXES))
+    group.theta[2] = np.log([0.4, 0.6, 3.0, 5.0, 9.0])
+    found = ranges(group, x, x)
+    slope = -Bell.log_value_and_gradient(np.tile(x, (N_TERMS, 1)), group.theta)[1][0]
+    assert (found.slope[0] <= slope).all()
+    assert (slope <= found.slope[1]).all()

@@ -134,6 +134,8 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
     for found in (effects(fitted, table).table, effects(fitted).table):
         assert_allclose(found.loc[[rate, fibre], "sobol"], expected, rtol=0, atol=1e-9)
         assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
+    with pytest.raises(ValueError, match="has the name of a column outside of it"):
+        effects(fitted, table, groups={fibre: [rate]})
 
 
 @pytest.fixture(scope="module")

@@ -1,16 +1,18 @@
 """Readability: its tables and sentences, pipelines and tables of every kind."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
-from skanfis.inspection import export_text, measures, readability, rules_html
+from skanfis.inspection import explain, export_text, measures, readability, rules_html
 from skanfis.inspection.readability import readability_of_rows
 from skanfis.inspection.text import number
 
@@ -48,6 +50,23 @@ def test_tables_hold_the_measures(model):
         assert_array_equal(own["error"], measures.rule_errors[:, k] * measures.deviation[k])
     ratio = (measures.printed_errors / measures.errors).max()
     assert_array_equal(found.summary, [measures.alone.max(), ratio])
+
+
+def test_errors_are_in_the_units_of_the_target_whatever_the_rows(rng):
+    X = rng.uniform(-1.0, 1.0, (200, 2))
+    y = 10.0 * np.tanh(3.0 * X[:, 0]) + rng.normal(size=200)
+    model = quick(n_mfs=[2, 1]).fit(X, y)
+    few = np.abs(X[:, 0]) < 0.3
+    errors = readability(model, X[few], y[few]).rules["error"]
+    values = explain(model, X[few])
+    values = values[values["strength"] > 0.5]
+    for r, error in errors.items():
+        own = values[values["rule"] == r]
+        assert_allclose(error, np.sqrt(np.mean((own["value"] - y[few][own["row"]]) ** 2)))
+    # Behind a scaler of the target as well what the fit has found is in its units.
+    scaled = TransformedTargetRegressor(quick(n_mfs=[2, 1]), transformer=StandardScaler())
+    told = re.findall(r"errs by (\S+) there", export_text(scaled.fit(X, y)))
+    assert sorted(told) == sorted(number(e, 2) for e in readability(scaled, X, y).rules["error"])
 
 
 def test_nothing_is_found_at_the_limits():

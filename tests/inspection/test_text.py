@@ -404,14 +404,16 @@ def test_a_model_without_data_has_no_weights_to_tell():
     assert "errs" not in text
 
 
-def test_what_the_text_errs_is_told_in_the_units_of_the_fit_alone(rng):
+@pytest.mark.parametrize("order", [0, 1])
+def test_what_the_text_errs_is_told_in_the_units_of_the_fit_alone(order, rng):
     """Behind a scaler numbers are rounded elsewhere; the other findings stay."""
     X = rng.uniform(0.0, 1e3, (100, 2))
     y = np.sin(X[:, 0] / 300.0) + 0.1 * rng.standard_normal(100)
-    plain = ANFISRegressor(n_mfs=2).fit(X, y)
-    scaled = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2)).fit(X, y)
+    plain = ANFISRegressor(n_mfs=2, order=order).fit(X, y)
+    scaled = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=2, order=order)).fit(X, y)
     *_, how, told = export_text(plain).split("\n\n")
     assert "What a rule errs by" in " ".join(how.split())
+    assert ("plus its own slopes" in " ".join(how.split())) == bool(order)
     assert "; the text as printed errs " in told.splitlines()[0]
     *_, untold = export_text(scaled).split("\n\n")
     assert re.fullmatch(r"\d+ numbers\.", untold.splitlines()[0])
