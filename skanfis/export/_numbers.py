@@ -35,7 +35,7 @@ class Numbers:
         self.high = _rounded(model.maximum, dtype, "the maximum of an input")
         self.reference = reference = _rounded(model.reference, dtype, "the mean of an input")
         what = "the inverse spread of an input"
-        self.inverse_spread = _rounded(1.0 / model.spread, dtype, what)
+        self.inverse_spread = _rounded(1.0 / model.spread, dtype, what, counts=True)
         # With its box as it is rounded: a function on the numbers differs by rounding alone.
         box = {"minimum": self.low.astype(float), "maximum": self.high.astype(float)}
         self.model = model = replace(model, **box)
@@ -55,9 +55,13 @@ class Numbers:
             order, self.node_ends = model.antecedent.walk
             self.nodes, self.node_input = self.terms[0].constants[order], self.term_input[order]
         # Coefficients (n_rules, n_outputs, 1 + n_slopes) about an offset, and inputs with slopes.
-        offset, coefficients, self.slope_input = _consequents(model, reference)
+        offset, coefficients, slopes = _consequents(model, reference)
+        self.slope_input = slopes
         self.offset = _rounded(offset, dtype, "a typical output")
-        self.consequents = _rounded(coefficients, dtype, "a consequent")
+        # A slope that is small by its unit counts by what it adds to an output, over the box.
+        adds = np.abs(coefficients) * np.append(1.0, (model.maximum - model.minimum)[slopes])
+        counts = adds > np.finfo(dtype).eps * adds.max(axis=(0, 2), keepdims=True)
+        self.consequents = _rounded(coefficients, dtype, "a consequent", counts)
         # How far the tangent is followed in each input, so that the sum in deviations is finite.
         self.reach = _reach(model, dtype)
         # Inputs whose tangents are found at one place: those of group 0 and g, where they are; all
@@ -87,18 +91,23 @@ def rounded_within(limits, dtype):
     return np.stack([low, high])
 
 
-def _rounded(values, dtype, what):
-    """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero."""
-    values = np.asarray(values, dtype=float)
-    limits = np.finfo(dtype)
-    largest, ends = np.abs(values).max(initial=0.0), (float(limits.tiny), float(limits.max))
-    if largest != 0.0 and not ends[0] <= largest <= ends[1]:
+def _rounded(values, dtype, what, counts=None):
+    """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero.
+
+    ValueError where that is a value that ``counts``, by default the largest, or there is no such
+    number.
+    """
+    values, sizes = np.asarray(values, dtype=float), np.abs(values)
+    least, most = float(np.finfo(dtype).tiny), float(np.finfo(dtype).max)
+    counts = sizes == sizes.max(initial=0.0) if counts is None else counts
+    lost = (sizes > most) | (counts & (0.0 < sizes) & (sizes < least))
+    if lost.any():
         name = "Single precision" if dtype == np.float32 else "Double precision"
         raise ValueError(
-            f"{name} cannot hold {what}, {largest:g}, with all its digits: it goes from "
-            f"{ends[0]:.2g} to {ends[1]:.2g}. Scale the data, or export in double precision."
+            f"{name} cannot hold {what}, {sizes[lost][0]:g}, with all its digits: it goes from "
+            f"{least:.2g} to {most:.2g}. Scale the data, or export in double precision."
         )
-    return np.where(np.abs(values) < float(limits.tiny), 0.0, values).astype(dtype)
+    return np.where(sizes < least, 0.0, values).astype(dtype)
 
 
 def _term_tables(model, reference):

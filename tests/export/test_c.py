@@ -181,7 +181,14 @@ def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("scale_x", "scale_y", "what"), [(1e45, 1.0, "an input"), (1.0, 1e42, "output")]
+    ("scale_x", "scale_y", "what"),
+    [
+        (1e45, 1.0, "an input"),
+        (1.0, 1e42, "output"),
+        # All slopes are zero in single precision, where the constants are not.
+        (1e9, 1e-30, "a consequent"),
+        ([5.5e35, 1.0, 1.0], 1.0, "inverse spread of an input"),
+    ],
 )
 def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
     model = quick(n_mfs=2).fit(X * scale_x, Y * scale_y)

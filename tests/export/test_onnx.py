@@ -119,8 +119,8 @@ def test_row_that_is_not_finite_gives_nan(policy):
 
 def test_tangent_without_end_is_finite():
     signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
-    for case in FEWEST:
-        if case.model.out_of_bounds == "linear":
+    for case in FEWEST[::3]:
+        if case.model.out_of_bounds == "linear" and case.model.tangent_at is not None:
             # In such units that slopes times the largest numbers are no numbers.
             steep = replace(case.model, coefficients=1e10 * case.model.coefficients, target=None)
             endless = steep.with_out_of_bounds("linear", np.inf)
