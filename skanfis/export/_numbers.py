@@ -100,7 +100,7 @@ def _rounded(values, dtype, what, counts=None):
     values, sizes = np.asarray(values, dtype=float), np.abs(values)
     least, most = float(np.finfo(dtype).tiny), float(np.finfo(dtype).max)
     counts = sizes == sizes.max(initial=0.0) if counts is None else counts
-    lost = (sizes > most) | (counts & (0.0 < sizes) & (sizes < least))
+    lost = (sizes > most) | (counts & (sizes > 0.0) & (sizes < least))
     if lost.any():
         name = "Single precision" if dtype == np.float32 else "Double precision"
         raise ValueError(
