@@ -351,6 +351,14 @@ HOSTILE = [
 ]
 
 
+def test_identifiers_differ_in_what_an_old_compiler_looks_at():
+    name, found = "compensation_new", set()
+    for case in FEWEST:
+        code = export_c(case.model, name=name)
+        found |= set(re.findall(rf"\b{name}_\w+", code.source, re.IGNORECASE))
+    assert len({one[:31] for one in found}) == len(found)
+
+
 @needs_compiler
 @pytest.mark.parametrize("std", ["c89", "c99"])
 def test_names_of_columns_cannot_leave_their_comment(std, tmp_path, rng):
