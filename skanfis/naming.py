@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from .antecedent.tree import CRISP
+from .digits import in_digits, plain, rounded, told_apart
 from .membership import Gaussian, SigmoidFalling, SigmoidRising
-from .policies import MOST_DIGITS, told_apart
 
 __all__ = [
     "LINGUISTIC",
@@ -113,11 +113,8 @@ def _written(group, own, low, high, fewest):
 
 def _with_length(place, length, alone, digits):
     """Write "6.8 ± 0.3", or the place alone."""
-    last = digits - 1 - int(np.floor(np.log10(length)))
-    place = round(place, last) + 0.0
-    size = int(np.floor(np.log10(abs(place)))) if place else -last
-    text = _plain(place, min(max(size + 1 + last, 1), MOST_DIGITS))
-    return text if alone else f"{text} ± {_plain(length, digits)}"
+    text = plain(rounded(place, length, digits))
+    return text if alone else f"{text} ± {in_digits(length, digits)}"
 
 
 def parameters_written(name, family, theta):
@@ -171,7 +168,7 @@ def _near(places, size):
     """Names of places, in as few digits as tell them apart; equal places are numbered."""
     if 0.0 < size < np.inf:
         places = _ALIKE * size * np.round(places / (_ALIKE * size)) + 0.0
-    return distinct(f"near {text}" for text in told_apart(places, _plain, 3))
+    return distinct(f"near {text}" for text in told_apart(places, 3))
 
 
 def distinct(names, numbered="{} ({})"):
@@ -185,11 +182,3 @@ def distinct(names, numbered="{} ({})"):
         taken[name] = 1
         found.append(name)
     return tuple(found)
-
-
-def _plain(number, digits):
-    """So many significant digits; an exponent only where zeros would fill up a large number."""
-    if 1e-4 <= abs(number) < max(1e9, 10.0 ** (digits + 5)):
-        shown = {"precision": digits, "unique": False, "fractional": False, "trim": "-"}
-        return np.format_float_positional(number, **shown)
-    return f"{number:.{digits}g}"

@@ -15,7 +15,6 @@ from sklearn.preprocessing import RobustScaler
 from skanfis.bounds import bounds
 from skanfis.export import export_c
 from skanfis.export.c.dialect import STATUS
-from skanfis.export.c.header import in_digits
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS
 from skanfis.options import LinearExtrapolation
@@ -299,14 +298,6 @@ def test_scattered_rules_take_an_exponential_per_rule_and_what_their_terms_do():
     # the exponent, three more and the way ahead; then the mean, and values twice.
     outside = [5, 5, 0, 5 * 7 + 3 + 2 * 3 * 2 + 3 + 2, 2 * 5 + 3]
     np.testing.assert_array_equal(cost_of(model, "linear"), inside + outside)
-
-
-def test_ranges_have_digits_that_mean_something():
-    assert in_digits(-1.4e-14, 60.0123456) == ["0", "60.0123"]
-    assert in_digits(-0.0, 2e-5) == ["0", "2e-05"]
-    assert in_digits(1.7e9, 1.7e9 + 12.3456789) == ["1700000000", "1700000012.35"]
-    assert in_digits(20.5, 20.5) == ["20.5", "20.5"]
-    assert in_digits(-np.inf, 1.0) == ["-inf", "1"]
 
 
 def test_units_and_notes_stand_in_the_header():

@@ -10,9 +10,9 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
+from skanfis.digits import in_digits
 from skanfis.inspection import export_text, measures, readability, rules_html
 from skanfis.inspection.readability import readability_of_rows
-from skanfis.inspection.text import number
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
@@ -87,7 +87,7 @@ def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
     errs = np.sqrt(np.mean((coefficients[1] - y[50:]) ** 2))
     assert [one for one in poor.findings if "constant" in one] == [
         "Errs more on its own rows than a constant would: rule 1 "
-        f"(errs by {number(errs, 2)}, a constant by 1)."
+        f"(errs by {in_digits(errs, 2)}, a constant by 1)."
     ]
 
 
