@@ -63,20 +63,22 @@ class Numbers:
         counts = adds > np.finfo(dtype).eps * adds.max(axis=(0, 2), keepdims=True)
         self.consequents = _rounded(coefficients, dtype, "a consequent", counts)
         # How far the tangent is followed in each input, so that the sum in deviations is finite.
-        self.reach = _reach(model, dtype)
+        end = float(np.finfo(dtype).max)
+        with np.errstate(over="ignore"):
+            reach = min(model.max_extrapolation, 0.25 * end / model.n_inputs) * model.spread
+        self.reach = _rounded(np.minimum(reach, end), dtype, "a reach", counts=False)
         # Inputs whose tangents are found at one place: those of group 0 and g, where they are; all
         # others at ``tangent_at``, about the reference. None where they all are where they are.
         self.tangent_group = None
         if model.tangent_at is not None and model.antecedent.n_terms:
             is_held = np.isfinite(model.tangent_at)
             self.tangent_group = np.where(is_held, np.cumsum(is_held), 0)
-            at = np.where(is_held, model.tangent_at - model.reference, 0.0)
+            at = np.where(is_held, model.tangent_at - reference, 0.0)
             self.tangent_at = _rounded(at, dtype, "a median of an input")
         # (2, n_outputs); None where outputs are not held.
         self.output_limits = None
         if model.out_of_bounds == "linear" or np.isfinite(model.output_limits).any():
             # Where nothing else holds outputs, the largest numbers do.
-            end = float(np.finfo(dtype).max)
             self.output_limits = rounded_within(np.clip(model.output_limits, -end, end), dtype)
         # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
         self.support = None if model.support is None else _support(model, reference)
@@ -136,15 +138,6 @@ def _consequents(model, reference):
     offset = model.rule_weights @ coefficients[:, :, 0] / model.rule_weights.sum()
     coefficients[:, :, 0] -= offset
     return offset, coefficients[:, :, np.r_[0, 1 + slope_inputs]], slope_inputs
-
-
-def _reach(model, dtype):
-    limits = np.finfo(dtype)
-    largest = float(limits.max)
-    with np.errstate(over="ignore"):
-        reach = min(model.max_extrapolation, 0.25 * largest / model.n_inputs) * model.spread
-    reach = np.minimum(reach, largest)
-    return np.where(reach < float(limits.tiny), 0.0, reach).astype(dtype)
 
 
 def _support(model, reference):

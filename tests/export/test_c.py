@@ -16,14 +16,15 @@ from skanfis.bounds import bounds
 from skanfis.export import export_c
 from skanfis.export.c.dialect import STATUS
 from skanfis.learning import VariableProjection
-from skanfis.membership import MEMBERSHIPS
+from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.options import LinearExtrapolation
 from skanfis.policies import OUT_OF_BOUNDS
 
+from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from .every_model import CASES, FEWEST, full_scale, rows, surface
-from .rule_bases import MODELS
+from .rule_bases import MODELS, SCALE, build
 
 MIN_COVERAGE = 0.3
 TOLERANCE = {"double": 1e-12, "float": 1e-5}
@@ -136,6 +137,22 @@ def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, 
     ((found, status),) = evaluate_all([code], X.astype(np.float32), tmp_path, "c99", [1])
     assert np.abs(found[:, 0] - estimator.predict(X)).max() < 1e-6 * np.abs(y / scale).max()
     assert (status == STATUS["IN_RANGE"]).all()
+
+
+@needs_compiler
+def test_tangents_of_far_inputs_are_found_at_their_medians(tmp_path):
+    # A float has steps of 8 at 1e8, where the inputs have a deviation of 600.
+    offset = np.array([1e8 + 3.0, 20.0, 0.0])
+    at = np.array([1e8 + 100.0, np.nan, 0.0])
+    antecedent = random_grid(np.random.default_rng(0), [Gaussian] * 3, (3, 2, 2))
+    low, high = np.float32([offset - 2.0 * SCALE, offset + 1.5 * SCALE]).astype(float)
+    changes = {"minimum": low, "maximum": high, "tangent_at": at, "out_of_bounds": "linear"}
+    model = build(antecedent, offset=offset, **changes)
+    Z = (offset + SCALE * np.random.default_rng(1).uniform(-3.0, 3.0, (500, 3))).astype(np.float32)
+    code = export_c(model, name="m", dtype="float")
+    ((found, _),) = evaluate_all([code], Z, tmp_path, "c99", [1], flags=[])
+    wanted = model.predict(Z.astype(float))
+    assert np.abs(found - wanted).max() < 1e-5 * full_scale(wanted)
 
 
 @pytest.mark.theory
