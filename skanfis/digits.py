@@ -2,8 +2,6 @@
 
 import numpy as np
 
-__all__ = ["MOST_DIGITS", "in_digits", "plain", "range_in_digits", "rounded", "told_apart"]
-
 # More than these tell no two doubles apart, and give back no other double.
 MOST_DIGITS = 17
 

@@ -15,6 +15,7 @@ its own membership when its input's are normalised; scattered rules: the rule's 
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import ClassVar
 
 import numpy as np
@@ -37,6 +38,15 @@ class TermGroup:
     def n_terms(self):
         """Number of terms in the group."""
         return self.inputs.size
+
+
+def groups_of(terms):
+    """Groups of terms (input, family, theta), consecutive ones of one family together."""
+    groups = []
+    for family, members in groupby(terms, key=lambda term: term[1]):
+        inputs, _, theta = zip(*members, strict=True)
+        groups.append(TermGroup(family, np.array(inputs), np.array(theta).T.copy()))
+    return tuple(groups)
 
 
 def _stack(values, Z):

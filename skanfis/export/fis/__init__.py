@@ -36,6 +36,15 @@ AggMethod='sum'
 DefuzzMethod='wtaver'"""
 # Points of the box at which the rules of the file are tried.
 _N_POINTS = 1000
+_GAP = (
+    "no rule of the .fis file fires: other programs give NaN, zero or the middle of the output's "
+    "Range there, skanfis what the nearest rule says. A membership without a foot (mf = "
+    "'gaussian', 'bell', 'two_sided_gaussian') or fewer, wider terms leave no such gaps."
+)
+_HELD = (
+    "the .fis file goes beyond the limits that skanfis holds outputs within: clamp them as the "
+    "comment at its head says."
+)
 
 
 def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
@@ -222,19 +231,8 @@ def _warn_of_differences(model):
     fires = np.zeros(_N_POINTS, dtype=bool)
     for rule in model.antecedent.rule_terms:
         fires |= np.prod(mu[rule], axis=0) > 0.0
-    if not fires.all():
-        warn_user(
-            f"At {np.mean(~fires):.1%} of {_N_POINTS} points within the training range no rule of "
-            "the .fis file fires: other programs give NaN, zero or the middle of the output's "
-            "Range there, skanfis what the nearest rule says. A membership without a foot (mf = "
-            "'gaussian', 'bell', 'two_sided_gaussian') or fewer, wider terms leave no such gaps.",
-            UserWarning,
-        )
     is_held = (model.predict(X) != replace(model, target=None).predict(X)).any(axis=1)
-    if is_held.any():
-        warn_user(
-            f"At {np.mean(is_held):.1%} of {_N_POINTS} points within the training range the .fis "
-            "file goes beyond the limits that skanfis holds outputs within: clamp them as the "
-            "comment at its head says.",
-            UserWarning,
-        )
+    for is_there, what in ((~fires, _GAP), (is_held, _HELD)):
+        if is_there.any():
+            where = f"{np.mean(is_there):.1%} of {_N_POINTS} points within the training range"
+            warn_user(f"At {where} {what}", UserWarning)
