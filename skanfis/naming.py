@@ -99,7 +99,12 @@ def _written(group, own, low, high, fewest):
     names: dict[tuple, str] = {}
     most = max(fewest, _MOST_DIGITS_OF_LENGTH)
     for digits in range(fewest, most + 1):
-        written = {term: sign + _with_length(*term, digits) for term in terms}
+        written = {}
+        for place, length, is_alone in terms:
+            text = sign + plain(rounded(place, length, digits))
+            if not is_alone:
+                text += f" ± {in_digits(length, digits)}"
+            written[place, length, is_alone] = text
         taken = Counter(written.values())
         for term, text in written.items():
             if term not in names and (taken[text] == 1 or digits == most):
@@ -109,12 +114,6 @@ def _written(group, own, low, high, fewest):
     if (low, high) == (0.0, 1.0):
         names |= {term: "1" if sign == "> " else "0" for term in terms if term[2]}
     return [names[term] for term in terms]
-
-
-def _with_length(place, length, alone, digits):
-    """Write "6.8 ± 0.3", or the place alone."""
-    text = plain(rounded(place, length, digits))
-    return text if alone else f"{text} ± {in_digits(length, digits)}"
 
 
 def parameters_written(name, family, theta):

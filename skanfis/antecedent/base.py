@@ -105,6 +105,15 @@ class Antecedent(ABC):
         return sum(group.n_terms for group in self.groups)
 
     @property
+    def terms(self):
+        """Input, family and theta of every term."""
+        return [
+            (j, group.family, theta)
+            for group in self.groups
+            for j, theta in zip(group.inputs.tolist(), group.theta.T, strict=True)
+        ]
+
+    @property
     def term_inputs(self):
         """Input of every term, shape (n_terms,)."""
         every = [group.inputs for group in self.groups]
@@ -169,17 +178,8 @@ class Antecedent(ABC):
         table = self.rule_terms if table is None else table
         kept, place = np.delete(np.arange(self.n_terms), terms), np.full(self.n_terms + 1, -1)
         place[kept] = np.arange(kept.size)
-        return RuleTableAntecedent(self._groups_with(kept), place[table])
-
-    def _groups_with(self, terms):
-        """The groups with these terms alone."""
-        left, start = [], 0
-        for group in self.groups:
-            own = terms[(terms >= start) & (terms < start + group.n_terms)] - start
-            if own.size:
-                left.append(TermGroup(group.family, group.inputs[own], group.theta[:, own]))
-            start += group.n_terms
-        return tuple(left)
+        every = self.terms
+        return RuleTableAntecedent(groups_of(every[t] for t in kept), place[table])
 
     @property
     def parameters(self):

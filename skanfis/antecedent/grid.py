@@ -72,7 +72,8 @@ class GridAntecedent(Antecedent):
         terms = terms[np.isin(inputs[terms], left[numbers > 1])]
         own = inputs[terms].tolist()
         counts = tuple(own.count(j) for j in dict.fromkeys(own))
-        return replace(self, groups=self._groups_with(terms), counts=counts), terms
+        every = self.terms
+        return replace(self, groups=groups_of(every[t] for t in terms), counts=counts), terms
 
     @property
     def rule_terms(self):

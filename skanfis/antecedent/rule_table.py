@@ -70,11 +70,7 @@ class RuleTableAntecedent(Antecedent):
         Two sides of an input are a product of two sigmoids. What no term says, three of them, is a
         ValueError.
         """
-        own = [
-            (int(j), group.family, theta)
-            for group in self.groups
-            for j, theta in zip(group.inputs, group.theta.T, strict=True)
-        ]
+        own = self.terms
         rules: list[dict[int, tuple[int, ...]]] = []
         made: dict[tuple, tuple] = {}
         for r, row in enumerate(self.table):

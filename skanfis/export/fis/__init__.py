@@ -123,11 +123,8 @@ def _premises(model):
     A rule's entry is the number of its term on that input, from 1 on, or 0 for none.
     """
     inputs, rule_terms = model.antecedent.term_inputs, model.antecedent.rule_terms
-    terms = [
-        function_of(group.family, natural)
-        for group in model.antecedent.groups
-        for natural in group.family.natural(group.theta).T
-    ]
+    every = model.antecedent.terms
+    terms = [function_of(family, family.natural(theta)) for _, family, theta in every]
     number = [np.count_nonzero(inputs[: t + 1] == j) for t, j in enumerate(inputs)]
     rules = np.zeros((model.n_rules, model.n_inputs), dtype=int)
     for r, place in np.argwhere(rule_terms >= 0):
