@@ -96,8 +96,8 @@ def rounded_within(limits, dtype):
 def _rounded(values, dtype, what, counts=None):
     """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero.
 
-    ValueError where that is a value that ``counts``, by default the largest, or there is no such
-    number.
+    ValueError where that happens to one that ``counts``, by default the largest, or one is beyond
+    the type.
     """
     values, sizes = np.asarray(values, dtype=float), np.abs(values)
     least, most = float(np.finfo(dtype).tiny), float(np.finfo(dtype).max)

@@ -16,7 +16,7 @@ from ._numbers import Numbers
 
 # Softmax along one axis and ReduceSum with axes as an input are of this version.
 _OLDEST_OPSET = 13
-# onnxruntime leaves out a sum with one number that single precision has not, as with zero.
+# onnxruntime leaves out the addition of one number that is zero in single precision.
 _TAKEN_FOR_ZERO = 1e-45
 
 
