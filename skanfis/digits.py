@@ -9,8 +9,8 @@ MOST_DIGITS = 17
 def rounded(values, unit, digits):
     """Values to so many digits of a unit; each is the number nearest to its decimals."""
     decimals = digits - 1 - np.floor(np.log10(unit)).astype(int)
-    # Python's own rounding is right to the last digit, and at every size.
-    return np.vectorize(round, otypes=[float])(values, decimals) + 0.0
+    # Python's own rounding is right to the last digit, and at every size; NumPy's is not.
+    return np.vectorize(round, otypes=[float])(np.asarray(values, dtype=float), decimals) + 0.0
 
 
 def plain(value):

@@ -30,6 +30,9 @@ def test_number_has_so_many_digits(value, digits, text):
         (-0.0, 2e-5, "0 to 2e-05"),
         (1.7e9, 1.7e9 + 12.3456789, "1700000000 to 1700000012.3457"),
         (20.5, 20.5, "20.5 to 20.5"),
+        (np.float32(0.1), np.float32(63.512345), "0.1 to 63.5123"),
+        # Rounded by NumPy it has more digits.
+        (np.float64(5.0151e-22), np.float64(5.0161e-22), "5.0151e-22 to 5.0161e-22"),
         (-np.inf, 1.0, "-inf to 1"),
     ],
 )
