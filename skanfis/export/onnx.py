@@ -83,8 +83,11 @@ def _convert(scope, node, container):
     is_double = isinstance(node.outputs[0].type, DoubleTensorType)
     dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
     graph = _Graph(scope, container, np.dtype(dtype))
-    # One input of all columns, or, of a frame, one of each.
-    parts = [graph.node("Cast", _Value(graph, one.full_name), to=kind) for one in node.inputs]
+    # One input of all columns, or, of a frame, one of each, which may be in another order.
+    named, given = {one.raw_name: one for one in node.inputs}, node.inputs
+    if named.keys() == set(model.input_names):
+        given = [named[name] for name in model.input_names]
+    parts = [graph.node("Cast", _Value(graph, one.full_name), to=kind) for one in given]
     y = _Formula(Numbers(model, dtype), graph).outputs(graph.node("Concat", *parts, axis=1))
     graph.node("Identity", y, output=node.outputs[0].full_name)
 

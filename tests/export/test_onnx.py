@@ -131,10 +131,11 @@ def test_tangent_without_end_is_finite():
 def test_a_frame_makes_an_input_of_every_column():
     table = pd.DataFrame({"a": X[:, 0], "b": X[:, 1].astype(np.float32), "c": X[:, 2].astype(int)})
     estimator = quick(n_mfs=2).fit(table, Y)
-    graph = skl2onnx.to_onnx(estimator, table[:1]).SerializeToString()
-    session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
-    (y,) = session.run(None, {name: table[[name]].to_numpy() for name in table})
-    np.testing.assert_allclose(y[:, 0], estimator.predict(table))
+    for shown in (table[:1], table.loc[:1, ["c", "a", "b"]]):
+        graph = skl2onnx.to_onnx(estimator, shown).SerializeToString()
+        session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+        (y,) = session.run(None, {name: table[[name]].to_numpy() for name in table})
+        np.testing.assert_allclose(y[:, 0], estimator.predict(table))
 
 
 def test_policy_is_that_of_the_estimator_at_conversion():
