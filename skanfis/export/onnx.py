@@ -119,8 +119,7 @@ class _Graph:
             array = array.astype(self.dtype)
         if array.size == 1 and 0.0 < abs(array.item()) < _TAKEN_FOR_ZERO:
             raise ValueError(
-                f"onnxruntime takes {array.item():g}, a constant of the model, for zero: scale "
-                "the data."
+                f"onnxruntime takes {array.item():g}, of the model, for zero: scale the data."
             )
         name = self.scope.get_unique_variable_name("constant")
         kind = helper.np_dtype_to_tensor_dtype(array.dtype)

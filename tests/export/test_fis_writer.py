@@ -113,4 +113,4 @@ def test_says_what_outputs_are_held_within():
     assert_allclose(clamped, model.predict(rows), atol=1e-11 * full_scale(model))
     endless = replace(model, out_of_bounds="linear", max_extrapolation=np.inf)
     with pytest.warns(UserWarning, match="goes beyond"):
-        assert "Output1 is held within [-0.9 inf]: clamp it" in export_fis(endless)
+        assert "Output1 is held within [-0.9 inf]: clamp it." in export_fis(endless)

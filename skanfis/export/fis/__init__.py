@@ -185,8 +185,7 @@ def _comments_and_names(model):
         comments.append("% The constraints of the fit hold within the Range: beyond it, not here.")
     for k, limits in enumerate(model.output_limits.T, start=1):
         if np.isfinite(limits).any():
-            held = f"% In skanfis, Output{k} is held within {_numbers(limits)}: clamp it to that."
-            comments.append(held)
+            comments.append(f"% In skanfis, Output{k} is held within {_numbers(limits)}: clamp it.")
     found = []
     for kind, given in (("Input", model.input_names), ("Output", model.output_names)):
         names = _identifiers(given, kind.lower())
