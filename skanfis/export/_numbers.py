@@ -12,7 +12,7 @@ import numpy as np
 
 from ..antecedent import TreeAntecedent
 from ..membership import Membership
-from ._families import FORMULAS
+from ._families import FORMULAS, check_own
 
 
 class TermTable(NamedTuple):
@@ -116,11 +116,7 @@ def _term_tables(model, reference):
     start = 0
     for group in model.antecedent.groups:
         family, inputs = group.family, group.inputs
-        if family not in FORMULAS:
-            raise ValueError(
-                f"Memberships {family.name!r} cannot be exported; "
-                f"{', '.join(one.name for one in FORMULAS)} can."
-            )
+        check_own(family)
         theta = group.theta.copy()
         theta[0] -= reference[inputs]
         constants = np.column_stack(FORMULAS[family].constants(theta))

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..membership import FAMILIES
 from ..model import TSKModel
+from ._families import check_own
 from .folding import fold
 from .json_reader import FORMAT, INPUT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
 from .limits import read_bytes
@@ -151,8 +151,7 @@ def _terms(model):
     before = [theta for _, _, theta in model.initial_antecedent.terms]
     every = zip(model.term_names, model.antecedent.terms, before, strict=True)
     for name, (j, family, theta), start in every:
-        if family not in FAMILIES.values():
-            raise ValueError(f"the membership {family.name!r} is not one of skanfis' own.")
+        check_own(family)
         term = {"name": name, "input": j, "function": family.name}
         after, start = (
             {key_of(one): float(value) for one, value in zip(family.parameters, own, strict=True)}

@@ -69,7 +69,7 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
     Raises
     ------
     ValueError, TypeError
-        As :func:`fold`; ValueError if a membership has no function in the format, or if
+        As :func:`fold`; ValueError if a membership is none of skanfis' own, or if
         :func:`read_fis` would refuse a number, such as a width beyond 1e50.
 
     Warns
