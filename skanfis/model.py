@@ -189,14 +189,11 @@ class TSKModel:
         """
         antecedent = self.antecedent if trained else self.initial_antecedent
         terms: list[dict] = []
-        for group in antecedent.groups:
-            names = [parameter.name for parameter in group.family.parameters]
-            natural = group.family.natural(group.theta)
-            for j, values in zip(group.inputs, natural.T, strict=True):
-                numbers = dict(zip(names, map(float, values), strict=True))
-                name = self.term_names[len(terms)]
-                term = {"input": self.input_names[j], "name": name, "function": group.family.name}
-                terms.append(term | numbers)
+        for name, (j, family, theta) in zip(self.term_names, antecedent.terms, strict=True):
+            keys = [parameter.name for parameter in family.parameters]
+            natural = family.natural(theta).tolist()
+            term = {"input": self.input_names[j], "name": name, "function": family.name}
+            terms.append(term | dict(zip(keys, natural, strict=True)))
         return terms
 
     def in_bounds(self, X) -> np.ndarray:

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from .antecedent.tree import CRISP
+from .digits import in_digits, plain, rounded, told_apart
 from .membership import Gaussian, SigmoidFalling, SigmoidRising
-from .policies import MOST_DIGITS, told_apart
 
 __all__ = [
     "LINGUISTIC",
@@ -99,7 +99,12 @@ def _written(group, own, low, high, fewest):
     names: dict[tuple, str] = {}
     most = max(fewest, _MOST_DIGITS_OF_LENGTH)
     for digits in range(fewest, most + 1):
-        written = {term: sign + _with_length(*term, digits) for term in terms}
+        written = {}
+        for place, length, is_alone in terms:
+            text = sign + plain(rounded(place, length, digits))
+            if not is_alone:
+                text += f" ± {in_digits(length, digits)}"
+            written[place, length, is_alone] = text
         taken = Counter(written.values())
         for term, text in written.items():
             if term not in names and (taken[text] == 1 or digits == most):
@@ -109,15 +114,6 @@ def _written(group, own, low, high, fewest):
     if (low, high) == (0.0, 1.0):
         names |= {term: "1" if sign == "> " else "0" for term in terms if term[2]}
     return [names[term] for term in terms]
-
-
-def _with_length(place, length, alone, digits):
-    """Write "6.8 ± 0.3", or the place alone."""
-    last = digits - 1 - int(np.floor(np.log10(length)))
-    place = round(place, last) + 0.0
-    size = int(np.floor(np.log10(abs(place)))) if place else -last
-    text = _plain(place, min(max(size + 1 + last, 1), MOST_DIGITS))
-    return text if alone else f"{text} ± {_plain(length, digits)}"
 
 
 def parameters_written(name, family, theta):
@@ -171,7 +167,7 @@ def _near(places, size):
     """Names of places, in as few digits as tell them apart; equal places are numbered."""
     if 0.0 < size < np.inf:
         places = _ALIKE * size * np.round(places / (_ALIKE * size)) + 0.0
-    return distinct(f"near {text}" for text in told_apart(places, _plain, 3))
+    return distinct(f"near {text}" for text in told_apart(places, 3))
 
 
 def distinct(names, numbered="{} ({})"):
@@ -185,11 +181,3 @@ def distinct(names, numbered="{} ({})"):
         taken[name] = 1
         found.append(name)
     return tuple(found)
-
-
-def _plain(number, digits):
-    """So many significant digits; an exponent only where zeros would fill up a large number."""
-    if 1e-4 <= abs(number) < max(1e9, 10.0 ** (digits + 5)):
-        shown = {"precision": digits, "unique": False, "fractional": False, "trim": "-"}
-        return np.format_float_positional(number, **shown)
-    return f"{number:.{digits}g}"

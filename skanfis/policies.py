@@ -6,18 +6,18 @@ from numbers import Real
 
 import numpy as np
 
+from .digits import told_apart
+
 __all__ = [
     "FARTHEST",
     "FARTHEST_ROW",
     "MAX_EXTRAPOLATION",
-    "MOST_DIGITS",
     "OUT_OF_BOUNDS",
     "SILENT",
     "TargetRange",
     "check_policy",
     "describe_out_of_bounds",
     "policy_in_words",
-    "told_apart",
 ]
 
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
@@ -29,8 +29,6 @@ SILENT = ("nan", "raise")
 MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 # A row further off than so many of them counts as so far: results saturate, and overflow nowhere.
 FARTHEST_ROW = 1e100
-# More than these tell no two doubles apart, and give back no other double.
-MOST_DIGITS = 17
 # What a prediction may have beyond the range of the target: of a line so many standard deviations
 # at least, whatever the limit of inputs; of rules that bend, for peaks between rows, this part of
 # the range.
@@ -107,18 +105,9 @@ def describe_out_of_bounds(X, minimum, maximum, names) -> str:
     for column, low, high, name in zip(X.T, minimum, maximum, names, strict=True):
         outside = (column < low) | (column > high)
         if outside.any():
-            ends = told_apart([low, high, column.min(), column.max()], "{:.{}g}".format, 6)
+            ends = told_apart([low, high, column.min(), column.max()], 6)
             parts.append(
                 f"{name!r} in {outside.sum()} of {column.size} rows (trained on "
                 f"[{ends[0]}, {ends[1]}], found [{ends[2]}, {ends[3]}])"
             )
     return "X lies outside the training data: " + "; ".join(parts) + "."
-
-
-def told_apart(values, write, fewest):
-    """Numbers in ``fewest`` digits, or as many as tell them apart, as those of time stamps."""
-    for n_digits in range(fewest, MOST_DIGITS + 1):
-        texts = [write(value, n_digits) for value in values]
-        if len(set(texts)) == len(set(values)):
-            break
-    return texts

@@ -25,6 +25,7 @@ LAYERS = {
     "exceptions": [],
     "blocks": NUMERIC,
     "_validation": SKLEARN,
+    "digits": NUMERIC,
     "policies": NUMERIC,
     "options": SKLEARN,
     "membership": NUMERIC,

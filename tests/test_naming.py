@@ -55,7 +55,7 @@ def test_two_terms_of_an_input_that_is_0_or_1_are_called_so():
     [
         ([2213.4, -3.0], ["2210", "-3"]),
         ([21.34, -0.0123456, 0.0], ["21.3", "-0.0123", "0"]),
-        ([1e12, 3e-7], ["1e+12", "3e-07"]),
+        ([1e12, 3e-7], ["1000000000000", "3e-07"]),
         # As many digits as tell them apart; those that differ by rounding have none.
         ([1e9 + 1, 1e9 + 2], ["1000000001", "1000000002"]),
         ([1.0, 1.0 + 1e-15, -1e-16], ["1", "1 (2)", "0"]),

@@ -1,6 +1,6 @@
 """Rule bases: the IF parts of a set of rules, over terms of any families."""
 
-from .base import Antecedent, TermGroup, by_group, by_parameter, strongest_rules
+from .base import Antecedent, TermGroup, by_group, by_parameter, groups_of, strongest_rules
 from .grid import GridAntecedent
 from .rule_table import RuleTableAntecedent
 from .tree import TreeAntecedent
@@ -13,5 +13,6 @@ __all__ = [
     "TreeAntecedent",
     "by_group",
     "by_parameter",
+    "groups_of",
     "strongest_rules",
 ]

@@ -15,6 +15,7 @@ its own membership when its input's are normalised; scattered rules: the rule's 
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import ClassVar
 
 import numpy as np
@@ -37,6 +38,15 @@ class TermGroup:
     def n_terms(self):
         """Number of terms in the group."""
         return self.inputs.size
+
+
+def groups_of(terms):
+    """Groups of terms (input, family, theta), consecutive ones of one family together."""
+    groups = []
+    for family, members in groupby(terms, key=lambda term: term[1]):
+        inputs, _, theta = zip(*members, strict=True)
+        groups.append(TermGroup(family, np.array(inputs), np.array(theta).T.copy()))
+    return tuple(groups)
 
 
 def _stack(values, Z):
@@ -93,6 +103,15 @@ class Antecedent(ABC):
     def n_terms(self):
         """Number of membership functions."""
         return sum(group.n_terms for group in self.groups)
+
+    @property
+    def terms(self):
+        """Input, family and theta of every term."""
+        return [
+            (j, group.family, theta)
+            for group in self.groups
+            for j, theta in zip(group.inputs.tolist(), group.theta.T, strict=True)
+        ]
 
     @property
     def term_inputs(self):
@@ -159,17 +178,8 @@ class Antecedent(ABC):
         table = self.rule_terms if table is None else table
         kept, place = np.delete(np.arange(self.n_terms), terms), np.full(self.n_terms + 1, -1)
         place[kept] = np.arange(kept.size)
-        return RuleTableAntecedent(self._groups_with(kept), place[table])
-
-    def _groups_with(self, terms):
-        """The groups with these terms alone."""
-        left, start = [], 0
-        for group in self.groups:
-            own = terms[(terms >= start) & (terms < start + group.n_terms)] - start
-            if own.size:
-                left.append(TermGroup(group.family, group.inputs[own], group.theta[:, own]))
-            start += group.n_terms
-        return tuple(left)
+        every = self.terms
+        return RuleTableAntecedent(groups_of(every[t] for t in kept), place[table])
 
     @property
     def parameters(self):

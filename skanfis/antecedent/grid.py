@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import accumulate, groupby, pairwise
+from itertools import accumulate, pairwise
 from math import prod
 
 import numpy as np
 
-from .base import Antecedent, TermGroup, softmax_in_place
+from .base import Antecedent, groups_of, softmax_in_place
 
 
 def _grid_rule_terms(counts):
@@ -43,13 +43,9 @@ class GridAntecedent(Antecedent):
     @classmethod
     def build(cls, families, inputs, thetas):
         """One entry of each argument per input that has terms; thetas (n_parameters, count)."""
-        groups = []
-        entries = zip(families, inputs, thetas, strict=True)
-        for family, members in groupby(entries, key=lambda entry: entry[0]):
-            _, used, theta = zip(*members, strict=True)
-            repeats = [part.shape[1] for part in theta]
-            groups.append(TermGroup(family, np.repeat(used, repeats), np.hstack(theta)))
-        return cls(tuple(groups), counts=tuple(theta.shape[1] for theta in thetas))
+        entries = zip(inputs, families, thetas, strict=True)
+        groups = groups_of((j, family, one) for j, family, theta in entries for one in theta.T)
+        return cls(groups, counts=tuple(theta.shape[1] for theta in thetas))
 
     @property
     def n_rules(self):
@@ -76,7 +72,8 @@ class GridAntecedent(Antecedent):
         terms = terms[np.isin(inputs[terms], left[numbers > 1])]
         own = inputs[terms].tolist()
         counts = tuple(own.count(j) for j in dict.fromkeys(own))
-        return replace(self, groups=self._groups_with(terms), counts=counts), terms
+        every = self.terms
+        return replace(self, groups=groups_of(every[t] for t in terms), counts=counts), terms
 
     @property
     def rule_terms(self):

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from ..membership import PRODUCTS, SIDES
-from .base import Antecedent, TermGroup, softmax_in_place
+from .base import Antecedent, TermGroup, groups_of, softmax_in_place
 
 
 def _one_term(terms):
@@ -70,11 +70,7 @@ class RuleTableAntecedent(Antecedent):
         Two sides of an input are a product of two sigmoids. What no term says, three of them, is a
         ValueError.
         """
-        own = [
-            (int(j), group.family, theta)
-            for group in self.groups
-            for j, theta in zip(group.inputs, group.theta.T, strict=True)
-        ]
+        own = self.terms
         rules: list[dict[int, tuple[int, ...]]] = []
         made: dict[tuple, tuple] = {}
         for r, row in enumerate(self.table):
@@ -91,14 +87,10 @@ class RuleTableAntecedent(Antecedent):
                     )
                 made[j, terms] = found
         order = sorted(made, key=lambda key: (made[key][0].name, *key))
-        groups = []
-        for family in dict.fromkeys(made[key][0] for key in order):
-            keys = [key for key in order if made[key][0] is family]
-            theta = np.column_stack([made[key][1] for key in keys])
-            groups.append(TermGroup(family, np.array([j for j, _ in keys]), theta))
+        groups = groups_of((j, *made[j, terms]) for j, terms in order)
         place, columns = {key: k for k, key in enumerate(order)}, sorted({j for j, _ in order})
         table = [[place[j, rule[j]] if j in rule else -1 for j in columns] for rule in rules]
-        return RuleTableAntecedent(tuple(groups), np.array(table)), [terms for _, terms in order]
+        return RuleTableAntecedent(groups, np.array(table)), [terms for _, terms in order]
 
     def normalise(self, log_mu):
         strengths = self._contains @ log_mu

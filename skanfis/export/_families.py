@@ -180,5 +180,13 @@ _BY_NAME = {
     "sigmoid_falling": (_one_sided_constants(-1.0), _side),
 }
 
-# By the class, since another class may go by the same name.
 FORMULAS = {FAMILIES[name]: Formula(*pair) for name, pair in _BY_NAME.items()}
+
+
+def check_own(family):
+    """Raise ValueError for a class that is not of this package, also one that goes by its names."""
+    if family not in FORMULAS:
+        raise ValueError(
+            f"Memberships of the class {family.__name__!r} cannot be exported; those of skanfis' "
+            f"own classes can: {', '.join(one.__name__ for one in FORMULAS)}."
+        )

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..antecedent import TreeAntecedent
 from ..membership import Membership
-from ._families import FORMULAS
+from ._families import FORMULAS, check_own
 
 
 class TermTable(NamedTuple):
@@ -35,7 +35,7 @@ class Numbers:
         self.high = _rounded(model.maximum, dtype, "the maximum of an input")
         self.reference = reference = _rounded(model.reference, dtype, "the mean of an input")
         what = "the inverse spread of an input"
-        self.inverse_spread = _rounded(1.0 / model.spread, dtype, what)
+        self.inverse_spread = _rounded(1.0 / model.spread, dtype, what, counts=True)
         # With its box as it is rounded: a function on the numbers differs by rounding alone.
         box = {"minimum": self.low.astype(float), "maximum": self.high.astype(float)}
         self.model = model = replace(model, **box)
@@ -55,24 +55,30 @@ class Numbers:
             order, self.node_ends = model.antecedent.walk
             self.nodes, self.node_input = self.terms[0].constants[order], self.term_input[order]
         # Coefficients (n_rules, n_outputs, 1 + n_slopes) about an offset, and inputs with slopes.
-        offset, coefficients, self.slope_input = _consequents(model, reference)
+        offset, coefficients, slopes = _consequents(model, reference)
+        self.slope_input = slopes
         self.offset = _rounded(offset, dtype, "a typical output")
-        self.consequents = _rounded(coefficients, dtype, "a consequent")
+        # A slope that is small by its unit counts by what it adds to an output, over the box.
+        adds = np.abs(coefficients) * np.append(1.0, (model.maximum - model.minimum)[slopes])
+        counts = adds > np.finfo(dtype).eps * adds.max(axis=(0, 2), keepdims=True)
+        self.consequents = _rounded(coefficients, dtype, "a consequent", counts)
         # How far the tangent is followed in each input, so that the sum in deviations is finite.
-        self.reach = _reach(model, dtype)
+        end = float(np.finfo(dtype).max)
+        with np.errstate(over="ignore"):
+            reach = min(model.max_extrapolation, 0.25 * end / model.n_inputs) * model.spread
+        self.reach = _rounded(np.minimum(reach, end), dtype, "a reach", counts=False)
         # Inputs whose tangents are found at one place: those of group 0 and g, where they are; all
         # others at ``tangent_at``, about the reference. None where they all are where they are.
         self.tangent_group = None
         if model.tangent_at is not None and model.antecedent.n_terms:
             is_held = np.isfinite(model.tangent_at)
             self.tangent_group = np.where(is_held, np.cumsum(is_held), 0)
-            at = np.where(is_held, model.tangent_at - model.reference, 0.0)
+            at = np.where(is_held, model.tangent_at - reference, 0.0)
             self.tangent_at = _rounded(at, dtype, "a median of an input")
         # (2, n_outputs); None where outputs are not held.
         self.output_limits = None
         if model.out_of_bounds == "linear" or np.isfinite(model.output_limits).any():
             # Where nothing else holds outputs, the largest numbers do.
-            end = float(np.finfo(dtype).max)
             self.output_limits = rounded_within(np.clip(model.output_limits, -end, end), dtype)
         # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
         self.support = None if model.support is None else _support(model, reference)
@@ -87,29 +93,30 @@ def rounded_within(limits, dtype):
     return np.stack([low, high])
 
 
-def _rounded(values, dtype, what):
-    """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero."""
-    values = np.asarray(values, dtype=float)
-    limits = np.finfo(dtype)
-    largest, ends = np.abs(values).max(initial=0.0), (float(limits.tiny), float(limits.max))
-    if largest != 0.0 and not ends[0] <= largest <= ends[1]:
+def _rounded(values, dtype, what, counts=None):
+    """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero.
+
+    ValueError where that happens to one that ``counts``, by default the largest, or one is beyond
+    the type.
+    """
+    values, sizes = np.asarray(values, dtype=float), np.abs(values)
+    least, most = float(np.finfo(dtype).tiny), float(np.finfo(dtype).max)
+    counts = sizes == sizes.max(initial=0.0) if counts is None else counts
+    lost = (sizes > most) | (counts & (sizes > 0.0) & (sizes < least))
+    if lost.any():
         name = "Single precision" if dtype == np.float32 else "Double precision"
         raise ValueError(
-            f"{name} cannot hold {what}, {largest:g}, with all its digits: it goes from "
-            f"{ends[0]:.2g} to {ends[1]:.2g}. Scale the data, or export in double precision."
+            f"{name} cannot hold {what}, {sizes[lost][0]:g}, with all its digits: it goes from "
+            f"{least:.2g} to {most:.2g}. Scale the data, or export in double precision."
         )
-    return np.where(np.abs(values) < float(limits.tiny), 0.0, values).astype(dtype)
+    return np.where(sizes < least, 0.0, values).astype(dtype)
 
 
 def _term_tables(model, reference):
     start = 0
     for group in model.antecedent.groups:
         family, inputs = group.family, group.inputs
-        if family not in FORMULAS:
-            raise ValueError(
-                f"Memberships {family.name!r} cannot be exported; "
-                f"{', '.join(one.name for one in FORMULAS)} can."
-            )
+        check_own(family)
         theta = group.theta.copy()
         theta[0] -= reference[inputs]
         constants = np.column_stack(FORMULAS[family].constants(theta))
@@ -127,15 +134,6 @@ def _consequents(model, reference):
     offset = model.rule_weights @ coefficients[:, :, 0] / model.rule_weights.sum()
     coefficients[:, :, 0] -= offset
     return offset, coefficients[:, :, np.r_[0, 1 + slope_inputs]], slope_inputs
-
-
-def _reach(model, dtype):
-    limits = np.finfo(dtype)
-    largest = float(limits.max)
-    with np.errstate(over="ignore"):
-        reach = min(model.max_extrapolation, 0.25 * largest / model.n_inputs) * model.spread
-    reach = np.minimum(reach, largest)
-    return np.where(reach < float(limits.tiny), 0.0, reach).astype(dtype)
 
 
 def _support(model, reference):

@@ -16,6 +16,7 @@ from ..antecedent import (
     GridAntecedent,
     RuleTableAntecedent,
     TreeAntecedent,
+    groups_of,
 )
 from ..membership import FAMILIES
 from ..model import TSKModel
@@ -23,7 +24,7 @@ from ..naming import distinct
 from ..policies import OUT_OF_BOUNDS, TargetRange
 from ..posterior import MOST_PARAMETERS, Posterior
 from ..support import RuleSupport
-from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, groups_of, number, numbers, shown
+from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, numbers, shown
 
 FORMAT = "skanfis-model"
 # The first knew no trees.

@@ -1,11 +1,8 @@
 """What a file may describe: of what size, known before memory is asked for, by which numbers."""
 
 import os
-from itertools import groupby
 
 import numpy as np
-
-from ..antecedent import TermGroup
 
 # A rule base holds rules x terms, its consequents rules x (1 + inputs) x outputs: 160 MB.
 MOST_NUMBERS = 20_000_000
@@ -24,15 +21,6 @@ def check_size(n_rules, n_terms, n_inputs, n_outputs):
             f"{n_rules} rules over {n_terms} terms, {n_inputs} inputs and {n_outputs} outputs are "
             f"{needed:,} numbers; at most {MOST_NUMBERS:,} are read."
         )
-
-
-def groups_of(terms):
-    """Groups of terms (input, family, theta), consecutive ones of one family together."""
-    groups = []
-    for family, members in groupby(terms, key=lambda term: term[1]):
-        inputs, _, theta = zip(*members, strict=True)
-        groups.append(TermGroup(family, np.array(inputs), np.array(theta).T.copy()))
-    return tuple(groups)
 
 
 def number(value, where, lowest=-LARGEST_NUMBER, highest=LARGEST_NUMBER, kind=float):

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..membership import FAMILIES
 from ..model import TSKModel
+from ._families import check_own
 from .folding import fold
 from .json_reader import FORMAT, INPUT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
 from .limits import read_bytes
@@ -148,19 +148,16 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
 
 def _terms(model):
     """Every term's name, input, function and theta by name, after training and before it."""
-    names = iter(model.term_names)
-    before = model.initial_antecedent.groups
-    for group, initial in zip(model.antecedent.groups, before, strict=True):
-        if group.family not in FAMILIES.values():
-            raise ValueError(f"the membership {group.family.name!r} is not one of skanfis' own.")
-        keys = [key_of(parameter) for parameter in group.family.parameters]
-        thetas = zip(
-            group.inputs.tolist(), group.theta.T.tolist(), initial.theta.T.tolist(), strict=True
+    before = [theta for _, _, theta in model.initial_antecedent.terms]
+    every = zip(model.term_names, model.antecedent.terms, before, strict=True)
+    for name, (j, family, theta), start in every:
+        check_own(family)
+        term = {"name": name, "input": j, "function": family.name}
+        after, start = (
+            {key_of(one): float(value) for one, value in zip(family.parameters, own, strict=True)}
+            for own in (theta, start)
         )
-        for j, theta, start in thetas:
-            term = {"name": next(names), "input": j, "function": group.family.name}
-            start = {"before_training": dict(zip(keys, start, strict=True))}
-            yield term | dict(zip(keys, theta, strict=True)) | start
+        yield term | after | {"before_training": start}
 
 
 def _laid_out(document):

@@ -16,12 +16,14 @@ from ._numbers import Numbers
 
 # Softmax along one axis and ReduceSum with axes as an input are of this version.
 _OLDEST_OPSET = 13
+# onnxruntime leaves out the addition of one number that is zero in single precision.
+_TAKEN_FOR_ZERO = 1e-45
 
 
 def register_onnx_converter() -> None:
     """Teach skl2onnx to convert :class:`skanfis.ANFISRegressor`, alone or in a pipeline.
 
-    Inputs of type double give a graph in double precision, all others one in single precision.
+    Inputs give a graph in double precision if one of them is double, else in single precision.
     ``out_of_bounds`` becomes part of the graph, save "raise", which is refused with a ValueError; a
     row that is not finite gives NaN. ImportError if skl2onnx is not installed.
 
@@ -55,8 +57,8 @@ def _set_shapes(node):
     """Type and shape of the output."""
     from skl2onnx.common.data_types import DoubleTensorType, FloatTensorType
 
-    given = node.inputs[0].type
-    kind = DoubleTensorType if isinstance(given, DoubleTensorType) else FloatTensorType
+    is_double = any(isinstance(given.type, DoubleTensorType) for given in node.inputs)
+    kind = DoubleTensorType if is_double else FloatTensorType
     n_outputs = node.raw_operator.model_.n_outputs
     node.outputs[0].type = kind([node.inputs[0].get_first_dimension(), n_outputs])
 
@@ -71,18 +73,22 @@ def _convert(scope, node, container):
             f"target_opset={container.target_opset} is too old for an ANFIS: it takes "
             f"{_OLDEST_OPSET} or newer."
         )
-    estimator, given = node.raw_operator, node.inputs[0]
+    estimator = node.raw_operator
     model = estimator.model_.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
     if model.out_of_bounds == "raise":
         raise ValueError(
             "out_of_bounds='raise' has no counterpart in ONNX, where no value makes a graph fail: "
             "set_params(out_of_bounds='nan') before the conversion marks such rows."
         )
-    is_double = isinstance(given.type, DoubleTensorType)
+    is_double = isinstance(node.outputs[0].type, DoubleTensorType)
     dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
     graph = _Graph(scope, container, np.dtype(dtype))
-    x = graph.node("Cast", _Value(graph, given.full_name), to=kind)
-    y = _Formula(Numbers(model, dtype), graph).outputs(x)
+    # One input of all columns, or, of a frame, one of each, which may be in another order.
+    named, given = {one.raw_name: one for one in node.inputs}, node.inputs
+    if named.keys() == set(model.input_names):
+        given = [named[name] for name in model.input_names]
+    parts = [graph.node("Cast", _Value(graph, one.full_name), to=kind) for one in given]
+    y = _Formula(Numbers(model, dtype), graph).outputs(graph.node("Concat", *parts, axis=1))
     graph.node("Identity", y, output=node.outputs[0].full_name)
 
 
@@ -111,6 +117,10 @@ class _Graph:
         array = np.asarray(value)
         if array.dtype.kind == "f" or not array.ndim:
             array = array.astype(self.dtype)
+        if array.size == 1 and 0.0 < abs(array.item()) < _TAKEN_FOR_ZERO:
+            raise ValueError(
+                f"onnxruntime takes {array.item():g}, of the model, for zero: scale the data."
+            )
         name = self.scope.get_unique_variable_name("constant")
         kind = helper.np_dtype_to_tensor_dtype(array.dtype)
         self.container.add_initializer(name, kind, list(array.shape), array.ravel().tolist())
@@ -175,13 +185,15 @@ class _Formula:
             far = (followed.abs() * numbers.inverse_spread).sum() + 1.0
             way_out, group = followed / far, numbers.tangent_group
         y, change = self._rules(z, way_out if group is None else None)
-        y = y + numbers.offset
-        if change is not None:
-            y = y + far * change
         for g in () if group is None else np.unique(group):
             is_here = np.isin(group, (0, g))
             there = z * is_here.astype(float) + np.where(is_here, 0.0, numbers.tangent_at)
-            y = y + far * self._rules(there, way_out * (group == g).astype(float))[1]
+            part = self._rules(there, way_out * (group == g).astype(float))[1]
+            change = part if change is None else change + part
+        y = y + numbers.offset
+        if change is not None:
+            # All of it at once: infinities of opposite sign have no sum.
+            y = y + far * change
         if numbers.output_limits is not None:
             low, high = numbers.output_limits
             y = y.at_least(low).at_most(high)

@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_count, checked_position
 from ..antecedent import TreeAntecedent
+from ..digits import rounded
 from ..export import fold, fold_with_rows
 from ..export.columns import by_column
 from ..export.folding import fold_with_reader
 from .labels import as_label, on_axis, title_of
 from .rules import has_training_data
-from .sentences import PRECISION, rounded
+from .sentences import PRECISION
 
 # Points of a membership along its input, and bins of the data behind it.
 _N_POINTS, BINS = 201, 30

@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import as_numbers, check_finite, positive_weights
+from ..digits import in_digits
 from ..export.columns import Level
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
 from .sentences import Sentences
-from .text import counted, number
+from .text import counted
 
 # In deviations of the target: the strongest rule alone is then as far from the model as one that
 # explains three quarters of the variance is from the target; beyond, it says too little.
@@ -129,8 +130,8 @@ class Readability:
         if not ratio > GREATEST_ERROR:
             return self.on_rules
         of_digits = (
-            f"The text as printed errs {number(ratio, 3)} times as much as the model: print more "
-            "digits (precision)."
+            f"The text as printed errs {in_digits(ratio, 3)} times as much as the model: print "
+            "more digits (precision)."
         )
         return [of_digits, *self.on_rules]
 
@@ -143,8 +144,8 @@ class Readability:
             if error > GREATEST_ALONE:
                 sentences.append(
                     f"No rule{of_output} can be read without the others: used alone, the strongest "
-                    f"is {number(error, 3)} standard deviations of the target off the model (more "
-                    f"than {GREATEST_ALONE})."
+                    f"is {in_digits(error, 3)} standard deviations of the target off the model "
+                    f"(more than {GREATEST_ALONE})."
                 )
         return sentences
 
@@ -164,7 +165,7 @@ class Readability:
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
             both = found.rule_errors[r, k], found.rule_spreads[r, k]
-            errs, spread = (number(found.deviation[k] * one, 2) for one in both)
+            errs, spread = (in_digits(found.deviation[k] * one, 2) for one in both)
             named.append(f"{rule} (errs by {errs}, a constant by {spread})")
         what = "Errs more on its own rows than a constant would: rule"
         return [f"{what} {_named(named)}."] if named else []

@@ -8,9 +8,9 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from .._validation import check_count
+from ..digits import MOST_DIGITS
 from ..export import fold
 from ..export.folding import fold_with_reader, last_step
-from ..policies import MOST_DIGITS
 from .sentences import Sentences
 
 

@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..antecedent.tree import CRISP
+from ..digits import MOST_DIGITS, rounded
 from ..export.columns import Level
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
-from ..policies import MOST_DIGITS
 from ..reading_cost import UNSAID
 
 # Digits of the noise's deviation to which numbers are written.
@@ -122,13 +122,6 @@ class Sentences:
     def reading_cost(self) -> int:
         """Numerals in the sentences of all rules, and in the common line."""
         return int(self.n_numbers.sum() + np.count_nonzero(self.common))
-
-
-def rounded(values, unit, precision):
-    """Values to so many digits of a unit; each is the number nearest to its decimals."""
-    decimals = precision - 1 - np.floor(np.log10(unit)).astype(int)
-    # Python's own rounding is right to the last digit, and at every size.
-    return np.vectorize(round, otypes=[float])(values, decimals) + 0.0
 
 
 def _resolution(model, slopes):

@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
+from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits
 from ..export.columns import by_column
 from ..export.folding import fold_with_reader
-from ..policies import MOST_DIGITS, SILENT, policy_in_words
+from ..policies import SILENT, policy_in_words
 from .rules import (
     condition,
     has_training_data,
@@ -22,10 +23,10 @@ from .rules import (
     rename,
     shown_rules,
 )
-from .sentences import PRECISION, Sentences, rounded
+from .sentences import PRECISION, Sentences
 
 # Most letters of a line; digits of a range.
-_WIDTH, _DIGITS_OF_RANGE = 96, 3
+_WIDTH, _DIGITS_OF_RANGE = 96, 4
 # Inputs in no rule are named if they are so few, and else counted.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
@@ -219,9 +220,9 @@ def _deviations(model, precision=PRECISION):
     lines, target = [], model.target
     for k, name in enumerate(model.output_names if target else ()):
         spread = target.spread[k] if target.minimum[k] < target.maximum[k] else 0.0
-        line = f"{name} varies by {number(spread, precision)}"
+        line = f"{name} varies by {in_digits(spread, precision)}"
         if model.posterior is not None:
-            line += f", about the rules by {number(model.posterior.noise[k], precision)}"
+            line += f", about the rules by {in_digits(model.posterior.noise[k], precision)}"
         lines.append(f"{line} (standard deviation).")
     return lines
 
@@ -285,8 +286,8 @@ def percent(part):
 def _errors(found, r):
     errors, names = found.rule_errors[r], found.model.output_names
     if len(names) == 1:
-        return number(errors[0], 2)
-    return ", ".join(f"{number(e, 2)} ({n})" for e, n in zip(errors, names, strict=True))
+        return in_digits(errors[0], 2)
+    return ", ".join(f"{in_digits(e, 2)} ({n})" for e, n in zip(errors, names, strict=True))
 
 
 def _last_lines(said, found, precision=PRECISION):
@@ -317,7 +318,7 @@ def _legend(said, found, precision):
         if said.two_valued[j] and name in said.levels and not terms:
             categories.setdefault(called[j], []).append(j)
             continue
-        range_of = _range(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
+        range_of = range_in_digits(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
         lines.append(f"  {name}: {range_of}")
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
@@ -334,7 +335,7 @@ def _legend(said, found, precision):
     lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         if np.isfinite([low, high]).any():
-            limits = _range(low, high, precision)
+            limits = range_in_digits(low, high, precision + 1)
             lines.append(f"No prediction leaves these limits: {name}, {limits}.")
     functions = {term["function"] for term in named}
     written = [name for name in compress(model.term_names, said.says_where) if "±" in name]
@@ -353,7 +354,7 @@ def _term_text(term, locations):
     """Write "gaussian, center 21.3, width 4.2" of an entry of TSKModel.memberships."""
     numbers = {k: v for k, v in term.items() if k not in ("input", "name", "function")}
     # Of a logarithm the last digits are rounding's.
-    told = (f"{k} {plain(v) if k in locations else number(v, 14)}" for k, v in numbers.items())
+    told = (f"{k} {plain(v) if k in locations else in_digits(v, 14)}" for k, v in numbers.items())
     return ", ".join([term["function"], *told])
 
 
@@ -372,27 +373,8 @@ def _wrapped(text, first="", later=""):
     return lines.replace(_UNBROKEN, " ± ")
 
 
-def _range(low, high, precision):
-    """Write "0.1 to 63.5", to so many digits of the width and one more."""
-    if np.isfinite(high - low):
-        unit = (high - low) or abs(high) or 1.0
-        return " to ".join(map(plain, rounded(np.array([low, high]), unit, precision + 1)))
-    return " to ".join(number(end, precision) for end in (low, high))
-
-
-def plain(value):
-    """A number that has been rounded, as it is."""
-    return repr(float(value) + 0.0).removesuffix(".0")
-
-
 def _signed(value):
     return f"{'-' if value < 0.0 else '+'}{plain(abs(value))}"
-
-
-def number(value, precision):
-    """Write so many significant digits, without an exponent while there is room."""
-    nearest = float(f"{float(value):.{precision - 1}e}")
-    return f"{nearest:.{max(precision, 15)}g}"
 
 
 def counted(number_of, what):

@@ -8,14 +8,15 @@ import numpy as np
 
 from .._validation import check_choice, checked_position
 from ..antecedent import TreeAntecedent
+from ..digits import plain, rounded
 from ..export.columns import Level
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .displays import axes_or_new, section_over
 from .labels import as_label, on_axis, title_of
 from .rules import condition, parts_led
-from .sentences import Sentences, rounded
-from .text import counted, percent, plain
+from .sentences import Sentences
+from .text import counted, percent
 
 # Inches: of a letter, of a leaf, around the tree.
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3

@@ -102,7 +102,6 @@ class Membership(ABC):
     def natural(cls, theta):
         """Theta with every logarithm undone: what a person reads."""
         natural = np.array(theta, dtype=float)
-        for row, parameter in zip(natural, cls.parameters, strict=True):
-            if parameter.kind != "location":
-                np.exp(row, out=row)
+        is_log = [parameter.kind != "location" for parameter in cls.parameters]
+        natural[is_log] = np.exp(natural[is_log])
         return natural

@@ -15,16 +15,16 @@ from sklearn.preprocessing import RobustScaler
 from skanfis.bounds import bounds
 from skanfis.export import export_c
 from skanfis.export.c.dialect import STATUS
-from skanfis.export.c.header import in_digits
 from skanfis.learning import VariableProjection
-from skanfis.membership import MEMBERSHIPS
+from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.options import LinearExtrapolation
 from skanfis.policies import OUT_OF_BOUNDS
 
+from ..oracles import random_grid
 from ..quick import quick
 from .c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
 from .every_model import CASES, FEWEST, full_scale, rows, surface
-from .rule_bases import MODELS
+from .rule_bases import MODELS, SCALE, build
 
 MIN_COVERAGE = 0.3
 TOLERANCE = {"double": 1e-12, "float": 1e-5}
@@ -139,6 +139,22 @@ def test_units_and_time_stamps_do_not_matter_to_single_precision(scale, offset, 
     assert (status == STATUS["IN_RANGE"]).all()
 
 
+@needs_compiler
+def test_tangents_of_far_inputs_are_found_at_their_medians(tmp_path):
+    # A float has steps of 8 at 1e8, where the inputs have a deviation of 600.
+    offset = np.array([1e8 + 3.0, 20.0, 0.0])
+    at = np.array([1e8 + 100.0, np.nan, 0.0])
+    antecedent = random_grid(np.random.default_rng(0), [Gaussian] * 3, (3, 2, 2))
+    low, high = np.float32([offset - 2.0 * SCALE, offset + 1.5 * SCALE]).astype(float)
+    changes = {"minimum": low, "maximum": high, "tangent_at": at, "out_of_bounds": "linear"}
+    model = build(antecedent, offset=offset, **changes)
+    Z = (offset + SCALE * np.random.default_rng(1).uniform(-3.0, 3.0, (500, 3))).astype(np.float32)
+    code = export_c(model, name="m", dtype="float")
+    ((found, _),) = evaluate_all([code], Z, tmp_path, "c99", [1], flags=[])
+    wanted = model.predict(Z.astype(float))
+    assert np.abs(found - wanted).max() < 1e-5 * full_scale(wanted)
+
+
 @pytest.mark.theory
 @needs_compiler
 def test_row_that_is_not_finite_gets_no_answer(tmp_path):
@@ -181,7 +197,14 @@ def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("scale_x", "scale_y", "what"), [(1e45, 1.0, "an input"), (1.0, 1e42, "output")]
+    ("scale_x", "scale_y", "what"),
+    [
+        (1e45, 1.0, "an input"),
+        (1.0, 1e42, "output"),
+        # All slopes are zero in single precision, where the constants are not.
+        (1e9, 1e-30, "a consequent"),
+        ([5.5e35, 1.0, 1.0], 1.0, "inverse spread of an input"),
+    ],
 )
 def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
     model = quick(n_mfs=2).fit(X * scale_x, Y * scale_y)
@@ -294,14 +317,6 @@ def test_scattered_rules_take_an_exponential_per_rule_and_what_their_terms_do():
     np.testing.assert_array_equal(cost_of(model, "linear"), inside + outside)
 
 
-def test_ranges_have_digits_that_mean_something():
-    assert in_digits(-1.4e-14, 60.0123456) == ["0", "60.0123"]
-    assert in_digits(-0.0, 2e-5) == ["0", "2e-05"]
-    assert in_digits(1.7e9, 1.7e9 + 12.3456789) == ["1700000000", "1700000012.35"]
-    assert in_digits(20.5, 20.5) == ["20.5", "20.5"]
-    assert in_digits(-np.inf, 1.0) == ["-inf", "1"]
-
-
 def test_units_and_notes_stand_in_the_header():
     notes = ["A star * multiplies; */ and /* and \\ end nothing.", "ms? Ask; ??/ and ??? do not."]
     units = {"x1": "degC?", "y": "deg/s */"}
@@ -344,6 +359,14 @@ HOSTILE = [
 ]
 
 
+def test_identifiers_differ_in_what_an_old_compiler_looks_at():
+    name, found = "compensation_new", set()
+    for case in FEWEST:
+        code = export_c(case.model, name=name)
+        found |= set(re.findall(rf"\b{name}_\w+", code.source, re.IGNORECASE))
+    assert len({one[:31] for one in found}) == len(found)
+
+
 @needs_compiler
 @pytest.mark.parametrize("std", ["c89", "c99"])
 def test_names_of_columns_cannot_leave_their_comment(std, tmp_path, rng):
@@ -380,6 +403,10 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
         ({"name": "m", "saturate": [(0.0, 1.0)] * 2}, r"each of the 1 outputs, .* shape \(2, 2\)"),
         ({"name": "m", "saturate": [(1.0, 0.0)]}, "must be finite, each low below its high"),
+        (
+            {"name": "m", "saturate": [(1.0 + 1e-9, 1.0 + 2e-9)], "dtype": "float"},
+            "with a number of float32 between them",
+        ),
     ],
 )
 def test_bad_argument(arguments, message):

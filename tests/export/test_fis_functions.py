@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from skanfis.export import export_c
+from skanfis.export import export_c, export_fis, export_json
 from skanfis.export.fis.functions import function_of, theta_of
 from skanfis.membership import FAMILIES
 
@@ -130,12 +130,14 @@ def test_refuses(name, parameters, message):
         theta_of(name, parameters, LOW, HIGH)
 
 
-def test_a_family_of_ones_own_is_refused():
+@pytest.mark.parametrize("given", ["own", "gaussian"])
+def test_a_family_of_ones_own_is_refused(given):
     class Own(FAMILIES["gaussian"]):
-        name = "own"
+        name = given
 
-    with pytest.raises(ValueError, match="'own' has no function in the"):
-        function_of(Own, [0.0, 1.0])
     X = np.linspace(0.0, 1.0, 30)[:, None]
-    with pytest.raises(ValueError, match=r"'own' cannot be exported; gaussian, bell, .* can"):
-        export_c(quick(n_mfs=2, mf=Own).fit(X, X[:, 0]), name="m")
+    estimator = quick(n_mfs=2, mf=Own).fit(X, X[:, 0])
+    for export in (export_c, export_fis, export_json):
+        name = {"name": "m"} if export is export_c else {}
+        with pytest.raises(ValueError, match=r"class 'Own' cannot be exported; .* can: Gaussian, "):
+            export(estimator, **name)

@@ -1,5 +1,6 @@
 """Writing .fis files: what is in them, and that they come back."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.export import export_fis
 from skanfis.export.fis.reader import parse_fis
 from skanfis.membership import MEMBERSHIPS
-from skanfis.policies import OUT_OF_BOUNDS, TargetRange
+from skanfis.policies import OUT_OF_BOUNDS
 
 from .. import oracles
-from .rule_bases import EVERY_PAIR, MODELS, build, rows_of
+from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
@@ -97,6 +98,19 @@ def test_says_that_constraints_hold_in_the_range_alone():
     at = np.full(A_GRID.n_inputs, np.nan)
     at[0] = 0.5 * (A_GRID.minimum[0] + A_GRID.maximum[0])
     assert told in export_fis(replace(A_GRID, tangent_at=at))
-    n = A_GRID.n_outputs
-    limited = TargetRange(np.zeros(n), np.ones(n), np.ones(n), lower=np.full(n, -9.0))
-    assert told in export_fis(replace(A_GRID, target=limited))
+
+
+def test_says_what_outputs_are_held_within():
+    assert "held" not in export_fis(A_GRID)
+    model = replace(MODELS["tree, order 1, 2 outputs"], target=narrow_target(2))
+    with pytest.warns(
+        UserWarning, match=r"At \d\d\.\d% of 1000 points .* the \.fis file goes beyond"
+    ):
+        text = export_fis(model)
+    found = re.findall(r"% In skanfis, Output[12] is held within \[(.*) (.*)\]: clamp", text)
+    rows = rows_of(model, 1.0, 200)
+    clamped = np.clip(parse_fis(text).predict(rows), *np.array(found, dtype=float).T)
+    assert_allclose(clamped, model.predict(rows), atol=1e-11 * full_scale(model))
+    endless = replace(model, out_of_bounds="linear", max_extrapolation=np.inf)
+    with pytest.warns(UserWarning, match="goes beyond"):
+        assert "Output1 is held within [-0.9 inf]: clamp it." in export_fis(endless)

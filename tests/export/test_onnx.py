@@ -1,9 +1,11 @@
 """The ONNX graph, run by onnxruntime, answers what ``predict`` answers."""
 
 from copy import copy
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.base import clone
 from sklearn.cluster import KMeans
@@ -115,6 +117,27 @@ def test_row_that_is_not_finite_gives_nan(policy):
     assert np.isnan(found[:, 0]).tolist() == [True, True, True, False, False, False]
 
 
+def test_tangent_without_end_is_finite():
+    signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
+    for case in FEWEST[::3]:
+        if case.model.out_of_bounds == "linear" and case.model.tangent_at is not None:
+            # In such units that slopes times the largest numbers are no numbers.
+            steep = replace(case.model, coefficients=1e10 * case.model.coefficients, target=None)
+            endless = steep.with_out_of_bounds("linear", np.inf)
+            found = answers(holding(endless), np.finfo(float).max * signs)
+            assert np.isfinite(found).all(), case.label
+
+
+def test_a_frame_makes_an_input_of_every_column():
+    table = pd.DataFrame({"a": X[:, 0], "b": X[:, 1].astype(np.float32), "c": X[:, 2].astype(int)})
+    estimator = quick(n_mfs=2).fit(table, Y)
+    for shown in (table[:1], table.loc[:1, ["c", "a", "b"]]):
+        graph = skl2onnx.to_onnx(estimator, shown).SerializeToString()
+        session = onnxruntime.InferenceSession(graph, providers=["CPUExecutionProvider"])
+        (y,) = session.run(None, {name: table[[name]].to_numpy() for name in table})
+        np.testing.assert_allclose(y[:, 0], estimator.predict(table))
+
+
 def test_policy_is_that_of_the_estimator_at_conversion():
     estimator = quick(n_mfs=2).fit(X, Y)
     Z = X.max(axis=0, keepdims=True) * 1.5
@@ -134,5 +157,7 @@ def test_what_a_graph_cannot_be_is_refused():
     expected = estimator.predict(X)
     for opset in (13, 17, 18, 21):
         np.testing.assert_allclose(answers(estimator, X, target_opset=opset)[:, 0], expected)
+    with pytest.raises(ValueError, match=r"onnxruntime takes .*e-5., of the model, for zero"):
+        skl2onnx.to_onnx(quick(n_mfs=2).fit(X, 1e-55 * Y), X[:1])
     with pytest.raises(ValueError, match="out_of_bounds='raise' has no counterpart in ONNX"):
         skl2onnx.to_onnx(estimator.set_params(out_of_bounds="raise"), X[:1])

@@ -12,9 +12,9 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
+from skanfis.digits import in_digits
 from skanfis.inspection import explain, export_text, measures, readability, rules_html
 from skanfis.inspection.readability import readability_of_rows
-from skanfis.inspection.text import number
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
@@ -66,7 +66,7 @@ def test_errors_are_in_the_units_of_the_target_whatever_the_rows(rng):
     # Behind a scaler of the target as well what the fit has found is in its units.
     scaled = TransformedTargetRegressor(quick(n_mfs=[2, 1]), transformer=StandardScaler())
     told = re.findall(r"errs by (\S+) there", export_text(scaled.fit(X, y)))
-    assert sorted(told) == sorted(number(e, 2) for e in readability(scaled, X, y).rules["error"])
+    assert sorted(told) == sorted(in_digits(e, 2) for e in readability(scaled, X, y).rules["error"])
 
 
 def test_nothing_is_found_at_the_limits():
@@ -106,7 +106,7 @@ def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
     errs = np.sqrt(np.mean((coefficients[1] - y[50:]) ** 2))
     assert [one for one in poor.findings if "constant" in one] == [
         "Errs more on its own rows than a constant would: rule 1 "
-        f"(errs by {number(errs, 2)}, a constant by 1)."
+        f"(errs by {in_digits(errs, 2)}, a constant by 1)."
     ]
 
 

@@ -15,11 +15,11 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
+from skanfis.digits import in_digits
 from skanfis.export import export_json, read_json
 from skanfis.inspection import export_text, readability, rules_html
 from skanfis.inspection.rules import parts_led
 from skanfis.inspection.sentences import Sentences, rounded
-from skanfis.inspection.text import number
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, rows_of
 from ..outline import Outline
@@ -356,7 +356,7 @@ def test_a_grid_in_words():
 
 
 def test_numbers_are_rounded_to_the_nearest_decimal():
-    assert number(1000423.4, 4) == "1000000"
+    assert in_digits(1000423.4, 4) == "1000000"
     found = rounded([1000423.41, -1e-13, 1.0 / 3.0], 600.0, 4)
     assert_array_equal(found, [1000423.4, 0.0, 0.3])
     assert rounded(0.1 + 0.2, 0.1, 17) == 0.1 + 0.2

@@ -53,7 +53,7 @@ def test_fis_comes_back(model):
     try:
         text = export_fis(model)
     except UserWarning:
-        return  # of gaps in which no rule of the file fires
+        return  # of places where the file does not say the same
     rows = rows_of(model, 0.99)
     wanted = model.predict(rows)
     assert_allclose(parse_fis(text).predict(rows), wanted, rtol=1e-6, atol=1e-6 * np.ptp(wanted))

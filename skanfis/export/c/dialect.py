@@ -199,9 +199,14 @@ def read_limits(saturate, numbers):
             f"saturate must have (low, high) for each of the {n_outputs} outputs, or be what "
             f"skanfis.bounds.bounds returns for this model; got an array of shape {given.shape}."
         )
-    if not (np.isfinite(given).all() and (given[:, 0] < given[:, 1]).all()):
-        raise ValueError(f"saturate={given.tolist()} must be finite, each low below its high.")
-    return rounded_within(given.T, numbers.dtype).T
+    limits = rounded_within(given.T, numbers.dtype).T
+    is_below = (given[:, 0] < given[:, 1]) & (limits[:, 0] <= limits[:, 1])
+    if not (np.isfinite([given, limits]).all() and is_below.all()):
+        raise ValueError(
+            f"saturate={given.tolist()} must be finite, each low below its high, with a number of "
+            f"{numbers.dtype} between them."
+        )
+    return limits
 
 
 def write_files(code, path):

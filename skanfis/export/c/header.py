@@ -4,9 +4,12 @@ import textwrap
 
 import numpy as np
 
+from ...digits import range_in_digits
 from ...policies import policy_in_words
 from .dialect import comment, remark, status_lines
 
+# Of the width of a range: to about a hundred-thousandth.
+_DIGITS = 6
 _SILENT = {
     "raise": "there is no output: y stays as it is",
     "nan": "there is no output: y becomes NaN, or stays as it is where C has no NaN",
@@ -67,8 +70,10 @@ def header(source, units, notes):
         *_ranges(model.output_names, lowest, highest, units),
     ]
     if source.limits is not None:
-        ends = zip(model.output_names, source.limits, strict=True)
-        told = ", ".join(f"{comment(name)} from {a:.7g} to {b:.7g}" for name, (a, b) in ends)
+        ends = zip(model.output_names, *source.limits.T, strict=True)
+        told = ", ".join(
+            f"{comment(name)} from {range_in_digits(a, b, _DIGITS)}" for name, a, b in ends
+        )
         lines += ["", f"Outputs are saturated beyond limits that were asked for: {told}."]
     lines += _precision_lines(numbers)
     lines += ["", policy_line(model, "Outside this range")]
@@ -95,20 +100,10 @@ def input_lines(names, low, high, units):
 
 
 def _ranges(names, low, high, units):
-    units, sides = units or {}, zip(names, low, high, strict=True)
-    for k, (name, *ends) in enumerate(sides):
+    units, ranges = units or {}, zip(names, low, high, strict=True)
+    for k, (name, least, most) in enumerate(ranges):
         unit = f" [{comment(units[name])}]" if name in units else ""
-        yield f"  [{k}] {comment(name)}{unit}: {' to '.join(in_digits(*ends))}"
-
-
-def in_digits(low, high):
-    """Both ends of a range as texts, to about a hundred-thousandth of its width."""
-    width = float(high) - float(low)
-    if not 0.0 < width < np.inf:
-        return [f"{end:.7g}" for end in (low, high)]
-    step = 10.0 ** (np.floor(np.log10(width)) - 5)
-    # Adding zero makes zero of minus zero.
-    return [f"{np.rint(float(end) / step) * step + 0.0:.12g}" for end in (low, high)]
+        yield f"  [{k}] {comment(name)}{unit}: {range_in_digits(least, most, _DIGITS)}"
 
 
 def policy_line(model, where):

@@ -202,14 +202,14 @@ class Source:
     def _memberships(self):
         """Functions of the families in use."""
         for family in dict.fromkeys(terms.family for terms in self.numbers.terms):
-            for what, suffix in (("Logarithm", ""), ("Derivative of the logarithm", "_slope")):
-                if family.name + suffix in self._named:
+            for what, of in (("Logarithm", ""), ("Derivative of the logarithm", "d_")):
+                if of + family.name in self._named:
                     yield self.dialect.write(
                         templates.MEMBERSHIP,
                         what=what,
                         family=family.name,
-                        suffix=suffix,
-                        lines=Body(family, self.dialect, bool(suffix)).text,
+                        of=of,
+                        lines=Body(family, self.dialect, bool(of)).text,
                     )
 
     @cached_property

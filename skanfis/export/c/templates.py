@@ -35,7 +35,7 @@ FINITE_INPUT = """
 
 MEMBERSHIP = """
 /* $what of a membership: $family. */
-static $real $name_$family$suffix($real x, const $real *p)
+static $real $name_$of$family($real x, const $real *p)
 {
 $lines
 }
@@ -45,7 +45,7 @@ TERMS = """
       |    for (i = 0; i < $count; ++i) {
 share |        l[$at] = $name_$family(z[$name_term_input[$at]], $name_terms$table[i]);
 slope |        t[$at] = e[$name_term_input[$at]]
-slope |            * $name_$family_slope(z[$name_term_input[$at]], $name_terms$table[i]);
+slope |            * $name_d_$family(z[$name_term_input[$at]], $name_terms$table[i]);
       |    }
 """
 # Of every input of a grid: shares in the place of logarithms, or their derivatives.

@@ -2,6 +2,7 @@
 
 import re
 import unicodedata
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -35,13 +36,23 @@ AggMethod='sum'
 DefuzzMethod='wtaver'"""
 # Points of the box at which the rules of the file are tried.
 _N_POINTS = 1000
+_GAP = (
+    "no rule of the .fis file fires: other programs give NaN, zero or the middle of the output's "
+    "Range there, skanfis what the nearest rule says. A membership without a foot (mf = "
+    "'gaussian', 'bell', 'two_sided_gaussian') or fewer, wider terms leave no such gaps."
+)
+_HELD = (
+    "the .fis file goes beyond the limits that skanfis holds outputs within: clamp them as the "
+    "comment at its head says."
+)
 
 
 def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
     """Write a trained model as a .fis file, for MATLAB, Octave or fuzzylite.
 
     The system is Sugeno's, with product as AND and weighted average; numbers have all their digits.
-    Clamp the inputs to their Range, that of the training data: beyond it programs differ.
+    Clamp the inputs to their Range, that of the training data: beyond it programs differ. Clamp the
+    outputs to the limits that a comment at the head of the file gives.
 
     Parameters
     ----------
@@ -58,13 +69,14 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
     Raises
     ------
     ValueError, TypeError
-        As :func:`fold`; ValueError if a membership has no function in the format, or if
+        As :func:`fold`; ValueError if a membership is none of skanfis' own, or if
         :func:`read_fis` would refuse a number, such as a width beyond 1e50.
 
     Warns
     -----
     UserWarning
-        If there are places in the box of the training data at which no rule of the file fires.
+        If there are places in the box of the training data at which no rule of the file fires, or
+        outputs are beyond their limits.
 
     Examples
     --------
@@ -75,7 +87,7 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
     '2 2, 4 (1) : 1'
     """
     model = fold(estimator).as_rule_table()
-    _warn_of_gaps(model)
+    _warn_of_differences(model)
     inputs, names_of_terms, terms, rules = _premises(model)
     comments, (input_names, output_names) = _comments_and_names(model)
     lines = [*comments, _HEAD.format(model=model)]
@@ -111,11 +123,8 @@ def _premises(model):
     A rule's entry is the number of its term on that input, from 1 on, or 0 for none.
     """
     inputs, rule_terms = model.antecedent.term_inputs, model.antecedent.rule_terms
-    terms = [
-        function_of(group.family, natural)
-        for group in model.antecedent.groups
-        for natural in group.family.natural(group.theta).T
-    ]
+    every = model.antecedent.terms
+    terms = [function_of(family, family.natural(theta)) for _, family, theta in every]
     number = [np.count_nonzero(inputs[: t + 1] == j) for t, j in enumerate(inputs)]
     rules = np.zeros((model.n_rules, model.n_inputs), dtype=int)
     for r, place in np.argwhere(rule_terms >= 0):
@@ -172,10 +181,11 @@ def _comments_and_names(model):
     ]
     if model.out_of_bounds != "clip":
         comments.append(f"% In skanfis, beyond it: {model.policy}.")
-    target = model.target
-    has_limits = target and np.isfinite(np.append(target.lower, target.upper)).any()
-    if model.tangent_at is not None or has_limits:
+    if model.tangent_at is not None:
         comments.append("% The constraints of the fit hold within the Range: beyond it, not here.")
+    for k, limits in enumerate(model.output_limits.T, start=1):
+        if np.isfinite(limits).any():
+            comments.append(f"% In skanfis, Output{k} is held within {_numbers(limits)}: clamp it.")
     found = []
     for kind, given in (("Input", model.input_names), ("Output", model.output_names)):
         names = _identifiers(given, kind.lower())
@@ -202,26 +212,23 @@ def _identifiers(names, fallback):
     return distinct(identifiers, "{}_{}")
 
 
-def _warn_of_gaps(model):
-    """Warn where the textbook's strengths, which the file has, are zero for all rules.
+def _warn_of_differences(model):
+    """Warn where, within the Range, the file does not say what skanfis does.
 
-    In skanfis the nearest rule speaks there: its memberships have a floor.
+    Where the textbook's strengths are zero for all rules the nearest one speaks in skanfis, whose
+    memberships have a floor. And the format knows no limits of outputs.
     """
-    rng = np.random.default_rng(0)
-    Z = rng.uniform(model.minimum, model.maximum, (_N_POINTS, model.n_inputs)).T
+    X = np.random.default_rng(0).uniform(model.minimum, model.maximum, (_N_POINTS, model.n_inputs))
     groups = model.antecedent.groups
     with np.errstate(over="ignore"):
-        by_group = [group.family.value(Z[group.inputs], group.theta) for group in groups]
+        by_group = [group.family.value(X.T[group.inputs], group.theta) for group in groups]
     # One more, for the inputs that a rule does not look at (-1).
     mu = np.concatenate([*by_group, np.ones((1, _N_POINTS))])
     fires = np.zeros(_N_POINTS, dtype=bool)
     for rule in model.antecedent.rule_terms:
         fires |= np.prod(mu[rule], axis=0) > 0.0
-    if not fires.all():
-        warn_user(
-            f"At {np.mean(~fires):.1%} of {_N_POINTS} points within the training range no rule of "
-            "the .fis file fires: other programs give NaN, zero or the middle of the output's "
-            "Range there, skanfis what the nearest rule says. A membership without a foot (mf = "
-            "'gaussian', 'bell', 'two_sided_gaussian') or fewer, wider terms leave no such gaps.",
-            UserWarning,
-        )
+    is_held = (model.predict(X) != replace(model, target=None).predict(X)).any(axis=1)
+    for is_there, what in ((~fires, _GAP), (is_held, _HELD)):
+        if is_there.any():
+            where = f"{np.mean(is_there):.1%} of {_N_POINTS} points within the training range"
+            warn_user(f"At {where} {what}", UserWarning)

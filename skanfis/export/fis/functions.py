@@ -11,6 +11,7 @@ from math import log
 import numpy as np
 
 from ...membership import FAMILIES, PRODUCTS, SIDES
+from .._families import check_own
 from ..limits import LARGEST_NUMBER, SMALLEST_NUMBER, shown
 
 # A plateau that is a point, of a family that always has one, as part of the shorter flank.
@@ -19,11 +20,7 @@ _POINT = 1e-12
 
 def function_of(family, natural):
     """Name and parameters in the file of a term with these natural parameters."""
-    if family.name not in _TO_FILE:
-        raise ValueError(
-            f"the membership {family.name!r} has no function in the .fis format; "
-            f"{', '.join(_TO_FILE)} have."
-        )
+    check_own(family)
     name, to_file = _TO_FILE[family.name]
     return name, to_file(*map(float, natural))
 

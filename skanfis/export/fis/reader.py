@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...antecedent import groups_of
 from ...model import TSKModel
 from ...naming import distinct
 from ..json_reader import rule_base
-from ..limits import LARGEST_NUMBER, check_size, groups_of, read_bytes, shown
+from ..limits import LARGEST_NUMBER, check_size, read_bytes, shown
 from .functions import theta_of
 
 # What is larger is refused before it is read.
