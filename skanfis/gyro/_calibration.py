@@ -85,7 +85,7 @@ class Verdict:
     gains: dict[str, Gain]
     n_groups: int
     recommended: str
-    is_one_cycle: bool = False  # one thermal cycle cannot show that it repeats
+    most: str = ""  # the most that could be recommended, as a Split has it
 
     @property
     def model(self):
@@ -202,7 +202,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]
     errors = {each.name: (each.after - rate)[judged] for each in every}
-    verdict = judge(errors, split.labels[judged], split.kind == "piece" and not np.ptp(rate))
+    verdict = judge(errors, split.labels[judged], split.most)
     written = _to_write(recipe, verdict, simpler)
     chosen = next(each for each in every if each.name == written)
     whole = GyroCompensator(
@@ -315,11 +315,11 @@ def _to_write(recipe, verdict, simpler):
     return name
 
 
-def judge(errors, groups, is_one_cycle=False):
+def judge(errors, groups, most=""):
     """Judge compensations by their errors on the same rows, in groups that were held out together.
 
     ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
-    One thermal cycle at rest recommends a constant at most: it cannot show that more repeats.
+    ``most`` is what the groups can recommend at most: beyond it errors may be those of a memory.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     counts = np.bincount(codes)
@@ -335,10 +335,10 @@ def judge(errors, groups, is_one_cycle=False):
         for place, name in enumerate(names)
         if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
-    if is_one_cycle:
-        recommended = min(names[:2], key=lambda name: of_all[name])
+    if most:
+        recommended = min(names[: 1 + names.index(NAMES[most])], key=lambda name: of_all[name])
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
-    return Verdict(of_all, gains, counts.size, recommended, is_one_cycle)
+    return Verdict(of_all, gains, counts.size, recommended, most)
 
 
 def _gain(logs):

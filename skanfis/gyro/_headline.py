@@ -20,6 +20,21 @@ from .targets.error_model import ErrorModel
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
+# What the log cannot tell, and what to do: of so few rates, and of one thermal cycle.
+_CANNOT_TELL = (
+    (
+        "So few rates cannot tell what is left at all others",
+        "use {} at most",
+        "What bends more may have learnt the rates themselves: log five or more, but for their "
+        "sign, and zero among them, then calibrate again.",
+    ),
+    (
+        "One cycle cannot tell whether this repeats",
+        "{} is safe",
+        "Whatever follows the temperature was learnt and judged on the same cycle: record two "
+        "more, then calibrate again from all.",
+    ),
+)
 _DIGITS = 4  # of what the noise makes of numbers: with them the text errs as the rules do
 _MOST_ROWS = 20_000  # evenly chosen, to see whether the rules can be read
 _MANY_FLAGGED = 0.2  # of the rows
@@ -51,9 +66,10 @@ def headline(calibration, unit):
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
-    if verdict.is_one_cycle:
-        safe = "leave the gyro as it is" if name == NOTHING else "a constant is safe"
-        title = f"One cycle cannot tell whether this repeats; until then {safe}"
+    if verdict.most:
+        cannot, use, advice = _CANNOT_TELL[verdict.most == "constant"]
+        use = "leave the gyro as it is" if name == NOTHING else use.format(ARTICLES[name])
+        title, hint = f"{cannot}; until then {use}", ""
     what = {
         NOTHING: "Without any compensation the error is",
         "constant": "Subtracting a constant leaves",
@@ -62,11 +78,8 @@ def headline(calibration, unit):
         "Nothing more elaborate that was tried is better by more than the scatter over the "
         f"{groups} can explain (95 %)."
     )
-    if verdict.is_one_cycle:
-        why = (
-            "Whatever follows the temperature was learnt and judged on the same cycle: record two "
-            "more, then calibrate again from all."
-        )
+    if verdict.most:
+        why = advice
     elif verdict.n_groups == 1:
         why = (
             "Only one held-out group has rows in range: how far errors scatter is not known, and "

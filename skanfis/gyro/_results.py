@@ -113,8 +113,11 @@ class Results:
         self.temperature = self.log["temperature"].to_numpy()
         self.time = self.log["time"].to_numpy() if "time" in self.log else None
         self.run = label_texts(self.log["run"]) if "run" in self.log else None
-        change = calibration.X.get("temperature_rate")
-        self.temperature_rate = None if change is None else _PER_MINUTE * change.to_numpy()
+        self.temperature_rate = None
+        if self.time is not None:
+            # Whether or not it is an input: what temperature alone leaves is seen by it.
+            change = features(self.log, ("temperature_rate",), calibration.compensator.time_constant)
+            self.temperature_rate = _PER_MINUTE * change["temperature_rate"].to_numpy()
         # That in which errors are no long row of zeros.
         is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
         self.unit = "deg/s" if is_large else "deg/h"

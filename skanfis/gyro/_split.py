@@ -152,7 +152,8 @@ class Split:
     """Folds of a cross-validation: every row is tested once, by a model that is new to its group.
 
     ``labels`` are those that a report lists, ``sentence`` says what was held out and why, and
-    ``cautions`` what that cannot show.
+    ``cautions`` what that cannot show. ``most`` is what it can recommend at most, by the name that
+    ``--write`` has for it; empty: anything.
     """
 
     kind: str
@@ -160,6 +161,7 @@ class Split:
     labels: np.ndarray
     sentence: str
     cautions: tuple[str, ...] = ()
+    most: str = ""
 
 
 def choose_split(log, kind="auto", *, uses_output=True):
@@ -199,7 +201,14 @@ def choose_split(log, kind="auto", *, uses_output=True):
         for part, told in _TOO_FEW.items()
         if part not in parts and 1 < counts.get(part, 0) < _FEWEST[part]
     )
-    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, cautions)
+    most = ""
+    if kind == "piece" and log["rate"].nunique() == 1:
+        most = "constant"  # one thermal cycle cannot show that more repeats
+    elif "level" not in parts and 1 < counts.get("level", 0) < _FEWEST["level"]:
+        # Four tell more than the two coefficients that bend the law; fewer could be learnt by it.
+        most = "line" if counts["level"] < _FEWEST["level"] - 1 else "law-line"
+    labels = _labels(log, parts[0], groups[parts[0]])
+    return Split(kind, folds, labels, sentence, cautions, most)
 
 
 def _choose(groups, counts, has_time):

@@ -20,6 +20,7 @@ _NOTES = {
     "after the one before: temperature_rate += (1 - exp(-h / $lag)) * ((temperature - previous) / "
     "h - temperature_rate); then previous = temperature.",
 }
+_EARTH = "What the calibration's true rate left out, as the earth's, is taken off with the bias."
 
 
 def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
@@ -44,7 +45,7 @@ def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
 def notes_on(compensator):
     """What to do with the output, and how inputs are made, as sentences."""
     use = SUBTRACT if compensator.predicts == "error" else _TAKE
-    notes = [f"{use} {raw_rate_of(compensator)}"]
+    notes = [f"{use} {raw_rate_of(compensator)}", _EARTH]
     notes += [note for name, note in _NOTES.items() if name in compensator.inputs]
     return [note.replace("$lag", f"{compensator.time_constant:g}") for note in notes]
 

@@ -67,6 +67,14 @@ def _write(calibration, text, folder):
         f"it differs from {of} by {largest:.4g} deg/s at most, proven; it leaves {left:.4g} deg/s "
         f"RMS on rows held out, and the model {model_rms:.4g}"
     )
+    if name == "px4":
+        # The correction lags behind by up to a degree: slopes in so many parts of the range.
+        edges = np.linspace(*made.piecewise.ends[0], 401)[None]
+        steepest = np.abs(made.piecewise.ranges(edges[:, :-1], edges[:, 1:])[1]).max()
+        worth += (
+            f"; PX4 holds a correction until the temperature has changed by 1 degC, which adds "
+            f"{steepest:.4g} deg/s at most"
+        )
     notes = [f"In the place of the model in compensator.json: {worth}.", _THERMOMETER]
     if is_code:
         use = f"{SUBTRACT} {raw_rate_of(compensator)}"
