@@ -52,7 +52,7 @@ _PICTURES = {
     "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group; no dot: not in range."),
     "allan-deviation": (
         AllanDisplay,
-        "Allan deviation of the error, over the runs that are in range from end to end. It is the "
+        "Allan deviation of the error, over the stretches that are in range without a gap. It is the "
         "root of IEEE 952's Allan variance.",
     ),
 }
@@ -155,10 +155,9 @@ class Results:
         if self.calibration.is_thinned:
             return "only some of the rows are used"
         try:
-            rows, interval = rows_for_allan(self.time, self.run, self.in_range)
+            rows, interval, run = rows_for_allan(self.time, self.run, self.in_range)
         except ValueError as reason:
             return str(reason)
-        run = None if self.run is None else self.run[rows]
         return {"rows": rows, "sampling_interval": interval, "run": run}
 
     @cached_property
