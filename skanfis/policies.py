@@ -6,20 +6,6 @@ from numbers import Real
 
 import numpy as np
 
-__all__ = [
-    "FARTHEST",
-    "FARTHEST_ROW",
-    "MAX_EXTRAPOLATION",
-    "MOST_DIGITS",
-    "OUT_OF_BOUNDS",
-    "SILENT",
-    "TargetRange",
-    "check_policy",
-    "describe_out_of_bounds",
-    "policy_in_words",
-    "told_apart",
-]
-
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # Those that answer nothing.
 SILENT = ("nan", "raise")

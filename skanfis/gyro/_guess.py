@@ -14,7 +14,7 @@ from ._units import settle_units
 from .errors import LogError
 
 _SAMPLE_ROWS = 100_000
-_TEMPERATURE = "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度"
+_HEAT = "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度"
 _RATE = "rate omega w angular velocity speed drehrate"
 _OUTPUT = (
     "gyro gyr gyroscope fog output out signal raw counts count adc measured meas indicated sensor "
@@ -32,12 +32,12 @@ _WORDS = {
         3.0: "t sec secs seconds epoch utc tow ms millis us",
     },
     "temperature": {
-        5.0: _TEMPERATURE,
+        5.0: _HEAT,
         3.0: "t",
         -3.5: "start set setpoint target chamber oven ambient amb room min max board",
     },
-    "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} {_WISH} {_TEMPERATURE}"},
-    "rate": {6.0: f"{_TRUTH} actual ist", 5.0: _WISH, 2.0: _RATE, -4.5: _OUTPUT, -99.0: _TEMPERATURE},
+    "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} {_WISH} {_HEAT}"},
+    "rate": {6.0: f"{_TRUTH} ist actual", 5.0: _WISH, 2.0: _RATE, -4.5: _OUTPUT, -99.0: _HEAT},
 }
 _SCORES = {
     part: {word: score for score, words in table.items() for word in words.split()}
@@ -99,8 +99,7 @@ class Request:
 class Layout:
     """Places of the parts in a file, and their units there.
 
-    ``others`` are columns that would do as well, ``assumed`` parts whose units nothing tells,
-    ``axis`` is that of the output by its name: "x", "y", "z" or empty.
+    ``others`` are columns that would do as well, ``assumed`` parts whose units nothing tells.
     """
 
     header: list
@@ -110,7 +109,7 @@ class Layout:
     others: dict = field(default_factory=dict)
     assumed: list = field(default_factory=list)
     dates: list = field(default_factory=list)  # places of those of a time without a date
-    axis: str = ""
+    axis: str = ""  # of the output, by its name: "x", "y" or "z"
 
     def name(self, part):
         return self.header[self.places[part]] if part in self.places else part

@@ -52,8 +52,8 @@ _PICTURES = {
     "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group; no dot: not in range."),
     "allan-deviation": (
         AllanDisplay,
-        "Allan deviation of the error, over the stretches that are in range without a gap. It is the "
-        "root of IEEE 952's Allan variance.",
+        "Allan deviation of the error, over stretches in range without a gap. It is the root of "
+        "IEEE 952's Allan variance.",
     ),
 }
 _COVERAGE = (
@@ -116,7 +116,9 @@ class Results:
         self.temperature_rate = None
         if self.time is not None:
             # Whether or not it is an input: what temperature alone leaves is seen by it.
-            change = features(self.log, ("temperature_rate",), calibration.compensator.time_constant)
+            change = features(
+                self.log, ("temperature_rate",), calibration.compensator.time_constant
+            )
             self.temperature_rate = _PER_MINUTE * change["temperature_rate"].to_numpy()
         # That in which errors are no long row of zeros.
         is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL

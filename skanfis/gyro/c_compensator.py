@@ -20,7 +20,6 @@ _NOTES = {
     "after the one before: temperature_rate += (1 - exp(-h / $lag)) * ((temperature - previous) / "
     "h - temperature_rate); then previous = temperature.",
 }
-_EARTH = "What the calibration's true rate left out, as the earth's, is taken off with the bias."
 
 
 def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
@@ -45,7 +44,7 @@ def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
 def notes_on(compensator):
     """What to do with the output, and how inputs are made, as sentences."""
     use = SUBTRACT if compensator.predicts == "error" else _TAKE
-    notes = [f"{use} {raw_rate_of(compensator)}", _EARTH]
+    notes = [f"{use} {raw_rate_of(compensator)}"]
     notes += [note for name, note in _NOTES.items() if name in compensator.inputs]
     return [note.replace("$lag", f"{compensator.time_constant:g}") for note in notes]
 
@@ -59,4 +58,7 @@ def raw_rate_of(compensator):
     """What the raw rate is, as a sentence."""
     factor = compensator.scale_factor
     divided = "" if factor == 1.0 else f" divided by {factor:.9g}"
-    return f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."
+    raw = f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."
+    return (
+        f"{raw} What the true rate of the calibration left out, as the earth's, goes with the bias."
+    )

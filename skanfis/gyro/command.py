@@ -179,9 +179,7 @@ def _settle_rest(reading, tell):
         name, largest = layout.name("rate"), log["rate"].abs().max()
         own = f" (if it is the gyro's own: --columns 'output={name}')" if largest else ""
         what = f"the rate of {name!r} is {largest:.3g} deg/s at most and not used{own}"
-    reading.notes.append(
-        f"{what}, and the output does not move: taken as at rest, the earth's rate in the bias"
-    )
+    reading.notes.append(f"{what}, and the output does not move: taken as at rest")
     tell(f"note: {reading.notes[-1]}")
     reading.log = log.assign(rate=0.0)
     return True
@@ -286,7 +284,7 @@ def _apply(options, tell):
     log = reading.log
     if "time" in compensator.inputs:
         start = log.get("power_on", log["time"]).iloc[0]
-        reading.notes.append(f"power-on of the first run is taken to be at {start:.10g} s, where its clock begins")
+        reading.notes.append(f"power-on is taken to be where the clock begins, at {start:.10g} s")
     n_rows = counted(f"{len(log):,}", "row")
     tell(n_rows)
     # Run by run, for the memory that this takes.

@@ -147,12 +147,8 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     for number, path in enumerate(paths):
         files.append(LogFile(path, request, files[0] if files else None))
         tables.append(files[-1].read().assign(file=np.int32(number)))
-        if _goes_on(files[-2:], tables[-2:]):
-            files[-1].goes_on = True
-            is_same = tables[-1]["run"] == 0
-            tables[-1].loc[is_same, "power_on"] = tables[-2]["power_on"].iloc[-1]
-        tables[-1]["run"] += np.int32(n_runs - files[-1].goes_on)
-        n_runs += len(files[-1].runs) - files[-1].goes_on
+        tables[-1]["run"] += np.int32(n_runs)
+        n_runs += len(files[-1].runs)
         if len(paths) > 1:
             tell(f"read {number + 1:,} of {len(paths):,}: {path}, {files[-1].n_rows:,} rows")
     table = pd.concat(tables) if len(tables) > 1 else tables[0]
@@ -160,9 +156,11 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
-    if going := [file.path for file in files if file.goes_on]:
-        told = f"{counted(len(going), 'file')}, first {going[0]}, where that of the file before ends"
-        notes.append(f"the clock goes on in {told}: so does the run")
+    runs = pd.concat([each.runs.assign(file=k) for k, each in enumerate(files)], ignore_index=True)
+    by_clock = request.guess and "time" in table and "run" not in layout.places
+    if by_clock and len(runs) > 1 == runs["device"].nunique():
+        table, runs, told = _joined_by_clock(table, runs, paths)
+        notes += told
     assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}
     n_rows, every = len(table), 1
     while len(table) > most_rows * every:
@@ -183,8 +181,6 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
             # All rows tell otherwise than the first ones.
             retold = replace(request, assumed=layout.units | found)
             return read(paths, retold, tell=tell, most_rows=most_rows)
-    own = [each.runs[int(each.goes_on) :].assign(file=k) for k, each in enumerate(files)]
-    runs = pd.concat(own, ignore_index=True)
     names = _names_of_runs(runs, paths)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
@@ -208,9 +204,6 @@ class LogFile:
         self.n_rows = 0
         self.runs = pd.DataFrame()  # labels of device and run, of each run that was read
         self._form = ""  # of a clock of texts
-        places = self.layout.places
-        self.goes_on = False  # with the last run of the file before
-        self.is_told_by_clock = self._is_command and "time" in places and "run" not in places
         if first is None:
             return
         differ = sorted(set(self.layout.places) ^ set(first.layout.places))
@@ -240,7 +233,7 @@ class LogFile:
         unlabelled = pd.Categorical.from_codes(np.zeros(len(log), dtype=np.int8), [""])
         for part in LABELS:
             log[part] = log[part].astype("category") if part in log else unlabelled
-        if self.is_told_by_clock and len(log):
+        if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
             runs = self._told_by_clock(log["time"].to_numpy())
             log = log[: len(runs)].assign(run=runs)
         if "time" in log:
@@ -384,13 +377,16 @@ class LogFile:
         return LogError(f"{where}, column {name!r}{part}: {reason}")
 
 
-def _goes_on(files, tables):
-    """Whether the second of two files goes on with the last run of the first, by the clock."""
-    if len(files) < 2 or any(table.empty for table in tables) or not files[1].is_told_by_clock:
-        return False
-    steps = np.diff(np.concatenate([table["time"] for table in tables]))
-    is_next = 0.0 < steps[len(tables[0]) - 1] < _NEXT * np.median(steps)
-    return is_next and files[0].runs["device"].iloc[-1] == files[1].runs["device"].iloc[0]
+def _joined_by_clock(table, runs, paths):
+    """The log with runs that go on in the next file, as the clock does, as one; runs; notes."""
+    ends, steps = np.flatnonzero(np.diff(table["run"])), np.diff(table["time"])
+    is_new = (steps[ends] <= 0.0) | (steps[ends] >= _NEXT * np.median(steps))
+    is_new = np.append(True, is_new | (np.diff(table["file"])[ends] == 0))
+    run = (np.cumsum(is_new, dtype=np.int32) - 1)[table["run"]]
+    table = table.assign(run=run, power_on=table["power_on"].groupby(run).transform("first"))
+    places = runs["file"][~is_new].tolist()
+    told = (f"{counted(len(places), 'file')}, first {paths[place]}" for place in places[:1])
+    return table, runs[is_new], [f"the run goes on in {each}, as the clock does" for each in told]
 
 
 def _since_power_on(log):

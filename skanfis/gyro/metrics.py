@@ -262,9 +262,9 @@ def allan_figures(tau, deviation):
 
 
 def rows_for_allan(time, run, answered):
-    """Rows of the stretches that were answered, without a gap in time; the time between rows [s].
+    """Rows of stretches without a gap in time or answers; the time between them [s]; their labels.
 
-    Last the label of each row's stretch. ValueError says why there is no Allan deviation.
+    ValueError says why there is no Allan deviation.
     """
     stretches, runs = [], rows_by_run(run, time.size)
     usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs]))
@@ -274,8 +274,7 @@ def rows_for_allan(time, run, answered):
         stretches += np.split(rows, np.flatnonzero(~is_next) + 1)
     stretches = [rows for rows in stretches if rows.size >= _ROWS_PER_TIME]
     if not stretches:
-        told = f"{_ROWS_PER_TIME} rows in range follow one another, evenly spaced in time"
-        raise ValueError(f"nowhere do {told}")
+        raise ValueError(f"nowhere do {_ROWS_PER_TIME} rows in range follow evenly in time")
     labels = np.repeat(np.arange(len(stretches)), [rows.size for rows in stretches])
     return np.concatenate(stretches), float(usual), labels
 

@@ -171,11 +171,9 @@ def _interval(figure, value, rows, samples, draws, kind):
     spread = np.array(found)[np.isfinite(found)]
     if spread.size < _FEWEST_DEFINED * len(draws):
         return nothing, "no interval: too many resamples do not have this figure"
-    ends = np.percentile(spread, _PERCENTILES)
-    if figure.name in metrics.SIZES_WITH_NOISE:
-        # A resample has fewer different rows, and so more noise: it tells the spread, no more.
-        ends *= value / np.median(spread)
-    return ends, ""
+    # A resample has fewer different rows, and so more noise: of such it tells the spread alone.
+    own = value / np.median(spread) if figure.name in metrics.SIZES_WITH_NOISE else 1.0
+    return own * np.percentile(spread, _PERCENTILES), ""
 
 
 def _of_side(rows, side):

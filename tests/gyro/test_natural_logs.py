@@ -76,7 +76,7 @@ def test_files_of_a_logger_that_begins_a_new_one_now_and_then(tmp_path, truth):
         same(reading, truth)
         assert (pd.factorize(reading.log["run"])[0] == pd.factorize(truth["run"])[0]).all()
         assert "power_on" not in reading.log
-        assert any("the clock goes on in 10 files, first" in note for note in reading.notes)
+        assert any("the run goes on in 10 files, first" in note for note in reading.notes)
         # Out of their order none goes on.
         assert found(paths[::-1], columns={"time": clock}).log["run"].nunique() == 15
 

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from ...export.c.dialect import write_files
-from ..c_compensator import SUBTRACT, input_units, raw_rate_of
+from ..c_compensator import SUBTRACT, input_units, notes_on, raw_rate_of
 from ..metrics import rms
 from .autopilots import NOTES, Cubic
-from .error_model import ErrorModel, difference
+from .error_model import ErrorModel, difference, spread
 from .tables import Spline, Table
 
 FILES = {
@@ -22,7 +22,6 @@ FILES = {
 # A target is let through whose error on rows held out is at most so many times the model's.
 _MOST_TIMES = 1.5
 _N_CALIBRATION_TEMPERATURES = 200
-_THERMOMETER = "The temperature [degC] must come from the thermometer that was logged."
 
 
 def write_targets(calibration, texts, folder):
@@ -68,14 +67,10 @@ def _write(calibration, text, folder):
         f"RMS on rows held out, and the model {model_rms:.4g}"
     )
     if name == "px4":
-        # The correction lags behind by up to a degree: slopes in so many parts of the range.
-        edges = np.linspace(*made.piecewise.ends[0], 401)[None]
+        edges = spread(made.piecewise.ends).T
         steepest = np.abs(made.piecewise.ranges(edges[:, :-1], edges[:, 1:])[1]).max()
-        worth += (
-            f"; PX4 holds a correction until the temperature has changed by 1 degC, which adds "
-            f"{steepest:.4g} deg/s at most"
-        )
-    notes = [f"In the place of the model in compensator.json: {worth}.", _THERMOMETER]
+        worth += f"; PX4, which holds it for up to 1 degC, adds {steepest:.4g} deg/s at most"
+    notes = [f"In the place of the model in compensator.json: {worth}.", *notes_on(compensator)[1:]]
     if is_code:
         use = f"{SUBTRACT} {raw_rate_of(compensator)}"
         write_files(
