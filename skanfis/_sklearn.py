@@ -39,7 +39,6 @@ __all__ = [
     "validate_parameter_constraints",
 ]
 
-
 _Method = TypeVar("_Method", bound=Callable)
 
 

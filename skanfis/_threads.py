@@ -8,13 +8,8 @@ from threading import Lock
 from joblib import Parallel, delayed, effective_n_jobs
 from threadpoolctl import ThreadpoolController
 
-
-@lru_cache(maxsize=1)
-def _thread_pools() -> ThreadpoolController:
-    """The process's thread pools; looking for them takes as long as a small fit."""
-    return ThreadpoolController()
-
-
+# The process's thread pools; looking for them takes as long as a small fit.
+_thread_pools = lru_cache(maxsize=1)(ThreadpoolController)
 # BLAS has one number of threads for the whole process: fits in several threads give it back in
 # reverse order, whichever ends first. Of OpenMP every thread has a number of its own.
 _BLAS_LIMITS: list = []

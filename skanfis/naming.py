@@ -14,16 +14,6 @@ from .antecedent.tree import CRISP
 from .digits import in_digits, plain, rounded, told_apart
 from .membership import Gaussian, SigmoidFalling, SigmoidRising
 
-__all__ = [
-    "LINGUISTIC",
-    "WRITTEN",
-    "default_output_names",
-    "default_term_names",
-    "distinct",
-    "given_term_names",
-    "parameters_written",
-]
-
 # Six as in the founding paper, negative large to positive large; seven with zero between them.
 LINGUISTIC = {
     1: ("any",),

@@ -8,18 +8,6 @@ import numpy as np
 
 from .digits import told_apart
 
-__all__ = [
-    "FARTHEST",
-    "FARTHEST_ROW",
-    "MAX_EXTRAPOLATION",
-    "OUT_OF_BOUNDS",
-    "SILENT",
-    "TargetRange",
-    "check_policy",
-    "describe_out_of_bounds",
-    "policy_in_words",
-]
-
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # Those that answer nothing.
 SILENT = ("nan", "raise")

@@ -17,8 +17,6 @@ from scipy.linalg import blas
 from .antecedent import Antecedent, by_parameter
 from .consequent import rule_outputs
 
-__all__ = ["MOST_PARAMETERS", "Posterior", "parameter_units"]
-
 # A model of more parameters keeps no posterior: its factor would take more than 32 MB.
 MOST_PARAMETERS = 2000
 # Of what is known at points that lie close together, what says nothing new.

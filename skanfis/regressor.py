@@ -40,8 +40,6 @@ from .training.chunks import RowSums, fitted_weights, inputs_with_slopes, solve
 from .training.data import NUMERIC, Fitted
 from .training.settings import given_weights, solver_of, structure_request
 
-__all__ = ["ANFISRegressor"]
-
 # Parameters of which a word stands for an object's defaults.
 _OBJECTS: dict[str, type] = {
     "solver": VariableProjection,

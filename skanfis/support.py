@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["RuleSupport"]
-
 
 @dataclass(frozen=True, eq=False)
 class RuleSupport:

@@ -16,7 +16,6 @@ from ._ofog_physics import REFERENCE_TEMPERATURE, Schedule, simulate_power_up, t
 _ANY = Interval(Real, None, None, closed="neither")
 _NOT_NEGATIVE = Interval(Real, 0, None, closed="left")
 _POSITIVE = Interval(Real, 0, None, closed="neither")
-_PART = Interval(Real, 0, 1, closed="both")
 _AT_LEAST_ONE = Interval(Integral, 1, None, closed="left")
 
 
@@ -58,17 +57,11 @@ _RANDOM = [
 ]  # fmt: skip
 _CONSTRAINTS = {
     "profile": [StrOptions({"constant", "soaks", "ramps"})],
-    "n_devices": [_AT_LEAST_ONE],
-    "n_runs": [_AT_LEAST_ONE],
-    "n_power_ups": [_AT_LEAST_ONE],
-    "off_time": [_NOT_NEGATIVE],
-    "duration": [_POSITIVE],
-    "sampling_interval": [_POSITIVE],
+    **dict.fromkeys(["n_devices", "n_runs", "n_power_ups"], (_AT_LEAST_ONE,)),
+    **dict.fromkeys(["off_time", "noise"], (_NOT_NEGATIVE,)),
+    **dict.fromkeys(["duration", "sampling_interval", "dwell_time"], (_POSITIVE,)),
     "max_rate": [_POSITIVE, None],
-    "dwell_time": [_POSITIVE],
-    "max_residual_heat": [_PART],
-    "noise": [_NOT_NEGATIVE],
-    "device_spread": [_PART],
+    **dict.fromkeys(["max_residual_heat", "device_spread"], (Interval(Real, 0, 1, closed="both"),)),
     "coefficients": [Mapping, None],
 }
 # Outside, neither the polynomials in temperature nor any chamber for gyros would hold.

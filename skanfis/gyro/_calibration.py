@@ -18,7 +18,7 @@ from .. import ANFISRegressor
 from ..exceptions import OutOfBoundsWarning
 from ..inspection.text import counted
 from ._checks import LARGEST_AT_REST, find_glitches
-from ._columns import SIGNALS, ask
+from ._columns import RATE_UNITS, SIGNALS, ask
 from ._simpler import NAMES, ROUNDS, Simpler, make_law, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, as_written, features
@@ -85,7 +85,6 @@ class Verdict:
     gains: dict[str, Gain]
     n_groups: int
     recommended: str
-    is_one_cycle: bool = False  # one thermal cycle cannot show that it repeats
 
     @property
     def model(self):
@@ -145,11 +144,8 @@ class Calibration:
         """Rows that were in the bounds of a model new to them, and have its answer."""
         return self.inside & np.isfinite(self.after)
 
-    def cautions(self, unit="deg/s", per_unit=1.0):
-        """Sentences that say why the compensator should not be used as it is.
-
-        Errors are in a unit of which ``per_unit`` are 1 deg/s.
-        """
+    def cautions(self, unit="deg/s"):
+        """Sentences that say why the compensator should not be used as it is; errors in a unit."""
         found = list(self.split.cautions)
         if "output" not in self.recipe.inputs and np.abs(self.rate).max() > LARGEST_AT_REST:
             found.append(
@@ -160,9 +156,8 @@ class Calibration:
             answered = rows & np.isfinite(self.after)
             if not answered.any():
                 continue
-            was, became = (
-                rms(per_unit * (rates - self.rate)[answered]) for rates in (self.before, self.after)
-            )
+            errors = (RATE_UNITS[unit] * (each - self.rate) for each in (self.before, self.after))
+            was, became = (rms(each[answered]) for each in errors)
             if became > was:
                 found.append(
                     f"the compensation makes held-out rows {where} worse, from {was:.4g} to "
@@ -202,7 +197,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
     judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]
     errors = {each.name: (each.after - rate)[judged] for each in every}
-    verdict = judge(errors, split.labels[judged], split.kind == "piece" and not np.ptp(rate))
+    verdict = judge(errors, split.labels[judged], split.most)
     written = _to_write(recipe, verdict, simpler)
     chosen = next(each for each in every if each.name == written)
     whole = GyroCompensator(
@@ -315,11 +310,11 @@ def _to_write(recipe, verdict, simpler):
     return name
 
 
-def judge(errors, groups, is_one_cycle=False):
+def judge(errors, groups, most=""):
     """Judge compensations by their errors on the same rows, in groups that were held out together.
 
     ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
-    One thermal cycle at rest recommends a constant at most: it cannot show that more repeats.
+    ``most`` is what the groups can recommend at most: beyond it errors may be those of a memory.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     counts = np.bincount(codes)
@@ -335,10 +330,10 @@ def judge(errors, groups, is_one_cycle=False):
         for place, name in enumerate(names)
         if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
-    if is_one_cycle:
-        recommended = min(names[:2], key=lambda name: of_all[name])
+    if most:
+        recommended = min(names[: 1 + names.index(NAMES[most])], key=lambda name: of_all[name])
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
-    return Verdict(of_all, gains, counts.size, recommended, is_one_cycle)
+    return Verdict(of_all, gains, counts.size, recommended)
 
 
 def _gain(logs):

@@ -14,16 +14,15 @@ from ._units import settle_units
 from .errors import LogError
 
 _SAMPLE_ROWS = 100_000
-_TEMPERATURE = "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度"
+_HEAT = "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度"
 _RATE = "rate omega w angular velocity speed drehrate"
 _OUTPUT = (
     "gyro gyr gyroscope fog output out signal raw counts count adc measured meas indicated sensor "
     "imu dut uut kreisel"
 )
-_TRUTH = (
-    "true truth table turntable drehtisch ref reference stage commanded command cmd encoder soll "
-    "consigne"
-)
+_TRUTH = "true truth table turntable drehtisch ref reference stage encoder enc"
+# What a table was told to do, it does a little later.
+_WISH = "commanded command cmd demand setpoint soll consigne"
 # Scores: how much a word in a column's name speaks for a part. A chamber's thermometer is not the
 # gyro's; a rate of a temperature is no rotation.
 _WORDS = {
@@ -33,12 +32,12 @@ _WORDS = {
         3.0: "t sec secs seconds epoch utc tow ms millis us",
     },
     "temperature": {
-        5.0: _TEMPERATURE,
+        5.0: _HEAT,
         3.0: "t",
         -3.5: "start set setpoint target chamber oven ambient amb room min max board",
     },
-    "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} setpoint {_TEMPERATURE}"},
-    "rate": {6.0: f"{_TRUTH} setpoint", 2.0: _RATE, -4.5: _OUTPUT, -99.0: _TEMPERATURE},
+    "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} {_WISH} {_HEAT}"},
+    "rate": {6.0: f"{_TRUTH} ist actual", 5.0: _WISH, 2.0: _RATE, -4.5: _OUTPUT, -99.0: _HEAT},
 }
 _SCORES = {
     part: {word: score for score, words in table.items() for word in words.split()}
@@ -110,6 +109,7 @@ class Layout:
     others: dict = field(default_factory=dict)
     assumed: list = field(default_factory=list)
     dates: list = field(default_factory=list)  # places of those of a time without a date
+    axis: str = ""  # of the output, by its name: "x", "y" or "z"
 
     def name(self, part):
         return self.header[self.places[part]] if part in self.places else part
@@ -170,6 +170,8 @@ def _guess(source, request, layout, first):
         layout.places.setdefault("rate", called_rate)
     of_first = request.assumed if first is None else first.units
     _settle_axis(columns, layout)
+    if "output" in layout.places:
+        layout.axis = columns[layout.places["output"]].axis
     place, taken = layout.places.get("time"), set(layout.places.values())
     if place is not None and columns[place].is_time and clock_form(sample[place]) == CLOCK:
         texts = [each.place for each in columns if each.numbers.size == 0]
@@ -200,7 +202,8 @@ class _Column:
                 # A name that is a unit and nothing else keeps it as its word too.
                 meant, words = found, words[:-length] or words
         axes = [letter for letter in "xyz" if letter in words and len(words) > 1]
-        self.words = set(words) - set(axes[-1:])
+        self.axis = "".join(axes[-1:])
+        self.words = set(words) - {self.axis}
         numbers = as_numbers(values, decimal)
         self.aligned = np.where(np.isfinite(numbers), numbers, np.nan)
         self.numbers = numbers[np.isfinite(numbers)]

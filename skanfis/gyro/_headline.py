@@ -20,6 +20,9 @@ from .targets.error_model import ErrorModel
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
+# What the log cannot tell, what it was all learnt from, and what to log; of one thermal cycle.
+_RATES = "So few rates cannot tell what is left at others", "rates: log five or more"
+_CYCLE = "One cycle cannot tell whether this repeats", "cycle: record two more"
 _DIGITS = 4  # of what the noise makes of numbers: with them the text errs as the rules do
 _MOST_ROWS = 20_000  # evenly chosen, to see whether the rules can be read
 _MANY_FLAGGED = 0.2  # of the rows
@@ -28,7 +31,8 @@ _MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and cou
 
 def headline(calibration, unit):
     """A title, and a sentence that gives its reason; errors in ``unit``."""
-    verdict, groups = calibration.verdict, held_out_groups(calibration)
+    verdict, most = calibration.verdict, calibration.split.most
+    groups = held_out_groups(calibration)
     left = {
         name: f"{three_digits(RATE_UNITS[unit] * error)} {unit}"
         for name, error in verdict.rms.items()
@@ -51,9 +55,10 @@ def headline(calibration, unit):
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
-    if verdict.is_one_cycle:
-        safe = "leave the gyro as it is" if name == NOTHING else "a constant is safe"
-        title = f"One cycle cannot tell whether this repeats; until then {safe}"
+    if most:
+        cannot, advice = _CYCLE if most == "constant" else _RATES
+        safe = "leave the gyro as it is" if name == NOTHING else f"{ARTICLES[name]} is safe"
+        title, hint = f"{cannot}; until then {safe}", ""
     what = {
         NOTHING: "Without any compensation the error is",
         "constant": "Subtracting a constant leaves",
@@ -62,11 +67,8 @@ def headline(calibration, unit):
         "Nothing more elaborate that was tried is better by more than the scatter over the "
         f"{groups} can explain (95 %)."
     )
-    if verdict.is_one_cycle:
-        why = (
-            "Whatever follows the temperature was learnt and judged on the same cycle: record two "
-            "more, then calibrate again from all."
-        )
+    if most:
+        why = f"Anything more was learnt and judged on the same {advice}, then calibrate anew."
     elif verdict.n_groups == 1:
         why = (
             "Only one held-out group has rows in range: how far errors scatter is not known, and "
@@ -80,9 +82,8 @@ def headline(calibration, unit):
 
 def held_out_groups(calibration):
     """Such as "12 held-out runs"."""
-    kind, n_groups = calibration.split.kind.split("+")[0], calibration.verdict.n_groups
-    if kind == "level":
-        kind = "rate level"
+    n_groups = calibration.verdict.n_groups
+    kind = calibration.split.kind.split("+")[0].replace("level", "rate level")
     n_all = np.unique(calibration.split.labels.astype(str)).size
     of_all = "" if n_all == n_groups else f" (of {n_all})"
     return f"{n_groups}{of_all} held-out {kind}{'s' if n_groups > 1 or of_all else ''}"
@@ -120,25 +121,23 @@ def errors_and_verdict(calibration, name_row="row {}".format):
     inside = calibration.in_range
     outside = ~calibration.inside & np.isfinite(after)
     sizes, constant = np.where(inside, np.abs(after), 0.0), calibration.verdict.rms["constant"]
-    lines = [
+    yield (
         f"error before   {rms(before[inside]):.4g} deg/s RMS, {constant:.4g} once a constant (the "
-        f"output at rest) is taken off, on {inside.sum():,} held-out rows in range",
+        f"output at rest) is taken off, on {inside.sum():,} held-out rows in range"
+    )
+    yield (
         f"error after    {rms(after[inside]):.4g} deg/s RMS on the same rows, half of them within "
-        f"{np.median(sizes[inside]):.4g}, peak {sizes.max():.4g} ({name_row(int(sizes.argmax()))})",
-    ]
+        f"{np.median(sizes[inside]):.4g}, peak {sizes.max():.4g} ({name_row(int(sizes.argmax()))})"
+    )
     if outside.any():
-        lines.append(
-            f"out of range   {rms(before[outside]):.4g} deg/s RMS before, "
-            f"{rms(after[outside]):.4g} after, on {outside.sum():,} held-out rows, all of them "
-            "flagged"
-        )
-    lines.append(f"flagged        {flagged_text(calibration)}")
+        errors = f"{rms(before[outside]):.4g} deg/s RMS before, {rms(after[outside]):.4g} after"
+        yield f"out of range   {errors}, on {outside.sum():,} held-out rows, all of them flagged"
+    yield f"flagged        {flagged_text(calibration)}"
     title, reason = headline(calibration, "deg/s")
-    lines.append(f"VERDICT        {title}. {reason}")
-    lines.append(f"written is     {written_text(calibration)}")
+    yield f"VERDICT        {title}. {reason}"
+    yield f"written is     {written_text(calibration)}"
     if calibration.writes_model and (against := against_reading(calibration)):
-        lines.append(f"rules          against reading them one by one: {against[0]}")
-    return lines
+        yield f"rules          against reading them one by one: {against[0]}"
 
 
 def of_rates(compensator, log, rates):

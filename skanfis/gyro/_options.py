@@ -32,7 +32,6 @@ _AT_LEAST = ("reduction_factor",)  # of this more is better
 _TARGET = re.compile(
     r"(rate-)?table(:(float|double|q31|q15))?|cubic(:(float|double))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
 )
-
 _TARGETS = (
     "in C table[:TYPE] over temperature, rate-table[:TYPE] over output too (TYPE float, double, "
     "q31, q15), cubic[:TYPE] piecewise over temperature (float, double); parameters of one AXIS "

@@ -52,8 +52,8 @@ _PICTURES = {
     "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group; no dot: not in range."),
     "allan-deviation": (
         AllanDisplay,
-        "Allan deviation of the error, over the runs that are in range from end to end. It is the "
-        "root of IEEE 952's Allan variance.",
+        "Allan deviation of the error, over stretches in range without a gap. It is the root of "
+        "IEEE 952's Allan variance.",
     ),
 }
 _COVERAGE = (
@@ -113,8 +113,13 @@ class Results:
         self.temperature = self.log["temperature"].to_numpy()
         self.time = self.log["time"].to_numpy() if "time" in self.log else None
         self.run = label_texts(self.log["run"]) if "run" in self.log else None
-        change = calibration.X.get("temperature_rate")
-        self.temperature_rate = None if change is None else _PER_MINUTE * change.to_numpy()
+        self.temperature_rate = None
+        if self.time is not None:
+            # Whether or not it is an input: what temperature alone leaves is seen by it.
+            change = features(
+                self.log, ("temperature_rate",), calibration.compensator.time_constant
+            )
+            self.temperature_rate = _PER_MINUTE * change["temperature_rate"].to_numpy()
         # That in which errors are no long row of zeros.
         is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
         self.unit = "deg/s" if is_large else "deg/h"
@@ -152,10 +157,9 @@ class Results:
         if self.calibration.is_thinned:
             return "only some of the rows are used"
         try:
-            rows, interval = rows_for_allan(self.time, self.run, self.in_range)
+            rows, interval, run = rows_for_allan(self.time, self.run, self.in_range)
         except ValueError as reason:
             return str(reason)
-        run = None if self.run is None else self.run[rows]
         return {"rows": rows, "sampling_interval": interval, "run": run}
 
     @cached_property

@@ -152,7 +152,7 @@ class Split:
     """Folds of a cross-validation: every row is tested once, by a model that is new to its group.
 
     ``labels`` are those that a report lists, ``sentence`` says what was held out and why, and
-    ``cautions`` what that cannot show.
+    ``cautions`` what that cannot show. It recommends ``most`` at most, as ``--write`` calls that.
     """
 
     kind: str
@@ -160,6 +160,7 @@ class Split:
     labels: np.ndarray
     sentence: str
     cautions: tuple[str, ...] = ()
+    most: str = ""
 
 
 def choose_split(log, kind="auto", *, uses_output=True):
@@ -194,12 +195,14 @@ def choose_split(log, kind="auto", *, uses_output=True):
     what = " and ".join(_WORDS[part][0] for part in parts)
     of_each = ", ".join(f"{counts[part]} {_WORDS[part][1]}" for part in parts)
     sentence = f"{what} held out ({of_each}, {len(folds)} folds; {reason})"
-    cautions = tuple(
-        told.format(counts[part])
-        for part, told in _TOO_FEW.items()
-        if part not in parts and 1 < counts.get(part, 0) < _FEWEST[part]
-    )
-    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, cautions)
+    few = [n for n in _TOO_FEW if n not in parts and 1 < counts.get(n, 0) < _FEWEST[n]]
+    cautions = tuple(_TOO_FEW[name].format(counts[name]) for name in few)
+    # One thermal cycle cannot show that more repeats.
+    most = "constant" if kind == "piece" and log["rate"].nunique() == 1 else ""
+    if "level" in few:
+        # Four tell more than the two coefficients that bend the law; fewer could be learnt by it.
+        most = "law-line" if counts["level"] == _FEWEST["level"] - 1 else "line"
+    return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, cautions, most)
 
 
 def _choose(groups, counts, has_time):

@@ -58,4 +58,7 @@ def raw_rate_of(compensator):
     """What the raw rate is, as a sentence."""
     factor = compensator.scale_factor
     divided = "" if factor == 1.0 else f" divided by {factor:.9g}"
-    return f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."
+    raw = f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."
+    return (
+        f"{raw} What the true rate of the calibration left out, as the earth's, goes with the bias."
+    )

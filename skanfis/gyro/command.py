@@ -35,6 +35,7 @@ from .compensator import INPUTS, GyroCompensator
 from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, specification
 from .log import find_logs, read
+from .targets.autopilots import NOTES
 from .targets.write import FILES, write_targets
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
@@ -132,11 +133,20 @@ def _where_from_and_to(options):
 def _read(options, paths, tell):
     """The reading of a checked log, and what the options ask of it. What was found out is told."""
     required = dict.fromkeys(["temperature", "output", *columns_of(options.inputs or ())])
-    reading = read(paths, request_of(options, required), tell=tell, most_rows=_MOST_ROWS)
+    request = request_of(options, required)
+    reading = read(paths, request, tell=tell, most_rows=_MOST_ROWS)
     if reading.assumed:
         reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
     for note in reading.notes:
         tell(f"note: {note}")
+    layout = reading.files[0].layout
+    for text in options.target if layout.axis and "output" not in request.columns else ():
+        kind, wanted, *_ = f"{text}:".split(":")
+        if kind in NOTES and wanted != layout.axis:
+            raise UsageError(
+                f"--target {text}: the output was taken from {layout.name('output')!r}. Say which "
+                f"column is that of the axis {wanted} (--columns output=NAME), this one or another."
+            )
     numbers = {"row": reading.n_rows}
     numbers |= {name: reading.log[name].nunique() for name in LABELS if name in reading.log}
     tell(", ".join(counted(f"{n:,}", name) for name, n in numbers.items()))
@@ -272,6 +282,9 @@ def _apply(options, tell):
     for note in [*reading.notes, *assumed]:
         tell(f"note: {note}")
     log = reading.log
+    if "time" in compensator.inputs:
+        start = log.get("power_on", log["time"]).iloc[0]
+        reading.notes.append(f"power-on is taken to be where the clock begins, at {start:.10g} s")
     n_rows = counted(f"{len(log):,}", "row")
     tell(n_rows)
     # Run by run, for the memory that this takes.

@@ -13,7 +13,7 @@ from .. import __version__
 from ..inspection.labels import printable
 from ..inspection.text import counted
 from ..policies import SILENT, policy_in_words
-from ._columns import RATE_UNITS, SIGNALS
+from ._columns import SIGNALS
 from ._headline import (
     ARTICLES,
     against_reading,
@@ -75,8 +75,7 @@ def report_page(results, title):
     what = "Arcsine law and fuzzy rules" if recipe.physics else "Fuzzy rules (ANFIS)"
     what = what if calibration.writes_model else ARTICLES[name].capitalize()
     target = "rate" if calibration.compensator.predicts == "rate" else "rate error"
-    cautions = calibration.cautions(results.symbol, RATE_UNITS[results.unit])
-    cautions = [f"Warning: {sentence}" for sentence in cautions]
+    cautions = [f"Warning: {signs(told)}" for told in calibration.cautions(results.unit)]
     if recipe.assumed:
         cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
     sections = (_check, _merit, _pictures, _sure, _written, _use, _log)

@@ -32,6 +32,7 @@ _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
 _FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
 _SHORTEST_RUN = 3  # rows, at the end of a file
+_NEXT = 2.5  # steps from file to file of one run, of which a row may be lost
 _BEGINNING = 0.1  # a clock that goes back to this part of a run has begun anew
 
 
@@ -155,6 +156,11 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
+    runs = pd.concat([each.runs.assign(file=k) for k, each in enumerate(files)], ignore_index=True)
+    by_clock = request.guess and "time" in table and "run" not in layout.places
+    if by_clock and len(runs) > 1 == runs["device"].nunique():
+        table, runs, told = _joined_by_clock(table, runs, paths)
+        notes += told
     assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}
     n_rows, every = len(table), 1
     while len(table) > most_rows * every:
@@ -175,7 +181,6 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
             # All rows tell otherwise than the first ones.
             retold = replace(request, assumed=layout.units | found)
             return read(paths, retold, tell=tell, most_rows=most_rows)
-    runs = pd.concat([each.runs.assign(file=k) for k, each in enumerate(files)], ignore_index=True)
     names = _names_of_runs(runs, paths)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
@@ -370,6 +375,18 @@ class LogFile:
         rate = f"column {self.layout.name('rate')!r} of the rate"
         reason = error.reason.replace(RATE_COLUMN, rate)
         return LogError(f"{where}, column {name!r}{part}: {reason}")
+
+
+def _joined_by_clock(table, runs, paths):
+    """The log with runs that go on in the next file, as the clock does, as one; runs; notes."""
+    ends, steps = np.flatnonzero(np.diff(table["run"])), np.diff(table["time"])
+    is_new = (steps[ends] <= 0.0) | (steps[ends] >= _NEXT * np.median(steps))
+    is_new = np.append(True, is_new | (np.diff(table["file"])[ends] == 0))
+    run = (np.cumsum(is_new, dtype=np.int32) - 1)[table["run"]]
+    table = table.assign(run=run, power_on=table["power_on"].groupby(run).transform("first"))
+    places = runs["file"][~is_new].tolist()
+    told = (f"{counted(len(places), 'file')}, first {paths[place]}" for place in places[:1])
+    return table, runs[is_new], [f"the run goes on in {each}, as the clock does" for each in told]
 
 
 def _since_power_on(log):

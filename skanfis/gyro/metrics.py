@@ -26,6 +26,8 @@ _RATE_BINS = 101  # parts of the range of rates, in means over which a nonlinear
 _AT_REST, _FEWEST_AT_REST = 1e-4, 10
 # They have no interval: the largest value of a resample says nothing of the largest to come.
 LARGEST_VALUES = ("residual_peak", "residual_peak_to_peak")
+# Sizes of means, into which the noise of these goes.
+SIZES_WITH_NOISE = ("scale_factor_nonlinearity", "scale_factor_nonlinearity_rms", "hysteresis")
 ALLAN_FIGURES = {
     "angle_random_walk": "deg/sqrt(h)",
     "bias_instability": "deg/h",
@@ -260,19 +262,21 @@ def allan_figures(tau, deviation):
 
 
 def rows_for_allan(time, run, answered):
-    """Rows of the runs that were answered from end to end, and the time between them [s].
+    """Rows of stretches without a gap in time or answers; the time between them [s]; their labels.
 
     ValueError says why there is no Allan deviation.
     """
-    runs = [rows for rows in rows_by_run(run, time.size) if answered[rows].all()]
-    if not runs:
-        raise ValueError("no run is in range from end to end")
-    if max(map(len, runs)) < _ROWS_PER_TIME:
-        raise ValueError(f"no run in range has {_ROWS_PER_TIME} rows")
-    steps = np.concatenate([np.diff(time[rows]) for rows in runs])
-    if np.abs(steps - np.median(steps)).max() > _UNEVEN * np.median(steps):
-        raise ValueError("the rows are not evenly spaced in time")
-    return np.sort(np.concatenate(runs)), float(np.median(steps))
+    stretches, runs = [], rows_by_run(run, time.size)
+    usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs]))
+    for rows in runs:
+        is_next = np.abs(np.diff(time[rows]) - usual) <= _UNEVEN * usual
+        is_next &= answered[rows[1:]] & answered[rows[:-1]]
+        stretches += np.split(rows, np.flatnonzero(~is_next) + 1)
+    stretches = [rows for rows in stretches if rows.size >= _ROWS_PER_TIME]
+    if not stretches:
+        raise ValueError(f"nowhere do {_ROWS_PER_TIME} rows in range follow evenly in time")
+    labels = np.repeat(np.arange(len(stretches)), [rows.size for rows in stretches])
+    return np.concatenate(stretches), float(usual), labels
 
 
 def _line(rate, output):

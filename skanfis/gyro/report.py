@@ -151,12 +151,12 @@ def _cells(answered, side, figures, units, kind, draws):
         for figure in figures:
             ends, (value, note) = (np.nan, np.nan), _or_nan(figure.value, rows)
             if draws and not note:
-                ends, note = _interval(figure, rows, samples, draws, kind)
+                ends, note = _interval(figure, value, rows, samples, draws, kind)
             cells.append((value, *ends, note))
     return cells
 
 
-def _interval(figure, rows, samples, draws, kind):
+def _interval(figure, value, rows, samples, draws, kind):
     """Ends of the interval, and why it has none."""
     nothing = (np.nan, np.nan)
     if figure.name in metrics.LARGEST_VALUES:
@@ -171,7 +171,9 @@ def _interval(figure, rows, samples, draws, kind):
     spread = np.array(found)[np.isfinite(found)]
     if spread.size < _FEWEST_DEFINED * len(draws):
         return nothing, "no interval: too many resamples do not have this figure"
-    return np.percentile(spread, _PERCENTILES), ""
+    # A resample has fewer different rows, and so more noise: of such it tells the spread alone.
+    own = value / np.median(spread) if figure.name in metrics.SIZES_WITH_NOISE else 1.0
+    return own * np.percentile(spread, _PERCENTILES), ""
 
 
 def _of_side(rows, side):
@@ -182,13 +184,12 @@ def _of_side(rows, side):
 
 
 def _allan_cells(part, side, is_answered):
-    """Coefficients read off the Allan deviation, of the runs that were answered whole."""
+    """Coefficients read off the Allan deviation, where rows follow one another."""
     time = part["time"].to_numpy()
-    run = part["run"].to_numpy() if "run" in part else np.zeros(len(part))
     try:
-        rows, interval = metrics.rows_for_allan(time, run, is_answered)
+        rows, interval, stretches = metrics.rows_for_allan(time, part.get("run"), is_answered)
         error = (part[side] - part["rate"]).to_numpy()[rows]
-        curve = metrics.allan_deviation(error, interval, run=run[rows])
+        curve = metrics.allan_deviation(error, interval, run=stretches)
         found = metrics.allan_figures(*curve[["averaging_time", "deviation"]].to_numpy().T)
     except ValueError as reason:
         return [(np.nan, np.nan, np.nan, str(reason))] * len(metrics.ALLAN_FIGURES)

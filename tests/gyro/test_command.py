@@ -502,6 +502,8 @@ def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, r
     ):
         code, _, said = run(where, f"{typed} --columns {wrong}")
         assert (code, told in said) == (3, True)
+    code, _, said = run(where, f"{typed} --target table px4:x")
+    assert (code, "px4:x: the output was taken from 'gyro_y'" in said) == (2, True)
     code, said, told = run(where, typed)
     assert (code, "read 4 of 4" in told) == (0, True)
     assert "whole runs held out (4 runs" in said

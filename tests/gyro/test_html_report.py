@@ -64,6 +64,14 @@ def page(calibration, options, coarse_report):
     return report_page(Results(calibration, **options), TITLE)
 
 
+def test_what_temperature_alone_leaves_of_a_hysteresis_is_told():
+    settings = {"rates": [0], "duration": 1800.0, "profile": "ramps", "random_state": 0}
+    log = make_ofog(n_devices=1, n_runs=3, **settings)
+    results = Results(calibration_of(log, ("temperature",), terms=(2,)))
+    assert "hysteresis" in results.pictures
+    assert np.isfinite(results.merit.set_index("figure").loc["hysteresis", "after"])
+
+
 def text_of(calibration):
     return Outline(report_page(Results(calibration), TITLE)).text
 

@@ -65,6 +65,28 @@ def test_lines_above_the_header_and_a_clock_past_midnight(tmp_path, truth):
     assert reading.name_row(10) == f"{tmp_path / 'log.txt'}, line 14"
 
 
+def test_files_of_a_logger_that_begins_a_new_one_now_and_then(tmp_path, truth):
+    """A run that is cut is one run; one from zero on is another, and one a while later too."""
+    parts = [rows.iloc[k : k + 20] for _, rows in truth.groupby("run") for k in (0, 20, 40)]
+    for clock in ("time", "clock"):
+        paths = [tmp_path / f"{clock}{number}.csv" for number in range(15)]
+        for path, part in zip(paths, parts, strict=True):
+            part[[clock, *PARTS[1:]]].to_csv(path, index=False)
+        reading = found(paths, columns={"time": clock})
+        same(reading, truth)
+        assert (pd.factorize(reading.log["run"])[0] == pd.factorize(truth["run"])[0]).all()
+        assert "power_on" not in reading.log
+        assert any("the run goes on in 10 files, first" in note for note in reading.notes)
+        # Out of their order none goes on.
+        assert found(paths[::-1], columns={"time": clock}).log["run"].nunique() == 15
+
+
+def test_the_rate_is_what_the_table_did_not_what_it_was_told(tmp_path, truth):
+    for told, done in (("rate_cmd_dps", "rate_enc_dps"), ("setpoint_dps", "actual_dps")):
+        table = truth[["time", "temperature", "output"]].assign(**{told: 0.0, done: truth["rate"]})
+        same(found_in(tmp_path, table), truth)
+
+
 def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth):
     table = truth[PARTS].astype(object)
     table.loc[5, "output"], table.loc[9, "temperature"], table.loc[200, "rate"] = "---", "", "NaN"

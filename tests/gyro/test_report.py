@@ -112,6 +112,26 @@ def test_interval_is_that_of_the_runs_not_of_the_rows(rng):
     assert bias["before_high"] - bias["before_low"] == pytest.approx(expected, rel=0.12)
 
 
+@pytest.mark.theory
+def test_sizes_of_means_lie_in_their_intervals_and_the_truth_does(rng):
+    """A resample has fewer different rows, so that the noise of its means is larger."""
+    time = np.tile(np.arange(2000.0), 8)
+    rate, phase = rng.uniform(-100.0, 100.0, time.size), 2.0 * np.pi * time / 400.0
+    run, heat = np.repeat(np.arange(8), 2000), {"temperature": 20.0 + 30.0 * np.sin(phase)}
+    heat["temperature_rate"] = np.cos(phase)
+    error = 1e-6 * rate**2 + 0.002 * np.sign(np.cos(phase)) + 0.01 * rng.normal(size=time.size)
+    report = gyro_report(rate, rate + error, run=run, **heat, n_resamples=50, random_state=0)
+    table = figures(report)
+    planted = {
+        "scale_factor_nonlinearity": 2.0 / 3.0 * 100.0,
+        "scale_factor_nonlinearity_rms": np.sqrt(4.0 / 45.0) * 100.0,
+        "hysteresis": 0.004 * HOUR,
+    }
+    for name, truth in planted.items():
+        value, low, high = table.loc[name, VALUES[:3]]
+        assert low < min(value, truth) <= max(value, truth) < high
+
+
 def test_refused_rows_are_left_out_of_both_sides(log):
     refused = np.arange(len(log)) % 10 == 0
     patchy = log.assign(after=log["after"].where(~refused))
@@ -165,9 +185,14 @@ def test_allan_deviation_is_read(rng):
     assert table.loc["angle_random_walk", "before"] == pytest.approx(0.05, rel=0.1)
     assert table.loc["angle_random_walk", "note"].startswith("no interval: see the standard errors")
     assert "still falls" in table.loc["bias_instability", "note"]
-    uneven = np.arange(4096.0) ** 1.01
+    # A row that is lost, or refused, ends a stretch and no more.
+    place = np.arange(4096.0)
+    options["after"] = np.where(place == 3000.0, np.nan, error)
+    table = figures(gyro_report(still, error, time=place + (place > 2000.0), **options))
+    assert table.loc["angle_random_walk", "after"] == pytest.approx(0.05, rel=0.1)
+    uneven = np.cumsum(rng.uniform(0.5, 1.5, 4096))
     table = figures(gyro_report(still, error, time=uneven, **options))
-    assert "not evenly spaced" in table.loc["angle_random_walk", "note"]
+    assert "nowhere do 10 rows in range follow" in table.loc["angle_random_walk", "note"]
 
 
 @pytest.mark.parametrize(

@@ -221,16 +221,17 @@ def test_a_row_less_moves_no_other_row_to_another_fold():
 
 
 @pytest.mark.parametrize(
-    ("rates", "n_devices", "expected"),
+    ("rates", "n_devices", "expected", "most"),
     [
-        ([-50, 50], 1, []),
-        ([-50, 0, 50], 1, ["the table stood still at 2 rates alone"]),
-        (LEVELS, 1, []),
-        (LEVELS, 2, ["2 devices share one compensator"]),
-        (LEVELS, 3, []),
+        ([-50, 50], 1, [], ""),
+        ([-50, 0, 50], 1, ["the table stood still at 2 rates alone"], "line"),
+        ([-30, 0, 80, 100], 1, ["the table stood still at 4 rates alone"], "law-line"),
+        (LEVELS, 1, [], ""),
+        (LEVELS, 2, ["2 devices share one compensator"], ""),
+        (LEVELS, 3, [], ""),
     ],
 )
-def test_too_few_levels_or_devices_to_hold_one_out_are_told(rates, n_devices, expected):
+def test_too_few_levels_or_devices_to_hold_one_out_are_told(rates, n_devices, expected, most):
     n_runs = 4 if n_devices == 1 else 2
     kinds = {"n_devices": n_devices, "n_runs": n_runs, "rates": rates}
     log = make_ofog(**kinds, sampling_interval=60.0, random_state=0)
@@ -239,3 +240,4 @@ def test_too_few_levels_or_devices_to_hold_one_out_are_told(rates, n_devices, ex
     assert [
         told[: len(start)] for told, start in zip(split.cautions, expected, strict=True)
     ] == expected
+    assert split.most == most

@@ -64,10 +64,16 @@ def test_one_group_shows_nothing(rng):
     assert verdict.recommended == "no compensation"
 
 
-@pytest.mark.parametrize(("constant", "recommended"), [(0.5, "constant"), (1.2, "no compensation")])
-def test_one_cycle_shows_no_more_than_a_constant(rng, constant, recommended):
-    """However much better a line looks: it was judged on the cycle that it was learnt from."""
-    errors = errors_of(rng, constant=constant, line=0.01, model=0.001)
-    verdict = judge(errors, GROUPS, is_one_cycle=True)
-    assert (verdict.recommended, verdict.is_one_cycle) == (recommended, True)
+@pytest.mark.parametrize(
+    ("most", "constant", "recommended"),
+    [
+        ("constant", 0.5, "constant"),
+        ("constant", 1.2, "no compensation"),
+        ("line", 0.5, "straight line"),
+    ],
+)
+def test_no_more_is_recommended_than_the_split_can_tell(rng, most, constant, recommended):
+    """However much better it looks: it was judged on the cycle, or rates, that it learnt."""
+    errors = errors_of(rng, constant=constant, **{"straight line": 0.01}, model=0.001)
+    assert judge(errors, GROUPS, most).recommended == recommended
     assert judge(errors, GROUPS).recommended == "model"

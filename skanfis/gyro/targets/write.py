@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from ...export.c.dialect import write_files
-from ..c_compensator import SUBTRACT, input_units, raw_rate_of
+from ..c_compensator import SUBTRACT, input_units, notes_on, raw_rate_of
 from ..metrics import rms
 from .autopilots import NOTES, Cubic
-from .error_model import ErrorModel, difference
+from .error_model import ErrorModel, difference, spread
 from .tables import Spline, Table
 
 FILES = {
@@ -22,7 +22,6 @@ FILES = {
 # A target is let through whose error on rows held out is at most so many times the model's.
 _MOST_TIMES = 1.5
 _N_CALIBRATION_TEMPERATURES = 200
-_THERMOMETER = "The temperature [degC] must come from the thermometer that was logged."
 
 
 def write_targets(calibration, texts, folder):
@@ -67,7 +66,11 @@ def _write(calibration, text, folder):
         f"it differs from {of} by {largest:.4g} deg/s at most, proven; it leaves {left:.4g} deg/s "
         f"RMS on rows held out, and the model {model_rms:.4g}"
     )
-    notes = [f"In the place of the model in compensator.json: {worth}.", _THERMOMETER]
+    if name == "px4":
+        edges = spread(made.piecewise.ends).T
+        steepest = np.abs(made.piecewise.ranges(edges[:, :-1], edges[:, 1:])[1]).max()
+        worth += f"; PX4, which holds it for up to 1 degC, adds {steepest:.4g} deg/s at most"
+    notes = [f"In the place of the model in compensator.json: {worth}.", *notes_on(compensator)[1:]]
     if is_code:
         use = f"{SUBTRACT} {raw_rate_of(compensator)}"
         write_files(

@@ -63,9 +63,15 @@ def test_errors_on_rows_held_out_by_hand_and_files_say_so(tmp_path):
                 lefts[test] = (off[:, None] + made.piecewise(at) - error(at))[test]
     rows = calibration.in_range
     for name in ("table", "px4"):
-        _, of_target, of_model = numbers_of(told[name][0])
+        _, of_target, of_model, *held = numbers_of(told[name][0])
         assert of_target == pytest.approx(rms(left[name][rows]), rel=1e-3)
         assert of_model == pytest.approx(rms((after - rate)[rows]), rel=1e-3)
+    # PX4 publishes a correction for every degree.
+    whole = ErrorModel(calibration.compensator, calibration.compensator.estimator, X)
+    made = Cubic(whole, "px4").piecewise
+    at = np.linspace(*made.ends[0], 2001)
+    slopes = np.diff(made(at[:, None])) / np.diff(at)
+    assert held == [pytest.approx(np.abs(slopes).max(), rel=0.02)]
     # Of the temperatures at boot the worst counts.
     worst = np.sqrt(np.mean(lefts[rows] ** 2, axis=0)).max()
     largest, of_target, _ = numbers_of(told["ardupilot"][0])
