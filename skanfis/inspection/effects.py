@@ -15,7 +15,7 @@ from ..export.columns import by_column
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
-from .text import MOST_NAMED, counted
+from .text import MOST_NAMED, ROUNDING, counted
 
 # Notes are made of shares that differ by more, and of outputs held on more of the combinations.
 _DIFFERENT, _HELD = 0.1, 0.01
@@ -189,10 +189,10 @@ def _known(model, blocks, rows):
             "The model does not know how its inputs are distributed: it was not trained by fit, or "
             "has been read from a file. Give rows of them as X, to skanfis.inspection.effects."
         )
-    found = []
+    found, two_valued = [], model.two_valued
     for inputs in blocks:
         own = list(inputs)
-        if len(own) > 1:
+        if len(own) > 1 or two_valued[own[0]]:
             # Indicators of the levels of a category, and none of these; their means are known.
             share = np.clip(model.reference[own], 0.0, 1.0)
             share = np.append(share, max(1.0 - share.sum(), 0.0))
@@ -215,6 +215,7 @@ class Study:
     output: int
     labels: list[str]
     blocks: list[Block]
+    levels: dict[str, list[str]]  # of each category, those without an indicator as one, the last
     is_shown: list[bool]  # whether pictures show it: one input, or a category
     rows: np.ndarray | None
     anova: ProductAnova | DrawnAnova
@@ -229,8 +230,12 @@ class Study:
             raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
         if not isinstance(groups, Mapping | None):
             raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
-        place, categories = model.input_names.index, by_column(read.levels)[0].items()
-        found = {name: tuple(map(place, own)) for name, own in categories if len(own) > 1}
+        place, (indicators, others) = model.input_names.index, by_column(read.levels)
+        found = {name: tuple(map(place, own)) for name, own in indicators.items()}
+        levels = {name: [read.levels[one].level for one in own] for name, own in indicators.items()}
+        for name, own in found.items():
+            if model.reference[list(own)].sum() < 1.0 - ROUNDING:
+                levels[name].append(" or ".join(others[name]))
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):
                 raise ValueError(f"groups[{label!r}] is {columns!r}: a list of columns is needed.")
@@ -246,7 +251,7 @@ class Study:
             raise ValueError("groups: a group may not have the name of a column outside of it.")
         is_shown = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
         blocks = _known(model, inputs, rows)
-        return cls(model, k, labels, blocks, is_shown, rows, _anova(model, k, blocks))
+        return cls(model, k, labels, blocks, levels, is_shown, rows, _anova(model, k, blocks))
 
     def pairs(self):
         """Pairs of blocks by their positions, but those that are zero for want of terms."""

@@ -114,16 +114,15 @@ class EffectsDisplay:
 
 def _along(study, g, n_points):
     """Rows along a block, the others at their means: "input", "points", and "levels" if any."""
-    name, own, model = study.labels[g], study.blocks[g].inputs, study.model
-    values, levels = np.unique(study.blocks[g].values, axis=0), None
-    if len(own) > 1:
-        values = np.eye(len(own))
-        levels = [model.input_names[j].removeprefix(f"{name}_") for j in own]
+    name, own = study.labels[g], study.blocks[g].inputs
+    values, levels = np.unique(study.blocks[g].values, axis=0), study.levels.get(name)
+    if levels is not None:
+        values = np.eye(len(levels))[:, : len(own)]
     elif len(values) <= 2:
         levels = [f"{value:.6g}" for value in values[:, 0]]
     else:
         values = np.linspace(values[0], values[-1], n_points)
-    rows = np.tile(model.reference, (len(values), 1))
+    rows = np.tile(study.model.reference, (len(values), 1))
     rows[:, own] = values
     points = values[:, 0] if levels is None else np.arange(len(values))
     return rows, {"input": name, "points": points, "levels": levels}

@@ -45,6 +45,8 @@ class Readability:
         The figures as arrays.
     levels : dict, default={}
         What indicators of a ``OneHotEncoder`` tell, by name; the functions here find them.
+    is_of_chunk : bool, default=False
+        Whether the rows are those of the latest ``partial_fit`` alone, which is then said.
 
     Attributes
     ----------
@@ -79,6 +81,7 @@ class Readability:
     model: TSKModel
     measures: Measures
     levels: Mapping[str, Level] = field(default_factory=dict)
+    is_of_chunk: bool = False
 
     @property
     def _said(self):
@@ -106,13 +109,7 @@ class Readability:
     @property
     def rule_errors(self) -> np.ndarray:
         """RMSE of each rule alone where it is the strongest, in units of the target."""
-        return self._unit * self.measures.rule_errors
-
-    @property
-    def _unit(self):
-        """A standard deviation of the target, of each output."""
-        target = self.model.target
-        return self.measures.deviation if target is None else target.spread
+        return self.measures.deviation * self.measures.rule_errors
 
     @property
     def reading_cost(self) -> int:
@@ -170,7 +167,7 @@ class Readability:
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
             both = found.rule_errors[r, k], found.rule_spreads[r, k]
-            errs, spread = (number(self._unit[k] * one, 2) for one in both)
+            errs, spread = (number(found.deviation[k] * one, 2) for one in both)
             named.append(f"{rule} (errs by {errs}, a constant by {spread})")
         what = "Errs more on its own rows than a constant would: rule"
         return [f"{what} {_named(named)}."] if named else []
@@ -190,7 +187,10 @@ class Readability:
 
     def __str__(self):
         nothing = "Nothing measured here speaks against reading the rules one by one."
-        return "\n".join([f"{self.line}.", *(self.findings or [nothing])])
+        lines = [f"{self.line}.", *(self.findings or [nothing])]
+        if self.is_of_chunk:
+            lines.append("Errors are of the rows of the latest partial_fit alone.")
+        return "\n".join(lines)
 
 
 def readability(
@@ -268,9 +268,10 @@ def _readability(estimator, X, y, sample_weight):
     return Readability(model, measure(model, read, n_rows, y, sample_weight), reader.levels)
 
 
-def readability_of_rows(model, X, y=None, sample_weight=None):
+def readability_of_rows(model, X, y=None, sample_weight=None, **told):
     """Measure a model on arrays that have been checked."""
-    return Readability(model, measure(model, lambda part: X[part], X.shape[0], y, sample_weight))
+    measures = measure(model, lambda part: X[part], X.shape[0], y, sample_weight)
+    return Readability(model, measures, **told)
 
 
 def _on_signs(said):

@@ -71,6 +71,9 @@ def readability_in_training(estimator, model, levels):
     if found is None:
         return None
     measures = found.measures
+    if model.target is not None:
+        scale = model.target.spread / found.model.target.spread
+        measures = replace(measures, deviation=scale * measures.deviation)
     # Sorted: columns that were only moved keep their numbers.
     own, fitted = (np.sort(one.coefficients, axis=1) for one in (model, found.model))
     if not np.array_equal(own, fitted):

@@ -29,7 +29,7 @@ _WIDTH, _DIGITS_OF_RANGE = 96, 3
 # Inputs in no rule are named if they are so few, and else counted.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
-_ROUNDING = 1e-9  # of a sum of shares
+ROUNDING = 1e-9  # of a sum of shares
 # How to compute a prediction; the parts in braces are left out where there is no such thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
@@ -175,8 +175,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     if has_training_data(model):
         cells["data", "rows"] = [percent(part) for part in parts_led(model)[chosen]]
         if found is not None:
-            fires = model.rule_rows > 0
-            cells["data", "error"] = [_errors(found, r) if fires[r] else "" for r in chosen]
+            cells["data", "error"] = [_errors(found, r) for r in chosen]
     cells["rule", "if"] = [premises[r] for r in chosen]
     for k, name in enumerate(model.output_names):
         cells["then", name] = [_conclusion(said, r, k) for r in chosen]
@@ -272,7 +271,8 @@ def _on_rows(model, found, r):
     if not model.rule_rows[r]:
         return ["strongest on no row"]
     share = [f"strongest on {percent(parts_led(model)[r])} of the rows"]
-    return share if found is None else [*share, f"errs by {_errors(found, r)} there"]
+    errors = _errors(found, r)
+    return [*share, f"errs by {errors} there"] if errors else share
 
 
 def percent(part):
@@ -282,6 +282,9 @@ def percent(part):
 
 
 def _errors(found, r):
+    """What a rule errs alone; nothing where it leads none of the rows that were measured."""
+    if found is None or not found.measures.rule_rows[r]:
+        return ""
     errors, names = found.rule_errors[r], found.model.output_names
     if len(names) == 1:
         return number(errors[0], 2)
@@ -322,7 +325,7 @@ def _legend(said, found, precision):
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
     for name, own in categories.items():
         levels = [said.levels[model.input_names[j]].level for j in own]
-        if model.reference[own].sum() < 1.0 - _ROUNDING:
+        if model.reference[own].sum() < 1.0 - ROUNDING:
             levels += [other for other in without_indicator[name] if other not in levels]
         lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
     if unnamed:

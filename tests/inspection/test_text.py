@@ -455,6 +455,14 @@ def test_a_rule_that_is_the_strongest_on_no_row_errs_on_none():
     text = export_text(replace(A_GRID, rule_weights=rows / 11, rule_rows=rows))
     assert "\nRule 3, strongest on no row:\n" in text
     assert text.count("strongest on 9.1 % of the rows") == 11
+    # Of a chunk on which a rule is not the strongest, what it errs is not known.
+    X = np.linspace(0.0, 1.0, 80)[:, None]
+    y = np.tanh(9.0 * (X[:, 0] - 0.5)) + 0.1 * np.cos(99.0 * X[:, 0])
+    model = ANFISRegressor(n_mfs=2).partial_fit(X, y).partial_fit(X[:20], y[:20])
+    text = export_text(model)
+    assert re.findall(r"% of the rows(, errs by 0|:)", text) == [", errs by 0", ":"]
+    assert text.endswith("\nErrors are of the rows of the latest partial_fit alone.")
+    assert ">nan<" not in rules_html(model)
 
 
 @ALL
