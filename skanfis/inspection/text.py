@@ -46,7 +46,7 @@ _WRITTEN = {
 _TERM = "The truth of {} terms is {}. "
 _LINE = ", less the common line's part in it, plus the common line"
 _IN_PLACE = (
-    "Every value has a part of this line in it; a rule's own slope stands in place of the line's."
+    "Every value has a part of this line; a rule's own slope replaces that of its input or level."
 )
 
 
@@ -309,7 +309,6 @@ def _legend(said, found, precision):
     has_part[model.antecedent.term_inputs] = True
     # Where nothing is predicted outside the range of any input, all of them have.
     with_part = set(called if model.out_of_bounds in SILENT else compress(called, has_part))
-    unnamed = list(dict.fromkeys(one for one in called if one not in with_part))
     without_indicator = by_column(said.levels)[1]
     categories: dict[str, list[int]] = {}
     for j, name in enumerate(model.input_names):
@@ -328,10 +327,12 @@ def _legend(said, found, precision):
         if model.reference[own].sum() < 1.0 - ROUNDING:
             levels += [other for other in without_indicator[name] if other not in levels]
         lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
-    if unnamed:
-        is_few = len(unnamed) <= MOST_NAMED
-        told = ", ".join(unnamed) if is_few else f"{len(unnamed)} more inputs"
-        lines.append(_wrapped(f"  {told}: in no rule", later=6 * " "))
+    unnamed = [one for one in dict.fromkeys(called) if one not in with_part]
+    with_slope = set(compress(called, model.coefficients[:, 1:].any(axis=(0, 2))))
+    for has_slope, told in ((True, "slopes too small to be written"), (False, "in no rule")):
+        if own := [one for one in unnamed if (one in with_slope) == has_slope]:
+            names = ", ".join(own) if len(own) <= MOST_NAMED else f"{len(own)} more inputs"
+            lines.append(_wrapped(f"  {names}: {told}", later=6 * " "))
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):

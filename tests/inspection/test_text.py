@@ -196,7 +196,7 @@ def test_a_rule_by_hand():
         2 rules, 3 inputs, 100 rows.
 
         Common to the rules, y: +3 per age from 1.
-        Every value has a part of this line in it; a rule's own slope stands in place of the line's.
+        Every value has a part of this line; a rule's own slope replaces that of its input or level.
 
         Rule 1, strongest on 75 % of the rows:
           IF rooms < 6.8 ± 0.3
@@ -377,6 +377,10 @@ def test_a_slope_that_moves_no_digit_is_left_out():
     model = replace(A_GRID, coefficients=coefficients)
     assert "per chip temperature" not in export_text(model)
     assert "per chip temperature" in export_text(model, precision=12)
+    line = ANFISRegressor(n_mfs=1).fit(rows_of(A_GRID, 1.0), rows_of(A_GRID, 1.0)[:, 0]).model_
+    coefficients = np.array([0.0, 1.0, 1e-9, 0.0]).reshape(1, 4, 1)
+    text = export_text(replace(line, coefficients=coefficients), feature_names=NAMES)
+    assert "\n  chip temperature: slopes too small to be written\n  rate: in no rule\n" in text
 
 
 @pytest.mark.parametrize(
