@@ -149,10 +149,8 @@ def _notes(table, held, is_by_draws):
     if "rows" in table:
         apart = table[(table["sobol"] - table["rows"]).abs() > _DIFFERENT]
         found = [f"{name} {rows:.2f} (else {own:.2f})" for name, own, rows in apart.itertuples()]
-        if found:
-            notes.append(
-                f"Inputs go together in the rows, which changes shares: {'; '.join(found)}."
-            )
+        if told := "; ".join(found):
+            notes.append(f"Inputs go together in the rows, which changes shares: {told}.")
     if held > _HELD:
         notes.append(
             f"In {100.0 * held:.1f} % of the combinations of inputs, taken as independent, "
@@ -233,8 +231,8 @@ class Study:
         place, (indicators, others) = model.input_names.index, by_column(read.levels)
         found = {name: tuple(map(place, own)) for name, own in indicators.items()}
         levels = {name: [read.levels[one].level for one in own] for name, own in indicators.items()}
-        for name, own in found.items():
-            if model.reference[list(own)].sum() < 1.0 - ROUNDING:
+        for name, places in found.items():
+            if model.reference[list(places)].sum() < 1.0 - ROUNDING:
                 levels[name].append(" or ".join(others[name]))
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):

@@ -131,11 +131,8 @@ class Readability:
         ratio = self.summary["text_over_model"]
         if not ratio > GREATEST_ERROR:
             return self.on_rules
-        of_digits = (
-            f"The text as printed errs {number(ratio, 3)} times as much as the model: print more "
-            "digits (precision)."
-        )
-        return [of_digits, *self.on_rules]
+        errs = f"The text as printed errs {number(ratio, 3)} times as much as the model"
+        return [f"{errs}: print more digits (precision).", *self.on_rules]
 
     @property
     def on_rules(self) -> list[str]:
@@ -187,10 +184,8 @@ class Readability:
 
     def __str__(self):
         nothing = "Nothing measured here speaks against reading the rules one by one."
-        lines = [f"{self.line}.", *(self.findings or [nothing])]
-        if self.is_of_chunk:
-            lines.append("Errors are of the rows of the latest partial_fit alone.")
-        return "\n".join(lines)
+        of_chunk = ["Errors are of the rows of the latest partial_fit alone."] * self.is_of_chunk
+        return "\n".join([f"{self.line}.", *(self.findings or [nothing]), *of_chunk])
 
 
 def readability(
@@ -268,10 +263,9 @@ def _readability(estimator, X, y, sample_weight):
     return Readability(model, measure(model, read, n_rows, y, sample_weight), reader.levels)
 
 
-def readability_of_rows(model, X, y=None, sample_weight=None, **told):
+def readability_of_rows(model, X, y=None, sample_weight=None):
     """Measure a model on arrays that have been checked."""
-    measures = measure(model, lambda part: X[part], X.shape[0], y, sample_weight)
-    return Readability(model, measures, **told)
+    return Readability(model, measure(model, lambda part: X[part], X.shape[0], y, sample_weight))
 
 
 def _on_signs(said):

@@ -183,8 +183,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
         table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{counted(model.n_rules, 'rule')}</b>, {_inputs_and_rows(model)}"
-    parts = [f"<div>{line}</div>" for line in [counts, *map(escape, _deviations(model))]]
-    parts.append(table)
+    parts = [f"<div>{line}</div>" for line in [counts, *map(escape, _deviations(model))]] + [table]
     lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
     if len(chosen) < model.n_rules:
         lines.append(f"and {_left_out(model, chosen)}")
@@ -330,8 +329,8 @@ def _legend(said, found, precision):
     unnamed = [one for one in dict.fromkeys(called) if one not in with_part]
     with_slope = set(compress(called, model.coefficients[:, 1:].any(axis=(0, 2))))
     for has_slope, told in ((True, "slopes too small to be written"), (False, "in no rule")):
-        if own := [one for one in unnamed if (one in with_slope) == has_slope]:
-            names = ", ".join(own) if len(own) <= MOST_NAMED else f"{len(own)} more inputs"
+        if alike := [one for one in unnamed if (one in with_slope) == has_slope]:
+            names = ", ".join(alike) if len(alike) <= MOST_NAMED else f"{len(alike)} more inputs"
             lines.append(_wrapped(f"  {names}: {told}", later=6 * " "))
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
@@ -346,9 +345,8 @@ def _legend(said, found, precision):
     formulas = {family.name: family.formula for family in families}
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
     line, errs = _LINE if said.common.any() else "", _ERRS if found else ""
-    how = _HOW.format(terms="".join(terms), line=line, errs=errs)
-    if model.n_rules == 1 and not model.antecedent.n_terms:
-        how = _HOW_OF_ONE
+    is_one = model.n_rules == 1 and not model.antecedent.n_terms
+    how = _HOW_OF_ONE if is_one else _HOW.format(terms="".join(terms), line=line, errs=errs)
     return "\n".join([*lines, "", _wrapped(how)])
 
 

@@ -224,6 +224,9 @@ def test_a_level_of_a_category_is_called_by_its_column(rng):
     assert re.search(r"(\+1\S* if fibre is SM|-1\S* if fibre is HB)", told)
     assert "fibre_" not in told
     assert "fibre is not PM" in rules_html(pipe)
+    # A scaler behind the encoder leaves rests of rounding, and no other words.
+    scaled = make_pipeline(encoder, StandardScaler(), ANFISRegressor(partition="tree", max_rules=2))
+    assert export_text(scaled.fit(X, y)).partition("Inputs")[0] == told
     # A category is an input in one line.
     assert re.search(r"trained:\n  rate: \S+ to \S+\n  fibre: HB, PM, SM\nOut", export_text(pipe))
     # The encoder moves columns: measured on the whole, the text errs as the fit had found.
