@@ -171,7 +171,7 @@ class TSKModel:
 
         Only then is its variance m (1 - m), with m the mean: the largest of values from 0 to 1.
         """
-        from_0_to_1 = (self.minimum == 0.0) & (self.maximum == 1.0)
+        from_0_to_1 = np.maximum(np.abs(self.minimum), np.abs(self.maximum - 1.0)) <= _ROUNDING
         most = self.reference * (1.0 - self.reference)
         return from_0_to_1 & (np.abs(self.spread**2 - most) <= _ROUNDING * most)
 

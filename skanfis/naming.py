@@ -101,7 +101,7 @@ def _written(group, own, low, high, fewest):
                 names[term] = text
         if len(names) == len(written):
             break
-    if (low, high) == (0.0, 1.0):
+    if max(abs(low), abs(high - 1.0)) <= _ROUNDING:
         names |= {term: "1" if sign == "> " else "0" for term in terms if term[2]}
     return [names[term] for term in terms]
 

@@ -564,7 +564,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             self._sums = before.faded(forgetting**n_rows).plus(latest)
         if not is_solved:
             self._solve_chunks()
-            self.readability_ = readability_of_rows(self.model_, *rows)
+            self.readability_ = replace(readability_of_rows(self.model_, *rows), is_of_chunk=True)
         self.n_samples_seen_ = getattr(self, "n_samples_seen_", 0) + n_rows
 
     def _begin_chunks(self, X, y, data, weight):

@@ -294,7 +294,8 @@ def _refuse(label, step, reason):
         f"{_described(label, step)} cannot be folded into the rules: {reason}. StandardScaler, "
         "MinMaxScaler, MaxAbsScaler, RobustScaler, SimpleImputer, OneHotEncoder, column selections "
         "and ColumnTransformers of these can. For rules in the units of that step's output, give "
-        "what is behind it: pipeline[-1], or regressor_ of a TransformedTargetRegressor."
+        "what is behind it: pipeline[-1], by name if it was fitted after "
+        "pipeline.set_output(transform='pandas'), or regressor_ of a TransformedTargetRegressor."
     )
 
 

@@ -11,11 +11,11 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from .._validation import checked_position
-from ..export.columns import Level, by_column
+from ..export.columns import by_column
 from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
-from .text import MOST_NAMED, counted
+from .text import MOST_NAMED, ROUNDING, counted
 
 # Notes are made of shares that differ by more, and of outputs held on more of the combinations.
 _DIFFERENT, _HELD = 0.1, 0.01
@@ -149,10 +149,8 @@ def _notes(table, held, is_by_draws):
     if "rows" in table:
         apart = table[(table["sobol"] - table["rows"]).abs() > _DIFFERENT]
         found = [f"{name} {rows:.2f} (else {own:.2f})" for name, own, rows in apart.itertuples()]
-        if found:
-            notes.append(
-                f"Inputs go together in the rows, which changes shares: {'; '.join(found)}."
-            )
+        if told := "; ".join(found):
+            notes.append(f"Inputs go together in the rows, which changes shares: {told}.")
     if held > _HELD:
         notes.append(
             f"In {100.0 * held:.1f} % of the combinations of inputs, taken as independent, "
@@ -189,10 +187,10 @@ def _known(model, blocks, rows):
             "The model does not know how its inputs are distributed: it was not trained by fit, or "
             "has been read from a file. Give rows of them as X, to skanfis.inspection.effects."
         )
-    found = []
+    found, two_valued = [], model.two_valued
     for inputs in blocks:
         own = list(inputs)
-        if len(own) > 1:
+        if len(own) > 1 or two_valued[own[0]]:
             # Indicators of the levels of a category, and none of these; their means are known.
             share = np.clip(model.reference[own], 0.0, 1.0)
             share = np.append(share, max(1.0 - share.sum(), 0.0))
@@ -215,8 +213,8 @@ class Study:
     output: int
     labels: list[str]
     blocks: list[Block]
+    levels: dict[str, list[str]]  # of each category, those without an indicator as one, the last
     is_shown: list[bool]  # whether pictures show it: one input, or a category
-    levels: Mapping[str, Level]  # as ``Reader.levels``
     rows: np.ndarray | None
     anova: ProductAnova | DrawnAnova
 
@@ -230,8 +228,12 @@ class Study:
             raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
         if not isinstance(groups, Mapping | None):
             raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
-        place, categories = model.input_names.index, by_column(read.levels)[0].items()
-        found = {name: tuple(map(place, own)) for name, own in categories}
+        place, (indicators, others) = model.input_names.index, by_column(read.levels)
+        found = {name: tuple(map(place, own)) for name, own in indicators.items()}
+        levels = {name: [read.levels[one].level for one in own] for name, own in indicators.items()}
+        for name, places in found.items():
+            if model.reference[list(places)].sum() < 1.0 - ROUNDING:
+                levels[name].append(" or ".join(others[name]))
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):
                 raise ValueError(f"groups[{label!r}] is {columns!r}: a list of columns is needed.")
@@ -248,8 +250,7 @@ class Study:
         labels, inputs = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
         is_shown = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
         blocks = _known(model, inputs, rows)
-        anova = _anova(model, k, blocks)
-        return cls(model, k, labels, blocks, is_shown, read.levels, rows, anova)
+        return cls(model, k, labels, blocks, levels, is_shown, rows, _anova(model, k, blocks))
 
     def pairs(self):
         """Pairs of blocks by their positions, but those that are zero for want of terms."""

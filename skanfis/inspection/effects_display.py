@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._validation import check_count
-from ..export.columns import by_column
 from .anova import N_SHARED, draw
 from .displays import BINS, BRIGHTEST, panels_or_new, pyplot
 from .effects import Study
@@ -21,7 +20,6 @@ _LEAST = 0.005
 _MOST_LETTERS = 24
 # Above and below the curves, as a part of what they span: below stand the data.
 _ROOM = 0.2
-_ROUNDING = 1e-9  # of the part of the rows that have a level without an indicator
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
@@ -116,19 +114,15 @@ class EffectsDisplay:
 
 def _along(study, g, n_points):
     """Rows along a block, the others at their means: "input", "points", and "levels" if any."""
-    name, block, model = study.labels[g], study.blocks[g], study.model
-    values, levels, own = np.unique(block.values, axis=0), None, list(block.inputs)
-    indicated = [study.levels.get(model.input_names[j]) for j in own]
-    if indicated[0] is not None:
-        values, levels = np.eye(len(own)), [one.level for one in indicated]
-        if np.average(~block.values.any(axis=1), weights=block.weight) > _ROUNDING:
-            values = np.vstack([values, np.zeros(len(own))])
-            levels.append(" or ".join(by_column(study.levels)[1][indicated[0].column]))
+    name, own = study.labels[g], study.blocks[g].inputs
+    values, levels = np.unique(study.blocks[g].values, axis=0), study.levels.get(name)
+    if levels is not None:
+        values = np.eye(len(levels))[:, : len(own)]
     elif len(values) <= 2:
         levels = [f"{value:.6g}" for value in values[:, 0]]
     else:
         values = np.linspace(values[0], values[-1], n_points)
-    rows = np.tile(model.reference, (len(values), 1))
+    rows = np.tile(study.model.reference, (len(values), 1))
     rows[:, own] = values
     points = values[:, 0] if levels is None else np.arange(len(values))
     return rows, {"input": name, "points": points, "levels": levels}

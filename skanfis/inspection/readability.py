@@ -46,6 +46,8 @@ class Readability:
         The figures as arrays.
     levels : dict, default={}
         What indicators of a ``OneHotEncoder`` tell, by name; the functions here find them.
+    is_of_chunk : bool, default=False
+        Whether the rows are those of the latest ``partial_fit`` alone, which is then said.
 
     Attributes
     ----------
@@ -80,6 +82,7 @@ class Readability:
     model: TSKModel
     measures: Measures
     levels: Mapping[str, Level] = field(default_factory=dict)
+    is_of_chunk: bool = False
 
     @property
     def _said(self):
@@ -129,11 +132,8 @@ class Readability:
         ratio = self.summary["text_over_model"]
         if not ratio > GREATEST_ERROR:
             return self.on_rules
-        of_digits = (
-            f"The text as printed errs {in_digits(ratio, 3)} times as much as the model: print "
-            "more digits (precision)."
-        )
-        return [of_digits, *self.on_rules]
+        errs = f"The text as printed errs {in_digits(ratio, 3)} times as much as the model"
+        return [f"{errs}: print more digits (precision).", *self.on_rules]
 
     @property
     def on_rules(self) -> list[str]:
@@ -185,7 +185,8 @@ class Readability:
 
     def __str__(self):
         nothing = "Nothing measured here speaks against reading the rules one by one."
-        return "\n".join([f"{self.line}.", *(self.findings or [nothing])])
+        of_chunk = ["Errors are of the rows of the latest partial_fit alone."] * self.is_of_chunk
+        return "\n".join([f"{self.line}.", *(self.findings or [nothing]), *of_chunk])
 
 
 def readability(

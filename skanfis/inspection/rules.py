@@ -218,11 +218,8 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     has_line = np.take_along_axis(has_line, order[:, :, None], axis=1)
     row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
     source = order[row, place]
-    texts = [
-        *premise_texts(model, read.levels),
-        *(f"beyond {name}" for name in model.input_names),
-        "held",
-    ]
+    beyond_names = [f"beyond {name}" for name in model.input_names]
+    texts = [*premise_texts(model, read.levels), *beyond_names, "held"]
     return pd.DataFrame(
         {
             "row": row,

@@ -21,9 +21,9 @@ _FAR_APART = 5.0
 class StructureDisplay:
     """Error expected of new rows against reading cost, of every structure that was compared.
 
-    The one that was chosen is ringed. The dashed line is the largest error that is surely within
-    the tolerance of ``simplicity``: what stands below it and further to the left would have been
-    chosen. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
+    The one that was chosen is ringed; below the dashed line errors are surely within the tolerance
+    of ``simplicity``. What stands there further to the left has more rules than the best, or rules
+    that are worse than the mean one by one. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------

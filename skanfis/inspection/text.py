@@ -30,7 +30,7 @@ _WIDTH, _DIGITS_OF_RANGE = 96, 4
 # Inputs in no rule are named if they are so few, and else counted.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
-_ROUNDING = 1e-9  # of a sum of shares
+ROUNDING = 1e-9  # of a sum of shares
 # How to compute a prediction; the parts in braces are left out where there is no such thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
@@ -48,7 +48,7 @@ _TERM = "The truth of {} terms is {}. "
 _LINE = ", less the common line's part in it, plus the common line"
 _SLOPES = ", plus its own slopes"
 _IN_PLACE = (
-    "Every value has a part of this line in it; a rule's own slope stands in place of the line's."
+    "Every value has a part of this line; a rule's own slope replaces that of its input or level."
 )
 
 
@@ -177,8 +177,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     if has_training_data(model):
         cells["data", "rows"] = [percent(part) for part in parts_led(model)[chosen]]
         if found is not None:
-            fires = model.rule_rows > 0
-            cells["data", "error"] = [_errors(found, r) if fires[r] else "" for r in chosen]
+            cells["data", "error"] = [_errors(found, r) for r in chosen]
     cells["rule", "if"] = [premises[r] for r in chosen]
     for k, name in enumerate(model.output_names):
         cells["then", name] = [_conclusion(said, r, k) for r in chosen]
@@ -186,8 +185,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
         table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{counted(model.n_rules, 'rule')}</b>, {_inputs_and_rows(model)}"
-    parts = [f"<div>{line}</div>" for line in [counts, *map(escape, _deviations(model))]]
-    parts.append(table)
+    parts = [f"<div>{line}</div>" for line in [counts, *map(escape, _deviations(model))]] + [table]
     lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
     if len(chosen) < model.n_rules:
         lines.append(f"and {_left_out(model, chosen)}")
@@ -274,7 +272,8 @@ def _on_rows(model, found, r):
     if not model.rule_rows[r]:
         return ["strongest on no row"]
     share = [f"strongest on {percent(parts_led(model)[r])} of the rows"]
-    return share if found is None else [*share, f"errs by {_errors(found, r)} there"]
+    errors = _errors(found, r)
+    return [*share, f"errs by {errors} there"] if errors else share
 
 
 def percent(part):
@@ -284,6 +283,9 @@ def percent(part):
 
 
 def _errors(found, r):
+    """What a rule errs alone; nothing where it leads none of the rows that were measured."""
+    if found is None or not found.measures.rule_rows[r]:
+        return ""
     errors, names = found.rule_errors[r], found.model.output_names
     if len(names) == 1:
         return in_digits(errors[0], 2)
@@ -308,7 +310,6 @@ def _legend(said, found, precision):
     has_part[model.antecedent.term_inputs] = True
     # Where nothing is predicted outside the range of any input, all of them have.
     with_part = set(called if model.out_of_bounds in SILENT else compress(called, has_part))
-    unnamed = list(dict.fromkeys(one for one in called if one not in with_part))
     without_indicator = by_column(said.levels)[1]
     categories: dict[str, list[int]] = {}
     for j, name in enumerate(model.input_names):
@@ -324,13 +325,15 @@ def _legend(said, found, precision):
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
     for name, own in categories.items():
         levels = [said.levels[model.input_names[j]].level for j in own]
-        if model.reference[own].sum() < 1.0 - _ROUNDING:
+        if model.reference[own].sum() < 1.0 - ROUNDING:
             levels += [other for other in without_indicator[name] if other not in levels]
         lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
-    if unnamed:
-        is_few = len(unnamed) <= MOST_NAMED
-        told = ", ".join(unnamed) if is_few else f"{len(unnamed)} more inputs"
-        lines.append(_wrapped(f"  {told}: in no rule", later=6 * " "))
+    unnamed = [one for one in dict.fromkeys(called) if one not in with_part]
+    with_slope = set(compress(called, model.coefficients[:, 1:].any(axis=(0, 2))))
+    for has_slope, told in ((True, "slopes too small to be written"), (False, "in no rule")):
+        if alike := [one for one in unnamed if (one in with_slope) == has_slope]:
+            names = ", ".join(alike) if len(alike) <= MOST_NAMED else f"{len(alike)} more inputs"
+            lines.append(_wrapped(f"  {names}: {told}", later=6 * " "))
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):

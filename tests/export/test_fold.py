@@ -237,7 +237,7 @@ def test_a_bent_target_is_refused(settings):
 
 def test_what_is_behind_a_step_that_does_not_fold_does():
     pipe = make_pipeline(PCA(2), StandardScaler(), regressor(n_mfs=2)).fit(X, Y)
-    with pytest.raises(ValueError, match=r"give what is behind it: pipeline\[-1\]"):
+    with pytest.raises(ValueError, match=r"behind it: pipeline\[-1\], by name if"):
         fold(pipe)
     assert_allclose(fold(pipe[1:]).predict(pipe[0].transform(X))[:, 0], pipe.predict(X), rtol=1e-9)
 

@@ -100,6 +100,9 @@ def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
     y = 10.0 * np.round(X) + np.tile([[-1.0], [1.0]], (50, 1))
     model = ANFISRegressor(n_mfs=2, order=0, agreement=1.0).fit(X, y.ravel()).model_
     assert readability(model, X, y).findings == []
+    # On rows of another deviation too a rule errs in units of the target.
+    error = np.sqrt(np.mean((model.coefficients[0] - y[:50]) ** 2))
+    assert_allclose(readability(model, X[:50], y[:50]).rule_errors[0], error)
     coefficients = model.coefficients.copy()
     coefficients[1] += 3.0
     poor = readability(replace(model, coefficients=coefficients), X, y)

@@ -196,7 +196,7 @@ def test_a_rule_by_hand():
         2 rules, 3 inputs, 100 rows.
 
         Common to the rules, y: +3 per age from 1.
-        Every value has a part of this line in it; a rule's own slope stands in place of the line's.
+        Every value has a part of this line; a rule's own slope replaces that of its input or level.
 
         Rule 1, strongest on 75 % of the rows:
           IF rooms < 6.8 ± 0.3
@@ -224,6 +224,9 @@ def test_a_level_of_a_category_is_called_by_its_column(rng):
     assert re.search(r"(\+1\S* if fibre is SM|-1\S* if fibre is HB)", told)
     assert "fibre_" not in told
     assert "fibre is not PM" in rules_html(pipe)
+    # A scaler behind the encoder leaves rests of rounding, and no other words.
+    scaled = make_pipeline(encoder, StandardScaler(), ANFISRegressor(partition="tree", max_rules=2))
+    assert export_text(scaled.fit(X, y)).partition("Inputs")[0] == told
     # A category is an input in one line.
     assert re.search(r"trained:\n  rate: \S+ to \S+\n  fibre: HB, PM, SM\nOut", export_text(pipe))
     # The encoder moves columns: measured on the whole, the text errs as the fit had found.
@@ -377,6 +380,10 @@ def test_a_slope_that_moves_no_digit_is_left_out():
     model = replace(A_GRID, coefficients=coefficients)
     assert "per chip temperature" not in export_text(model)
     assert "per chip temperature" in export_text(model, precision=12)
+    line = ANFISRegressor(n_mfs=1).fit(rows_of(A_GRID, 1.0), rows_of(A_GRID, 1.0)[:, 0]).model_
+    coefficients = np.array([0.0, 1.0, 1e-9, 0.0]).reshape(1, 4, 1)
+    text = export_text(replace(line, coefficients=coefficients), feature_names=NAMES)
+    assert "\n  chip temperature: slopes too small to be written\n  rate: in no rule\n" in text
 
 
 @pytest.mark.parametrize(
@@ -457,6 +464,14 @@ def test_a_rule_that_is_the_strongest_on_no_row_errs_on_none():
     text = export_text(replace(A_GRID, rule_weights=rows / 11, rule_rows=rows))
     assert "\nRule 3, strongest on no row:\n" in text
     assert text.count("strongest on 9.1 % of the rows") == 11
+    # Of a chunk on which a rule is not the strongest, what it errs is not known.
+    X = np.linspace(0.0, 1.0, 80)[:, None]
+    y = np.tanh(9.0 * (X[:, 0] - 0.5)) + 0.1 * np.cos(99.0 * X[:, 0])
+    model = ANFISRegressor(n_mfs=2).partial_fit(X, y).partial_fit(X[:20], y[:20])
+    text = export_text(model)
+    assert re.findall(r"% of the rows(, errs by 0|:)", text) == [", errs by 0", ":"]
+    assert text.endswith("\nErrors are of the rows of the latest partial_fit alone.")
+    assert ">nan<" not in rules_html(model)
 
 
 @ALL
