@@ -20,7 +20,6 @@ from ..export.rule_bases import MODELS, build, rows_of
 from ..quick import quick
 from .test_anova import TREE
 from .test_displays import drawn
-from .test_effects import categories
 
 plt = pytest.importorskip("matplotlib.pyplot")
 KINDS = {
@@ -86,38 +85,6 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
         EffectsDisplay.from_estimator(model, X, max_shown=0)
     with pytest.raises(ValueError, match="groups has every column, and groups have no curve"):
         EffectsDisplay.from_estimator(model, X, groups={"all": range(3)})
-
-
-def test_the_band_is_the_deviation_of_the_mean_over_other_inputs(rng):
-    X = rng.normal([10.0, -2.0], [3.0, 0.5], (60, 2))
-    fitted = quick(n_mfs=1).fit(X, X @ [1.0, 2.0] + rng.normal(size=60))
-    display = drawn(EffectsDisplay.from_estimator(fitted))
-    # On a line the mean over rows is the output at their mean.
-    curve = next(one for one in display.curves if one["input"] == "x0")
-    rows = np.column_stack([curve["points"], np.full(61, X[:, 1].mean())])
-    deviation = fitted.predict(rows, return_std=True)[1]
-    expected = np.sqrt(deviation**2 - fitted.noise_std_**2)
-    assert_allclose(curve["deviation"], expected, rtol=0.03)
-
-
-def test_a_category_is_drawn_by_its_levels():
-    X, y = categories()
-    encoder = OneHotEncoder(sparse_output=False)
-    encoder = make_column_transformer((encoder, ["fibre"]), remainder="passthrough")
-    model = make_pipeline(encoder, quick(n_mfs=[2, 1, 1, 1])).fit(X, y)
-    for table in (X, None):
-        display = drawn(EffectsDisplay.from_estimator(model, table))
-        curve = next(one for one in display.curves if one["input"] == "fibre")
-        assert curve["levels"] == ["a", "b", "c"]
-        frequent = X["fibre"].value_counts(normalize=True).sort_index()
-        assert_allclose(curve["counts"], frequent, atol=1e-9)
-        # Along a level the other columns of the category are zero, not at their means.
-        rate, n = X["rate"].to_numpy(), len(X)
-        for level, mean in zip("abc", curve["mean"], strict=True):
-            rows = X.assign(fibre=level, rate=rate)
-            assert_allclose(mean, model.predict(rows).sum() / n, atol=1e-9)
-        axes = display.axes_[display.curves.index(curve)]
-        assert [one.get_text() for one in axes.get_xticklabels()] == ["a", "b", "c"]
 
 
 def test_labels_of_many_levels_stand_apart(rng):

@@ -8,9 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.compose import make_column_transformer
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import OneHotEncoder, StandardScaler
+from sklearn.preprocessing import OneHotEncoder
 
-from skanfis import ANFISRegressor
 from skanfis.inspection import explain, readability, rules_table
 
 from ..export.every_model import FEWEST
@@ -57,28 +56,6 @@ def test_what_a_rule_does_not_look_at_is_missing():
         "rate",
     ]
     assert "if" not in rules_table(MODELS["one rule, order 1, 1 outputs"])
-
-
-def test_an_input_called_value_has_a_column_of_its_own():
-    names = ("value", *NAMES[1:])
-    table, other = rules_table(replace(A_GRID, input_names=names)), rules_table(A_GRID)
-    assert list(table["then y"]) == ["value", *names]
-    assert_array_equal(table["then y"], other["then y"])
-    assert_array_equal(table["at"], other["at"])
-
-
-def test_a_pipeline_is_told_in_raw_units(rng):
-    X = pd.DataFrame(
-        rng.uniform([250.0, -1e-3], [330.0, 1e-3], (80, 2)), columns=["kelvin", "rate"]
-    )
-    y = 1e3 + np.sin(X["kelvin"] / 20) + 100 * X["rate"]
-    pipe = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[2, 1], agreement=1.0)).fit(X, y)
-    table = rules_table(pipe)
-    scaled = rules_table(pipe[-1])
-    assert_allclose(table["then y", "value"], scaled["then y", "value"], rtol=1e-9)
-    strengths = pipe[-1].model_.strengths(pipe[0].transform(X))
-    centers = strengths.T @ X.to_numpy() / strengths.sum(axis=0)[:, None]
-    assert_allclose(table["at"], centers, rtol=1e-6)
 
 
 @pytest.mark.parametrize("case", FEWEST, ids=[case.label for case in FEWEST])
