@@ -485,34 +485,6 @@ def test_a_scale_factor_needs_rates_that_the_output_follows_whatever_the_inputs(
     assert (rates - 50.0).abs().max() < 0.5
 
 
-def test_an_axis_that_the_table_did_not_turn_and_a_file_for_each_run(tmp_path, run):
-    log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
-    noise = np.random.default_rng(0).normal(size=len(log))
-    table = log[["time", "temperature", "rate"]].assign(gyro_x=noise, gyro_y=log["output"])
-    (tmp_path / "logs").mkdir()
-    for number, part in table.groupby(log["run"]):
-        part.to_csv(tmp_path / "logs" / f"run{number}.csv", index=False)
-    where, typed = tmp_path / "logs" / "*.csv", "--terms 1,1,2 --inputs time temperature output"
-    for wrong, told in (
-        ("output=gyro_x", "the log, column 'gyro_x' (output): does not follow the rate"),
-        (
-            "output=gyro_y rate=gyro_x --units output=deg/s rate=deg/s",
-            "or the column 'gyro_x' of the rate, the wrong one?",
-        ),
-    ):
-        code, _, said = run(where, f"{typed} --columns {wrong}")
-        assert (code, told in said) == (3, True)
-    code, said, told = run(where, typed)
-    assert (code, "read 4 of 4" in told) == (0, True)
-    assert "whole runs held out (4 runs" in said
-    model, target = tmp_path / "out" / "compensator.json", tmp_path / "rates.csv"
-    assert run(where, f"--apply {model} --columns output=gyro_y", target)[0] == 0
-    rates = pd.read_csv(target)
-    whole = GyroCompensator.read_json(model).apply(log)
-    np.testing.assert_allclose(rates["rate_compensated"], whole["rate_compensated"], atol=1e-9)
-    assert rates["run"].tolist() == [f"run{number}" for number in log["run"]]
-
-
 @pytest.fixture(scope="module")
 def two_devices():
     """Two devices of two runs, on clocks that begin anew with each."""

@@ -120,19 +120,6 @@ def test_refused_rows_are_left_out_of_both_sides(log):
     assert not {"hysteresis", "bias_stability_10s"} & set(report_of(log, "run")["figure"])
 
 
-def test_the_bias_of_rows_at_rest_has_an_interval_of_such():
-    """Every other run rests; an asymmetry moves the mean of all rows, and no row at rest."""
-    run, rate = np.repeat(np.arange(6), 20), np.tile(np.linspace(-100.0, 100.0, 20), 6)
-    rate[(run % 2 == 0) & (np.arange(120) % 20 < 12)] = 0.0
-    output = np.where(rate > 0.0, 1.0015, 1.0005) * rate + 5.0 / 3600.0
-    report = gyro_report(rate, output, run=run, random_state=0).set_index("figure")
-    assert (
-        report.loc["bias"][["before", "before_low", "before_high"]].tolist()
-        == [pytest.approx(5.0, rel=1e-2)] * 3
-    )
-    assert report.loc["bias_repeatability", "before"] == pytest.approx(0.0, abs=1e-9)
-
-
 def test_nonlinearity_is_not_that_of_the_noise(rng):
     rate = rng.uniform(-100, 100, 100_000)
     noisy = rate + 0.1 * rng.normal(size=rate.size)

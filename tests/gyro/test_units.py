@@ -64,14 +64,6 @@ def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offset
     assert f"({truth['rate'].min() * scales[3]:.4g} to" in found.assumed["rate"]
 
 
-def test_degrees_fahrenheit_that_look_like_celsius(tmp_path, truth):
-    heat = np.linspace(-4.0, 80.0, len(truth))
-    found = reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
-    assert found.units["temperature"] == "degC"
-    told = "taken as degC (-4 to 80; degF? give --units temperature=degF)"
-    assert told in found.assumed["temperature"]
-
-
 def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, truth):
     turn = np.pi / 180
     with pytest.raises(UsageError) as caught:
@@ -89,14 +81,6 @@ def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, t
 def test_a_clock_that_may_be_two_is_asked_for(tmp_path, truth, slower, ways):
     with pytest.raises(UsageError, match=ways):
         reading(tmp_path, truth, NAMES, (1 / slower, 1, 1, 1))
-
-
-# As warm as a room in degF alone, in degC alone, and in either.
-@pytest.mark.parametrize(("low", "high"), [(32.0, 80.0), (20.0, 95.0), (60.0, 80.0)])
-def test_a_temperature_in_either_scale_is_asked_for(tmp_path, truth, low, high):
-    heat = np.linspace(low, high, len(truth))
-    with pytest.raises(UsageError, match="temperature=degC or --units temperature=degF"):
-        reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
 
 
 @pytest.mark.parametrize("mark", [9999.0, -9999.0])
