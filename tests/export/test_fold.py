@@ -138,26 +138,6 @@ def test_moved_and_dropped_columns_go_back_to_their_place():
     assert_same_predictions(pipe, pd.DataFrame(around(frame.to_numpy()), columns=frame.columns), 50)
 
 
-@pytest.mark.parametrize(
-    "columns",
-    [
-        slice("kelvin", "rate"),
-        slice(-2, None),
-        "kelvin",
-        [2, 0],
-        ["rate", "hours"],
-        np.array([True, False, True]),
-        lambda frame: ["rate"],
-    ],
-)
-def test_columns_are_chosen_as_scikit_learn_does(columns):
-    frame = pd.DataFrame(X, columns=NAMES)
-    one = isinstance(columns, str | int)
-    chosen = ColumnTransformer([("some", StandardScaler(), [columns] if one else columns)])
-    pipe = make_pipeline(chosen, regressor(n_mfs=2)).fit(frame, Y)
-    assert_same_predictions(pipe, frame, 10.0)
-
-
 def mixed(n_rows=200):
     """A table with text in it, and a target that depends on it."""
     g = np.random.default_rng(3)
