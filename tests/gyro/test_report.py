@@ -70,19 +70,6 @@ def test_planted_truth_is_in_the_table(log):
     assert table.loc["reduction_factor", "after"] == pytest.approx(10.0)
 
 
-@pytest.mark.parametrize("unit", ["deg/s", "deg/h"])
-def test_one_unit_for_every_rate(log, unit):
-    usual = figures(report_of(log, *ALL, n_resamples=5))
-    one = figures(report_of(log, *ALL, n_resamples=5, rate_unit=unit))
-    in_second = {"deg/s": 1.0, "deg/h": 1 / HOUR}
-    for name, line in usual.iterrows():
-        own = line["unit"][:5]
-        factor = in_second[own] / in_second[unit] if own in in_second else 1.0
-        assert one.loc[name, "unit"] == line["unit"].replace(own, unit if own in in_second else own)
-        expected = factor * line[VALUES].astype(float)
-        np.testing.assert_allclose(one.loc[name, VALUES].astype(float), expected, rtol=1e-12)
-
-
 def test_intervals_hold_the_figure_and_come_back_with_the_seed(log):
     one, two = report_of(log, *ALL), report_of(log, *ALL)
     pd.testing.assert_frame_equal(one, two)

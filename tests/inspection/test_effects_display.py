@@ -1,6 +1,5 @@
 """The picture of effects against means over the product of the inputs' values."""
 
-import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -8,12 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.cluster import KMeans
 from sklearn.compose import make_column_transformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder
 
-from skanfis import ANFISRegressor
 from skanfis.inspection import EffectsDisplay, effects
 
 from ..export.rule_bases import MODELS, build, rows_of
@@ -106,28 +103,3 @@ def test_labels_of_many_levels_stand_apart(rng):
     for labels in sides:
         boxes = [one.get_window_extent() for one in labels]
         assert not any(one.overlaps(next_one) for one, next_one in pairwise(boxes))
-
-
-def test_a_pair_that_does_nothing_is_not_drawn_and_zero_though_by_draws(rng):
-    # Heavy tails, and rules that differ by the first input alone: no two do anything together.
-    X = rng.standard_t(3, (300, 9))
-    model = ANFISRegressor(
-        partition=KMeans(3, random_state=0), premise_features=[0], agreement=0.0, max_iter=0
-    ).fit(X, np.abs(X[:, 0]))
-    model = model.model_
-    coefficients = model.coefficients.copy()
-    coefficients[:, 2:] = model.target.spread / model.spread[1:, None]
-    model = replace(model, coefficients=coefficients)
-    found = effects(model, X)
-    shares = found.table["sobol"]
-    assert_allclose(shares[shares.index.str.contains(" and ")], 0.0, atol=1e-4)
-    # Nor is it printed by itself.
-    assert "x0 and x1" in shares
-    assert "x0 and x1" not in str(found)
-    assert re.search(r"\n\d pairs more ", str(found))
-    display = drawn(EffectsDisplay.from_estimator(model, X))
-    assert display.pairs == []
-    # By draws a share may be less than nothing.
-    display.curves[0]["share"] = -0.01
-    assert "alone 0 %" in display.plot().axes_[0].get_title(loc="left")
-    assert not any("-0 %" in axes.get_title(loc="left") for axes in display.axes_)

@@ -43,21 +43,6 @@ def test_rules_table_holds_consequents_and_support(model):
         assert_allclose(said["value"], at_center, rtol=1e-9, atol=1e-9)
 
 
-def test_what_a_rule_does_not_look_at_is_missing():
-    table = rules_table(A_GRID)["if"]
-    assert list(table) == list(NAMES)
-    assert list(table["chip temperature"].iloc[:6]) == ["low"] * 2 + ["medium"] * 2 + ["high"] * 2
-    table = rules_table(A_TABLE)["if"]
-    missing = A_TABLE.antecedent.rule_terms < 0
-    assert missing.any()
-    assert_array_equal(table.isna(), missing)
-    assert list(rules_table(MODELS["scattered on two inputs, order 0, 1 outputs"])["if"]) == [
-        "chip temperature",
-        "rate",
-    ]
-    assert "if" not in rules_table(MODELS["one rule, order 1, 1 outputs"])
-
-
 @pytest.mark.parametrize("case", FEWEST, ids=[case.label for case in FEWEST])
 def test_contributions_add_up_to_the_prediction(case):
     """Of all policies; some outputs are held, and some tangents are taken at one place."""
