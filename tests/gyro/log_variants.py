@@ -18,18 +18,19 @@ NAMES = {
     "time": ["time", "Time", "t", "Timestamp", "Elapsed", "_time", "Zeit"],
     "temperature": ["101 <Gyro temp>", "Temperature", "T", "Temperatur", "thermistor", "imu_temp"],
     "output": ["gyro", "Kreisel", "102 <Gyro output>", "FOG", "Output", "adc_gyro"],
-    "rate": ["rate", "rate_true", "encoder", "Ref rate", "Turntable", "Drehtisch soll", "Stage"],
+    "rate": ["rate", "rate_true", "encoder", "Ref rate", "reference_rate", "Drehtisch", "Stage"],
 }
 UNITS = {
-    "time": {"s": (1.0, 0.0), "ms": (1e3, 0.0), "min": (1 / 60, 0.0)},
+    "time": {"s": (1.0, 0.0), "ms": (1e3, 0.0), "us": (1e6, 0.0), "min": (1 / 60, 0.0)},
     "temperature": {"degC": (1.0, 0.0), "K": (1.0, 273.15), "degF": (1.8, 32.0)},
     "output": {"deg/s": (1.0, 0.0), "rad/s": (np.pi / 180, 0.0), "deg/h": (3600.0, 0.0),
                "counts": (-27_000.0, 0.0), "mV": (8.0, 0.0), "mdeg/s": (1e3, 0.0)},
     "rate": {"deg/s": (1.0, 0.0), "rad/s": (np.pi / 180, 0.0), "deg/h": (3600.0, 0.0)},
 }  # fmt: skip
 SPELT = {
-    "s": ["s", "sec"], "ms": ["ms"], "min": ["min"], "degC": ["degC", "°C", "C"], "K": ["K"],
-    "degF": ["degF", "°F"], "deg/s": ["deg/s", "dps", "°/s"], "rad/s": ["rad/s", "rad_s"],
+    "s": ["s", "sec"], "ms": ["ms"], "us": ["us", "US"], "min": ["min"], "K": ["K"],
+    "degC": ["degC", "°C", "C", "celsius"],
+    "degF": ["degF", "°F"], "deg/s": ["deg/s", "dps", "°/s"], "rad/s": ["rad/s", "rad_s", "radps"],
     "deg/h": ["deg/h", "deg/hr"], "counts": ["counts", "LSB"], "mV": ["mV"], "mdeg/s": ["mdps"],
 }  # fmt: skip
 PREAMBLES = [
@@ -40,7 +41,7 @@ PREAMBLES = [
     ["#datatype,dateTime:RFC3339,double", "#default,,"],
     ["// General information:", "//  Sample rate: 100.0 Hz"],
 ]
-EXTRAS = ["seq", "chamber_set", "supply_V", "pressure", "status"]
+EXTRAS = ["PacketCounter", "chamber_set", "supply_V", "vdd_mV", "pressure", "status"]
 
 
 def clean_logs():
@@ -84,7 +85,7 @@ def variant(number, logs, seed=0):
         units["output"] = str(rng.choice(["deg/s", "rad/s", "deg/h"]))
     told = {part: rng.random() < 0.75 for part in parts}
     # Values may tell a clock in min, or not: see test_units.py.
-    told["time"] |= units["time"] == "min"
+    told["time"] |= units["time"] in ("min", "us")
     told["output"] |= source == "rest" or units["output"] in ("counts", "mV", "mdeg/s")
     nameless = rng.random() < 0.08
     headless = not nameless and rng.random() < 0.05
@@ -136,7 +137,8 @@ def _time_form(log, table, header, units, told, rng):
 
 def _add_axes(frame, header, rng):
     name = header["output"]
-    axes = ["gyro_x", "gyro_y", "gyro_z"]
+    stem = str(rng.choice(["gyro_x", "Gyr_X", "GyrX"]))
+    axes = [stem.replace(stem[-1], axis) for axis in ("xyz" if stem.islower() else "XYZ")]
     tail = name.partition("[")[2].partition("(")[0] or None
     if tail is None:
         return

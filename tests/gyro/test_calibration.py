@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from skanfis.gyro import _calibration, _simpler
-from skanfis.gyro._calibration import fit_model
+from skanfis.gyro._calibration import Recipe, fit_model
 from skanfis.gyro._headline import errors_and_verdict, formula_of, headline
+from skanfis.gyro.compose import rules_of
 
 from .planted import NOISE, calibrated, evaluated, log_of
 
@@ -134,3 +135,15 @@ def test_what_a_fold_holds_out_has_no_say_in_its_model(monkeypatch):
     for rows, (train, _) in zip(seen[:-1], folds, strict=True):
         np.testing.assert_array_equal(rows, train)
     np.testing.assert_array_equal(seen[-1], log.index)
+
+
+@pytest.mark.floors
+def test_rules_are_for_what_the_law_leaves():
+    log = log_of(law)
+    X, rate = log[["temperature", "output"]], log["rate"].to_numpy()
+    groups = log["run"].astype(str).to_numpy()
+    recipe = Recipe(tuple(X), physics=True)
+    assert rules_of(fit_model(X, rate, groups, recipe))[-1].n_rules_ == 1
+    # An amplitude that is curved in temperature.
+    curved = X.assign(output=X["output"] * (1 - 2e-5 * (X["temperature"] - 25.0) ** 2))
+    assert rules_of(fit_model(curved, rate, groups, recipe))[-1].n_rules_ == 1

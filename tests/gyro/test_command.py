@@ -405,6 +405,21 @@ def thermal_cycle(*turns, n_rows=300, lag=0.05):
     return pd.DataFrame(table | {"gyro_x_dps": bias + noise[0], "gyro_y_dps": noise[1] - bias})
 
 
+def test_a_thermal_cycle_at_rest(tmp_path, run):
+    typed = "--terms 3,1 --write rules"
+    code, said, _ = run(thermal_cycle(20, -20, 60, -20, 60, 20), typed)
+    assert code == 0
+    assert "whole legs between turning points of the temperature held out (5 legs" in said
+    assert "taken as at rest" in said
+    assert "time = 'Timestamp [ms]' in ms; temperature = 'Temp'" in said
+    assert "output = 'gyro_x_dps' in deg/s ('gyro_y_dps' would do too)" in said
+    compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
+    assert compensator.inputs == ("temperature", "temperature_rate")
+    log = pd.DataFrame({"time": [0.0, 1e4], "temperature": 10.0, "output": 0.31})
+    # Neither warming nor cooling: between the two.
+    assert compensator.apply(log)["rate_compensated"].abs().max() < 0.02
+
+
 def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(run):
     log = thermal_cycle(20, -20, 60, 20).rename(columns={"gyro_y_dps": "rate [dps]"})
     log["rate [dps]"] *= 0.05

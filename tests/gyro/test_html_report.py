@@ -14,7 +14,7 @@ pytest.importorskip("jinja2")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro._calibration import Recipe, calibrate
-from skanfis.gyro._headline import rules_text
+from skanfis.gyro._headline import proven_bounds, rules_text
 from skanfis.gyro._options import parse_limit
 from skanfis.gyro._results import Picture, Results
 from skanfis.gyro._split import choose_split
@@ -178,6 +178,16 @@ def test_the_way_to_get_what_is_missing_is_said(calibration, monkeypatch, no_dra
     for make in (check_installed, lambda: text_of(calibration)):
         with pytest.raises(ImportError, match="pip install jinja2"):
             make()
+
+
+def test_limits_on_both_sides_of_the_figure_and_what_is_proven(page, calibration):
+    text = Outline(page).text
+    section = text[text.index("Limits of the specification") : text.index("Pictures")]
+    assert re.findall(r"pass|fail|not measured", section) == ["pass", "fail", "not measured"]
+    assert "1 of 3 limits are kept; not kept: residual rms; could not be measured" in text
+    told = text[text.rindex("What is proven") : text.rindex("Can the rules be read?")]
+    assert f"{Results(calibration).shown(proven_bounds(calibration)[0])} °/s" in told
+    assert "never against it proven" in told
 
 
 def test_no_screen_is_asked_for(fresh_process):

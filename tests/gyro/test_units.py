@@ -83,6 +83,14 @@ def test_a_clock_that_may_be_two_is_asked_for(tmp_path, truth, slower, ways):
         reading(tmp_path, truth, NAMES, (1 / slower, 1, 1, 1))
 
 
+# As warm as a room in degF alone, in degC alone, and in either.
+@pytest.mark.parametrize(("low", "high"), [(32.0, 80.0), (20.0, 95.0), (60.0, 80.0)])
+def test_a_temperature_in_either_scale_is_asked_for(tmp_path, truth, low, high):
+    heat = np.linspace(low, high, len(truth))
+    with pytest.raises(UsageError, match="temperature=degC or --units temperature=degF"):
+        reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
+
+
 @pytest.mark.parametrize("mark", [9999.0, -9999.0])
 def test_marks_of_no_value_tell_no_unit_and_are_refused(tmp_path, truth, mark):
     heat = truth["temperature"].where(np.arange(len(truth)) % 20 != 7, mark)
