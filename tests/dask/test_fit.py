@@ -200,18 +200,6 @@ def test_score_of_one_row_is_nan_and_of_no_prediction_refused():
         model.score(*cut(250, X, y))
 
 
-def test_score_after_merge_is_that_of_one_process():
-    X, y = data(600)
-    first = ANFISRegressor(n_mfs=2).fit(X, y)
-    parts = [
-        DaskANFISRegressor(partition=first, solver="lse").partial_fit(X[part], y[part])
-        for part in (slice(300), slice(300, None))
-    ]
-    merged = parts[0].merge(parts[1])
-    expected = r2_score(y, merged.predict(X))
-    assert merged.score(*cut(250, X, y)) == pytest.approx(expected, rel=1e-12)
-
-
 def parts_of(*tables):
     """A frame of these partitions, which say nothing of themselves before they are there."""
     meta = tables[0].iloc[:0]
@@ -336,15 +324,3 @@ def test_plain_estimator_names_the_one_for_dask():
         ANFISRegressor().fit(*cut(100, X, y))
     with pytest.raises(TypeError, match=r"X\.compute"):
         ANFISRegressor(n_mfs=1).fit(X, y).predict(*cut(100, X))
-
-
-def test_what_is_known_is_kept_as_in_one_process(few_are_many):
-    g = np.random.default_rng(1)
-    X = g.uniform(-1.0, 1.0, (N_ROWS, 2))
-    y = 1.0 / (1.0 + np.exp(-8.0 * X[:, 0])) + X[:, 1] + 0.3 * g.normal(size=N_ROWS)
-    known = {"n_mfs": [3, 1], "max_iter": 3, "monotonic_cst": [1, 0]}
-    known |= {"agreement": 0.1, "alpha": 1e-4}
-    single = ANFISRegressor(**known).fit(X, y)
-    spread = DaskANFISRegressor(**known).fit(*cut(700, X, y))
-    assert spread.constraints_["certified"]
-    assert_same_model(spread, single, 1e-7)

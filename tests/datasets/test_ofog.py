@@ -26,12 +26,6 @@ def data():
     return make_ofog(random_state=0)
 
 
-def test_parts_add_up_to_the_error(data):
-    assert list(data.columns[12:]) == PARTS
-    assert_array_equal(data["error"], data["output"] - data["rate"])
-    assert_allclose(data[PARTS].sum(axis=1), data["error"], atol=1e-12)
-
-
 def test_rates_are_the_levels_asked_for_in_every_run_or_of_one_dwell_alone(data):
     few = make_ofog(rates=np.linspace(-100, 100, 11), random_state=0)
     for _, run in few.groupby("run"):

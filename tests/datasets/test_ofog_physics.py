@@ -119,30 +119,6 @@ def test_each_coefficient_acts_in_its_own_part_alone(coefficient, part, normals)
     assert_allclose(measured["error"] - parts["nonlinearity"], parts[part], rtol=1e-9, atol=1e-12)
 
 
-def test_coefficients_have_the_units_of_data_sheets():
-    settling = np.exp(-TIME / 180)
-    device = {"bias": 7.0, "warm_up": 30.0, "bias_temperature": 0.5, "self_heating": 0.0}
-    device |= {"bias_temperature_curvature": 0.01}
-    measured, _ = simulate(IDEAL | device, bias=-2.0, ambient=15.0, rate=0.0 * TIME)
-    expected = 7.0 - 2.0 + 30.0 * settling - 5.0 + 1.0
-    assert_allclose(measured["output"] * 3600, expected, rtol=1e-9)
-    # Small-signal slope over 10 degC, and while it warms up; the gyro does not heat itself.
-    slopes = []
-    by_temperature = {"sagnac_temperature": -370.0, "amplitude_temperature": -40.0}
-    for ambient in (20.0, 30.0):
-        output = simulate(IDEAL | by_temperature, ambient=ambient, rate=0.0 * TIME + 0.1)[0]
-        slopes.append(output["output"][0] / 0.1)
-    assert_allclose((slopes[1] - slopes[0]) / 10.0, -410e-6, rtol=1e-3)
-    device = {"scale_factor": 500.0, "warm_up_scale_factor": 200.0}
-    measured, _ = simulate(IDEAL | device, rate=0.0 * TIME + 1e-3)
-    assert_allclose(measured["output"] / 1e-3, 1.0005 * (1 + 200e-6 * settling), rtol=1e-9)
-    # 1 degC/min at 5 deg/h/(degC/min) is 5 deg/h.
-    (thermal,) = history(**IDEAL | {"self_heating": 20.0})
-    device = IDEAL | {"self_heating": 20.0, "bias_temperature_rate": 5.0}
-    measured, _ = simulate(device, rate=0.0 * TIME)
-    assert_allclose(measured["output"] * 3600, 5.0 * 60.0 * thermal.coil_rate, rtol=1e-9)
-
-
 def test_noise_is_what_a_perfect_compensation_leaves(normals):
     # With every systematic coefficient known, the arcsine inverts the law; noise is all that stays.
     device = NOMINAL | {"quantisation": 3.0}

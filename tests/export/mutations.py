@@ -95,15 +95,6 @@ def number_paths(document, path=()):
         yield path
 
 
-def mutated_numbers(document, part=0, parts=1):
-    """Pairs of a number's path and a hostile value: all, or one of so many equal parts of them.
-
-    A prime number of parts gives every path values of its own, and each part every value.
-    """
-    pairs = [(path, value) for path in number_paths(document) for value in HOSTILE_NUMBERS]
-    return pairs[part::parts]
-
-
 def with_number(document, path, value):
     """The document with another value at a path."""
     changed = inner = copy.deepcopy(document)

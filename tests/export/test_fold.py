@@ -101,21 +101,6 @@ def test_folded_model_predicts_what_the_pipeline_does(kind, scaler, policy, n_ou
     assert_array_equal(fold(pipe).predict(X).shape, (len(X), n_outputs))
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_scale_of_the_target_is_folded(kind):
-    X, y = data(2)
-    # Not the tangent of triangles, as in CASES: rounding decides on which side of a corner it is.
-    policy = "clip" if kind == "triangles" else "linear"
-    inner = make_pipeline(StandardScaler(), regressor(**KINDS[kind], out_of_bounds=policy))
-    target = make_pipeline(MinMaxScaler((-1, 3)), StandardScaler())
-    both = TransformedTargetRegressor(inner, transformer=target).fit(X, y)
-    assert_same_predictions(both, around(X), 1e4)
-    last = regressor(**KINDS[kind], out_of_bounds=policy)
-    only_target = TransformedTargetRegressor(last, transformer=RobustScaler())
-    only_target = make_pipeline(MaxAbsScaler(), only_target).fit(X, y[:, 0])
-    assert_same_predictions(only_target, around(X), 10.0)
-
-
 def test_moved_and_dropped_columns_go_back_to_their_place():
     frame = pd.DataFrame(np.column_stack([X[:, 2], X[:, 0], X[:, 1], X[:, 0]]))
     frame.columns = ["rate", "dropped", "kelvin", "hours"]
@@ -136,26 +121,6 @@ def test_moved_and_dropped_columns_go_back_to_their_place():
     assert_array_equal(rows, frame[["rate", "kelvin", "hours"]])
     assert_same_predictions(pipe, frame, 10.0)
     assert_same_predictions(pipe, pd.DataFrame(around(frame.to_numpy()), columns=frame.columns), 50)
-
-
-@pytest.mark.parametrize(
-    "columns",
-    [
-        slice("kelvin", "rate"),
-        slice(-2, None),
-        "kelvin",
-        [2, 0],
-        ["rate", "hours"],
-        np.array([True, False, True]),
-        lambda frame: ["rate"],
-    ],
-)
-def test_columns_are_chosen_as_scikit_learn_does(columns):
-    frame = pd.DataFrame(X, columns=NAMES)
-    one = isinstance(columns, str | int)
-    chosen = ColumnTransformer([("some", StandardScaler(), [columns] if one else columns)])
-    pipe = make_pipeline(chosen, regressor(n_mfs=2)).fit(frame, Y)
-    assert_same_predictions(pipe, frame, 10.0)
 
 
 def mixed(n_rows=200):

@@ -138,18 +138,6 @@ def test_a_frame_makes_an_input_of_every_column():
         np.testing.assert_allclose(y[:, 0], estimator.predict(table))
 
 
-def test_policy_is_that_of_the_estimator_at_conversion():
-    estimator = quick(n_mfs=2).fit(X, Y)
-    Z = X.max(axis=0, keepdims=True) * 1.5
-    estimator.set_params(out_of_bounds="clip")
-    held = answers(estimator, Z)
-    for limit in (0.0, 0.3, np.inf):
-        estimator.set_params(out_of_bounds=LinearExtrapolation(limit))
-        way = abs(answers(estimator, Z)[0, 0] - held[0, 0])
-        assert (way > 0.02) == (limit > 0.0)
-        np.testing.assert_allclose(answers(estimator, Z)[:, 0], estimator.predict(Z))
-
-
 def test_what_a_graph_cannot_be_is_refused():
     estimator = quick(n_mfs=2).fit(X, Y)
     with pytest.raises(ValueError, match="target_opset=12 is too old"):

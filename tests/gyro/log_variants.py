@@ -15,30 +15,33 @@ from skanfis.datasets import make_ofog
 
 # Of each part: names without a unit, and what a name with one is made of.
 NAMES = {
-    "time": ["time", "Time", "t", "Timestamp", "elapsed", "Zeit"],
-    "temperature": ["temp", "Temperature", "T_gyro", "Temperatur", "thermistor", "imu_temp"],
-    "output": ["gyro", "Gyro", "gyro_out", "FOG", "Output", "imu_gyro"],
-    "rate": ["rate", "rate_true", "table_rate", "Ref rate", "Turntable", "cmd_rate"],
+    "time": ["time", "Time", "t", "Timestamp", "Elapsed", "_time", "Zeit"],
+    "temperature": ["101 <Gyro temp>", "Temperature", "T", "Temperatur", "thermistor", "imu_temp"],
+    "output": ["gyro", "Kreisel", "102 <Gyro output>", "FOG", "Output", "adc_gyro"],
+    "rate": ["rate", "rate_true", "encoder", "Ref rate", "reference_rate", "Drehtisch", "Stage"],
 }
 UNITS = {
-    "time": {"s": (1.0, 0.0), "ms": (1e3, 0.0), "min": (1 / 60, 0.0)},
+    "time": {"s": (1.0, 0.0), "ms": (1e3, 0.0), "us": (1e6, 0.0), "min": (1 / 60, 0.0)},
     "temperature": {"degC": (1.0, 0.0), "K": (1.0, 273.15), "degF": (1.8, 32.0)},
     "output": {"deg/s": (1.0, 0.0), "rad/s": (np.pi / 180, 0.0), "deg/h": (3600.0, 0.0),
-               "counts": (-27_000.0, 0.0), "mV": (8.0, 0.0)},
+               "counts": (-27_000.0, 0.0), "mV": (8.0, 0.0), "mdeg/s": (1e3, 0.0)},
     "rate": {"deg/s": (1.0, 0.0), "rad/s": (np.pi / 180, 0.0), "deg/h": (3600.0, 0.0)},
 }  # fmt: skip
 SPELT = {
-    "s": ["s", "sec"], "ms": ["ms"], "min": ["min"], "degC": ["degC", "°C", "C"], "K": ["K"],
-    "degF": ["degF", "°F"], "deg/s": ["deg/s", "dps", "°/s"], "rad/s": ["rad/s", "rad_s"],
-    "deg/h": ["deg/h", "deg/hr"], "counts": ["counts", "LSB"], "mV": ["mV"],
+    "s": ["s", "sec"], "ms": ["ms"], "us": ["us", "US"], "min": ["min"], "K": ["K"],
+    "degC": ["degC", "°C", "C", "celsius"],
+    "degF": ["degF", "°F"], "deg/s": ["deg/s", "dps", "°/s"], "rad/s": ["rad/s", "rad_s", "radps"],
+    "deg/h": ["deg/h", "deg/hr"], "counts": ["counts", "LSB"], "mV": ["mV"], "mdeg/s": ["mdps"],
 }  # fmt: skip
 PREAMBLES = [
     ["Bench 7", "Operator: A. Jones"],
     ["Serial,1234", "Start,2026-03-01 10:00:00", ""],
     ["# made by a logger, version 2.1", "# fs = 0.1"],
     ["Device;FOG-1;7", "Range;100;200", "", "Data"],
+    ["#datatype,dateTime:RFC3339,double", "#default,,"],
+    ["// General information:", "//  Sample rate: 100.0 Hz"],
 ]
-EXTRAS = ["seq", "chamber_set", "supply_V", "pressure", "status"]
+EXTRAS = ["PacketCounter", "chamber_set", "supply_V", "vdd_mV", "pressure", "status"]
 
 
 def clean_logs():
@@ -82,8 +85,8 @@ def variant(number, logs, seed=0):
         units["output"] = str(rng.choice(["deg/s", "rad/s", "deg/h"]))
     told = {part: rng.random() < 0.75 for part in parts}
     # Values may tell a clock in min, or not: see test_units.py.
-    told["time"] |= units["time"] == "min"
-    told["output"] |= source == "rest" or units["output"] in ("counts", "mV")
+    told["time"] |= units["time"] in ("min", "us")
+    told["output"] |= source == "rest" or units["output"] in ("counts", "mV", "mdeg/s")
     nameless = rng.random() < 0.08
     headless = not nameless and rng.random() < 0.05
     table, header = {}, {}
@@ -124,7 +127,8 @@ def _time_form(log, table, header, units, told, rng):
     if "run" in log and rng.random() < 0.5:
         seconds = seconds + 7200.0 * log["run"].astype(float).to_numpy()
         table["time"] = seconds * UNITS["time"][units["time"]][0]
-    form = str(rng.choice(["", "", "%Y-%m-%d %H:%M:%S", "%d.%m.%Y %H:%M:%S", "%H:%M:%S"]))
+    dates = ["%Y-%m-%d %H:%M:%S", "%d.%m.%Y %H:%M:%S", "%Y-%m-%dT%H:%M:%S.%f+01:00"]
+    form = str(rng.choice(["", "", *dates, "%m/%d/%y %I:%M:%S %p", "%H:%M:%S"]))
     if form:
         moments = pd.Timestamp("2026-03-01 20:00") + pd.to_timedelta(seconds, unit="s")
         table["time"], units["time"], told["time"] = moments.strftime(form), "clock", True
@@ -133,7 +137,8 @@ def _time_form(log, table, header, units, told, rng):
 
 def _add_axes(frame, header, rng):
     name = header["output"]
-    axes = ["gyro_x", "gyro_y", "gyro_z"]
+    stem = str(rng.choice(["gyro_x", "Gyr_X", "GyrX"]))
+    axes = [stem.replace(stem[-1], axis) for axis in ("xyz" if stem.islower() else "XYZ")]
     tail = name.partition("[")[2].partition("(")[0] or None
     if tail is None:
         return
@@ -210,8 +215,11 @@ def _written(frame, header, headless, rng):
         lines = list(PREAMBLES[int(rng.integers(len(PREAMBLES)))])
     buffer = io.StringIO(newline="")
     quoting = csv.QUOTE_ALL if rng.random() < 0.15 else csv.QUOTE_MINIMAL
-    writer = csv.writer(buffer, delimiter=separator, lineterminator=end, quoting=quoting)
+    # Some programs end every line with the separator, and begin the header like a comment.
+    tail = separator if separator == ";" and rng.random() < 0.3 else ""
+    writer = csv.writer(buffer, delimiter=separator, lineterminator=tail + end, quoting=quoting)
     if not headless:
+        buffer.write("% " if quoting == csv.QUOTE_MINIMAL and rng.random() < 0.1 else "")
         writer.writerow(header)
     for row in frame.itertuples(index=False):
         writer.writerow([_cell(value, decimal) for value in row])

@@ -12,7 +12,6 @@ import pandas as pd
 import pytest
 from sklearn.compose import make_column_transformer
 from sklearn.linear_model import LinearRegression
-from sklearn.model_selection import GridSearchCV, KFold
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
@@ -23,7 +22,7 @@ from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_p
 from skanfis.gyro.compose import law_and_rules
 from skanfis.gyro.physics import phase_of
 
-from ..export.c_compiler import SANITIZE, STRICT, UNTOUCHED, evaluate_all, gcc, needs_compiler, run
+from ..export.c_compiler import SANITIZE, UNTOUCHED, evaluate_all, needs_compiler
 from ..quick import quick
 from .targets.models import polynomial
 
@@ -31,7 +30,6 @@ pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsW
 
 COUNTS = -27_000.0  # per deg/s
 MIN_COVERAGE = 0.2
-SELF_TEST = ["-DGYRO_SELF_TEST", "-DGYRO_SELF_TEST_MAIN"]
 
 
 @cache
@@ -180,24 +178,6 @@ def test_no_rate_where_the_law_has_none(tmp_path):
     [(y, status)] = evaluate_all([code], rows, tmp_path, "c99", [1])
     assert (status & 1 == 1).all()
     assert np.isfinite(y).all()
-
-
-@pytest.mark.theory
-@needs_compiler
-def test_files_make_a_program_that_tests_itself(tmp_path):
-    model, X = whole()
-    folds = KFold(2, shuffle=True, random_state=0)
-    search = GridSearchCV(model, {"residual__n_mfs": [1, 2]}, cv=folds).fit(X, simulated()["rate"])
-    code = export_c_physics(search, tmp_path / "gyro-7", name="gyro", dtype="float", std="c89")
-    assert (tmp_path / "gyro-7.c").read_text() == code.source
-    gcc(["-std=c89", *STRICT, *SANITIZE, *SELF_TEST, "gyro-7.c", "-o", "test", "-lm"], tmp_path)
-    assert run(["./test"], tmp_path).returncode == 0
-    # A wrong coefficient is found out.
-    wrong = code.source.replace("gyro_sagnac[2] =\n{ ", "gyro_sagnac[2] =\n{ 2.0f * ")
-    assert wrong != code.source
-    (tmp_path / "gyro-7.c").write_text(wrong)
-    gcc(["-std=c89", *SELF_TEST, "gyro-7.c", "-o", "test", "-lm"], tmp_path)
-    assert run(["./test"], tmp_path).returncode == 1
 
 
 def test_header_says_what_goes_in():

@@ -1,7 +1,5 @@
 """A compensator as C: what its header says of the output, the units, and how inputs are made."""
 
-import numpy as np
-
 from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
 from skanfis.gyro.c_compensator import export_c_compensator
 from skanfis.gyro.compensator import features
@@ -42,15 +40,3 @@ def test_header_of_a_compensator_says_units_and_how_inputs_are_made(tmp_path):
     assert "subtract" not in text
     assert "[0] rate, in deg/s" in text
     assert "at most: an arcsine, " in text
-
-
-def test_the_rate_of_the_temperature_is_made_as_the_header_says():
-    log = simulated()
-    run = log[log["run"] == log["run"].min()]
-    made = features(run, ("temperature_rate",), 25.0).to_numpy()[:, 0]
-    rate, previous, by_hand = 0.0, run["temperature"].iloc[0], [0.0]
-    for h, temperature in zip(np.diff(run["time"]), run["temperature"].iloc[1:], strict=True):
-        rate += (1 - np.exp(-h / 25.0)) * ((temperature - previous) / h - rate)
-        previous = temperature
-        by_hand.append(rate)
-    np.testing.assert_allclose(made, by_hand, atol=1e-15)

@@ -122,16 +122,6 @@ def test_before_after_and_what_is_simpler_are_of_the_same_rows():
     assert f"is taken off, on {rows.sum():,} held-out rows in range" in shown
 
 
-@pytest.mark.floors
-def test_a_gyro_at_rest_has_no_law():
-    log = log_of(constant).assign(rate=0.0)
-    log["output"] = 0.01 + 1e-4 * log["temperature"]
-    calibration = calibrated(log, terms=(1, 1))
-    found = {simple.name: simple for simple in calibration.simpler}
-    assert "never changes" in found["arcsine law"].missing
-    assert "arcsine law" not in calibration.verdict.rms
-
-
 @pytest.mark.usefixtures("few_rivals")
 def test_what_a_fold_holds_out_has_no_say_in_its_model(monkeypatch):
     log, seen = log_of(constant), []

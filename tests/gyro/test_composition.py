@@ -1,11 +1,10 @@
-"""Physics plus what it leaves: sums, nested parameters, and flags through Pipelines."""
+"""Physics plus what it leaves: sums, nested parameters, and groups through Pipelines."""
 
 import numpy as np
 import pytest
 from sklearn.base import clone
 from sklearn.compose import make_column_transformer
-from sklearn.linear_model import LinearRegression, Ridge
-from sklearn.model_selection import GridSearchCV, LeaveOneGroupOut
+from sklearn.linear_model import LinearRegression
 from sklearn.neighbors import KNeighborsRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
@@ -14,8 +13,6 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.gyro.compose import ResidualRegressor
 from skanfis.gyro.physics import OpenLoopArcsineRegressor
-
-from ..quick import quick
 
 pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 
@@ -81,32 +78,6 @@ def test_groups_reach_the_part_that_chooses_by_them():
     assert n_rules[1] == 1
     alone = clone(part).fit(x, y - model.base_.predict(x), anfisregressor__groups=run)
     np.testing.assert_array_equal(model.residual_.predict(x), alone.predict(x))
-
-
-def test_groups_reach_a_search_for_its_splitter(rng):
-    x, y, run = shifted_runs(rng)
-    search = GridSearchCV(Ridge(), {"alpha": [0.1, 100.0]}, cv=LeaveOneGroupOut())
-    model = ResidualRegressor(LinearRegression(), search).fit(x, y, groups=run)
-    alone = clone(search).fit(x, y - model.base_.predict(x), groups=run)
-    found, expected = (one.cv_results_["mean_test_score"] for one in (model.residual_, alone))
-    assert len(set(found)) == 2
-    np.testing.assert_array_equal(found, expected)
-
-
-@pytest.mark.parametrize("scaled", [False, True])
-def test_flags_of_both_parts_come_through(data, scaled):
-    X, rate = data
-    anfis = quick(n_mfs=2)
-    residual = make_pipeline(StandardScaler(), anfis) if scaled else anfis
-    model = ResidualRegressor(OpenLoopArcsineRegressor(), residual)
-    model.fit(X.to_numpy(), rate)
-    rows = X.to_numpy()[[0, 0, 0]]
-    rows[1, 2] = 1e5  # a time that only the residual model looks at
-    rows[2, 0] = 1e5  # an output beyond the sine
-    np.testing.assert_array_equal(model.in_bounds(rows), [True, False, False])
-    coverage = model.coverage(rows)
-    assert coverage[0] > 0.3
-    assert np.all(coverage[1:] < 1e-6)
 
 
 def test_a_base_that_refuses_training_rows_is_refused(data):

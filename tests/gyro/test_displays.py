@@ -167,29 +167,6 @@ def test_a_band_between_bands_without_rows_is_drawn_too():
         np.testing.assert_allclose([box.intervaly for box in boxes], [[-size, 2.0 * size]] * 10)
 
 
-def test_hysteresis_is_that_of_the_law(log):
-    bias = (0.5 * log["temperature"] + 10.0 * log["temperature_rate"]) / 3600.0
-    # A scale factor that changes with temperature, and its cube, are no bias.
-    by_rate = 1e-4 * log["temperature"] * log["rate"] - 1e-6 * log["rate"] ** 3
-    planted = log.assign(output=log["rate"] + by_rate + bias, after=log["rate"])
-    display = display_of(HysteresisDisplay, planted)
-    # The branches are 2 x 10 deg/h x |rate of change| apart, most where it is 1 degC/min.
-    table = display.tables()["bias"]
-    place = (table["temperature [degC]"] - 20.0) / 30.0
-    gap = table["bias before, warming [deg/h]"] - table["bias before, cooling [deg/h]"]
-    inner = place.abs() < 2 / 3
-    np.testing.assert_allclose(gap[inner], 20.0 * np.sqrt(1 - place[inner] ** 2), rtol=0.05)
-    assert gap.max() == pytest.approx(20.0, rel=0.05)
-    assert f"largest gap {gap.max():.1f} °/h" in display.axes_[0].get_title(loc="left")
-    # Bins of both, picture and figure of merit, are of the rows that have an answer.
-    planted["after"] = planted["after"].where(planted["temperature"] > 0.0)
-    table = display_of(HysteresisDisplay, planted).tables()["bias"]
-    assert table["temperature [degC]"].min() > 0.0
-    assert table.iloc[:, 3:].diff(axis=1).abs().max(axis=None) < 1e-6
-    display = display_of(HysteresisDisplay, log.assign(temperature_rate=1.0))
-    assert "never meet" in display.axes_[0].get_title(loc="left")
-
-
 def test_scale_factor_error_is_that_of_the_law(log):
     rate = log["rate"]
     before = rate * (1 + 1e-6 * (300.0 + 0.02 * rate**2)) + 0.5  # a bias is no scale factor

@@ -232,17 +232,6 @@ def test_one_row_that_no_other_supports_is_named(part, by):
     assert glitches(log) == [row]
 
 
-def test_three_rows_are_named_and_more_support_each_other():
-    log = simulated()
-    rows = [10, 100, 200, 300]
-    for count in (2, 3):
-        spoilt = log.copy()
-        spoilt.loc[rows[:count], "output"] += 40.0
-        assert glitches(spoilt) == rows[:count]
-    log.loc[rows, "output"] += 40.0
-    assert glitches(log) == []
-
-
 def test_however_many_temperatures_are_glitches_and_a_step_is_none():
     log = simulated(sampling_interval=2.0)
     cold = log.loc[log.index[::400], "temperature"].index

@@ -86,14 +86,6 @@ def test_repeatability_is_the_spread_over_runs(table):
         figure("bias_repeatability", **columns, of_bias=~of_bias)
 
 
-def test_input_error_takes_the_scale_factor_out(table):
-    rate, temperature = table
-    error = 0.002 + 1e-4 * (temperature - 20.0)
-    np.testing.assert_allclose(input_error(rate, 3.0 * (rate + error)), error, atol=1e-13)
-    at_rest = input_error(np.array([5.0, 5.0]), np.array([5.25, 4.75]))
-    np.testing.assert_array_equal(at_rest, [0.25, -0.25])
-
-
 def test_sensitivities_found_together_do_not_count_for_each_other():
     """On a warm-up temperature and its rate go together; alone, the one takes the other's part."""
     time = np.linspace(0.0, 3.0, 200)

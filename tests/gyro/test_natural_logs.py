@@ -46,25 +46,6 @@ def moments(truth, form):
     return (start + pd.to_timedelta(truth["clock"], unit="s")).dt.strftime(form)
 
 
-def test_lines_above_the_header_and_a_clock_past_midnight(tmp_path, truth):
-    lines = ["Bench 7;operator X", "", "Datum;Uhrzeit;Temp [°C];Gyro [mrad/s];Table"]
-    days, clocks = moments(truth, "%Y-%m-%d"), moments(truth, "%H:%M:%S")
-    output = truth["output"] * np.pi / 0.18
-    rows = zip(days, clocks, truth["temperature"], output, truth["rate"], strict=True)
-    lines += [";".join(map(str, row)) for row in rows]
-    (tmp_path / "log.txt").write_text("\n".join(lines), encoding="utf-8")
-    reading = found(tmp_path / "log.txt")
-    same(reading, truth)
-    np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]))
-    # The hour without power between runs of ten minutes.
-    assert (reading.log["run"].astype(int) == truth["run"].astype(int) + 1).all()
-    told = "; ".join(reading.notes)
-    for said in ("temperature = 'Temp [°C]' in degC", "split into 5 runs", "--columns"):
-        assert said in told
-    assert (reading.units["output"], set(reading.assumed)) == ("mrad/s", {"rate"})
-    assert reading.name_row(10) == f"{tmp_path / 'log.txt'}, line 14"
-
-
 def test_files_of_a_logger_that_begins_a_new_one_now_and_then(tmp_path, truth):
     """A run that is cut is one run; one from zero on is another, and one a while later too."""
     parts = [rows.iloc[k : k + 20] for _, rows in truth.groupby("run") for k in (0, 20, 40)]
@@ -151,14 +132,6 @@ def test_numbers_with_a_true_minus_sign(tmp_path, truth, decimal):
     text = truth[PARTS].to_csv(index=False, sep=";", decimal=decimal)
     (tmp_path / "log.csv").write_text(text.replace("-", "\u2212"), encoding="utf-8")
     same(found(tmp_path / "log.csv"), truth)
-
-
-def test_columns_whose_names_say_nothing_are_asked_for(tmp_path, truth):
-    table = pd.DataFrame({"a": truth["temperature"], "b": truth["output"], "d": truth["rate"]})
-    with pytest.raises(LogError, match=r"Say which it is .such as --columns temperature=a"):
-        found_in(tmp_path, table)
-    told = found(tmp_path / "log.csv", columns={"temperature": "a", "output": "D ", "rate": "b"})
-    np.testing.assert_allclose(told.log["output"], truth["rate"])
 
 
 @pytest.mark.parametrize("name", ["U_mV", "gyro_mV", "U [mV]"])
@@ -322,12 +295,13 @@ def test_a_file_of_labview(tmp_path, truth):
     assert "time" not in reading.assumed
 
 
-def test_units_in_a_line_of_their_own_below_numbers(tmp_path, truth):
+@pytest.mark.parametrize("separator", [",", "  "])
+def test_units_in_a_line_of_their_own_below_numbers(tmp_path, truth, separator):
     lines = ["Serial,1234", "Operator,7", "", "t,Temp,Gyro,Table", "ms,K,(rad/s),deg/s"]
     rows = zip(1000 * truth["time"], truth["temperature"] + 273.15, np.radians(truth["output"]),
                truth["rate"], strict=True)  # fmt: skip
     lines += [",".join(map(repr, map(float, row))) for row in rows]
-    (tmp_path / "log.csv").write_text("\n".join(lines))
+    (tmp_path / "log.csv").write_text("\n".join(lines).replace(",", separator))
     reading = found(tmp_path / "log.csv")
     same(reading, truth)
     assert reading.assumed == {}
@@ -421,15 +395,6 @@ def test_a_counter_of_32_bits_that_begins_again_goes_on(tmp_path, truth, unit, s
     places = "1 place" if times == 1 else f"{times} places"
     told = f"back by the range of its 32 bits in {places}, first at line 18; the time goes"
     assert told in "; ".join(reading.notes)
-
-
-def test_a_block_that_occurs_twice_is_left_out(tmp_path, truth):
-    times = pd.Timestamp("2026-03-01 10:00") + pd.to_timedelta(10.0 * np.arange(300), unit="s")
-    table = truth[PARTS].assign(time=times.strftime("%d.%m.%Y %H:%M:%S"))
-    reading = found_in(tmp_path, pd.concat([table[:200], table[100:]]))
-    same(reading, truth)
-    told = "; ".join(reading.notes)
-    assert "100 repeated rows left out, from line 202 to line 301" in told
 
 
 @pytest.mark.parametrize("n_runs", [1, 5])

@@ -70,19 +70,6 @@ def test_planted_truth_is_in_the_table(log):
     assert table.loc["reduction_factor", "after"] == pytest.approx(10.0)
 
 
-@pytest.mark.parametrize("unit", ["deg/s", "deg/h"])
-def test_one_unit_for_every_rate(log, unit):
-    usual = figures(report_of(log, *ALL, n_resamples=5))
-    one = figures(report_of(log, *ALL, n_resamples=5, rate_unit=unit))
-    in_second = {"deg/s": 1.0, "deg/h": 1 / HOUR}
-    for name, line in usual.iterrows():
-        own = line["unit"][:5]
-        factor = in_second[own] / in_second[unit] if own in in_second else 1.0
-        assert one.loc[name, "unit"] == line["unit"].replace(own, unit if own in in_second else own)
-        expected = factor * line[VALUES].astype(float)
-        np.testing.assert_allclose(one.loc[name, VALUES].astype(float), expected, rtol=1e-12)
-
-
 def test_intervals_hold_the_figure_and_come_back_with_the_seed(log):
     one, two = report_of(log, *ALL), report_of(log, *ALL)
     pd.testing.assert_frame_equal(one, two)
@@ -138,19 +125,6 @@ def test_refused_rows_are_left_out_of_both_sides(log):
     pd.testing.assert_frame_equal(report_of(patchy, "run"), report_of(log[~refused], "run"))
     # What has no column is left out.
     assert not {"hysteresis", "bias_stability_10s"} & set(report_of(log, "run")["figure"])
-
-
-def test_the_bias_of_rows_at_rest_has_an_interval_of_such():
-    """Every other run rests; an asymmetry moves the mean of all rows, and no row at rest."""
-    run, rate = np.repeat(np.arange(6), 20), np.tile(np.linspace(-100.0, 100.0, 20), 6)
-    rate[(run % 2 == 0) & (np.arange(120) % 20 < 12)] = 0.0
-    output = np.where(rate > 0.0, 1.0015, 1.0005) * rate + 5.0 / 3600.0
-    report = gyro_report(rate, output, run=run, random_state=0).set_index("figure")
-    assert (
-        report.loc["bias"][["before", "before_low", "before_high"]].tolist()
-        == [pytest.approx(5.0, rel=1e-2)] * 3
-    )
-    assert report.loc["bias_repeatability", "before"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_nonlinearity_is_not_that_of_the_noise(rng):

@@ -107,13 +107,6 @@ def levels_and_runs():
     return log_of(n_devices=1, n_runs=4, rates=LEVELS)
 
 
-def test_a_choice_never_leaks(levels_and_runs):
-    for train, test in choose_split(levels_and_runs).folds:
-        # Levels of one size and two signs are held out together.
-        for part in (levels_and_runs["rate"].abs(), levels_and_runs["run"]):
-            assert not np.isin(part[test], part[train]).any()
-
-
 def test_a_rate_of_one_row_or_two_is_no_level():
     rate = np.repeat([10.0, 20, 30, 40, 50, 64, 77], [5, 5, 5, 5, 5, 1, 2])
     columns = {"rate": rate, "output": rate, "temperature": np.linspace(0.0, 50.0, rate.size)}

@@ -78,16 +78,6 @@ def features(columns):
     return clone(FEATURE).fit_transform(columns)
 
 
-def test_future_does_not_alter_the_past(columns, features):
-    # Row by row, as on the gyro: the last of all rows so far is the newest.
-    for n_rows in range(1, len(columns) + 1):
-        so_far = clone(FEATURE).fit_transform(columns[:n_rows])
-        assert_array_equal(so_far[-1], features[n_rows - 1])
-    later = columns.copy()
-    later.loc[later.index[30:], "T"] += 1e6
-    assert_array_equal(clone(FEATURE).fit_transform(later)[:30], features[:30])
-
-
 def test_runs_do_not_know_of_each_other(columns, features):
     for name in "abc":
         rows = (columns["run"] == name).to_numpy()

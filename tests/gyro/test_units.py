@@ -64,14 +64,6 @@ def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offset
     assert f"({truth['rate'].min() * scales[3]:.4g} to" in found.assumed["rate"]
 
 
-def test_degrees_fahrenheit_that_look_like_celsius(tmp_path, truth):
-    heat = np.linspace(-4.0, 80.0, len(truth))
-    found = reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
-    assert found.units["temperature"] == "degC"
-    told = "taken as degC (-4 to 80; degF? give --units temperature=degF)"
-    assert told in found.assumed["temperature"]
-
-
 def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, truth):
     turn = np.pi / 180
     with pytest.raises(UsageError) as caught:

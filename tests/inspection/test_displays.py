@@ -10,11 +10,9 @@ from sklearn.compose import TransformedTargetRegressor, make_column_transformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, OneHotEncoder
 
-from skanfis import ANFISRegressor
-from skanfis.cluster import SubtractiveClustering
 from skanfis.export import fold
 from skanfis.inspection import EffectsDisplay, MembershipDisplay, ResponseSurfaceDisplay
-from skanfis.inspection.labels import as_label, printable, title_of
+from skanfis.inspection.labels import as_label, printable
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
@@ -56,33 +54,6 @@ class TestMemberships:
                     assert_allclose(curve, expected, rtol=1e-9)
             assert not np.allclose(one.before, one.after)
 
-    def test_they_lie_over_the_histogram_of_the_data(self, fitted):
-        pipe, X = fitted
-        display = drawn(MembershipDisplay.from_estimator(pipe, X))
-        for one in display.inputs:
-            counts, edges = np.histogram(X[one.input_name], 30)
-            assert_array_equal(one.counts, counts)
-            assert_allclose(one.edges, edges)
-            assert_allclose(one.grid[[0, -1]], [X[one.input_name].min(), X[one.input_name].max()])
-        assert [axes.get_xlabel() for axes in display.axes_] == ["kelvin", "rate"]
-        legend = display.axes_[0].get_legend()
-        assert [text.get_text() for text in legend.get_texts()] == ["low", "medium", "high"]
-        lines = display.axes_[0].get_lines()
-        assert [line.get_linestyle() for line in lines] == ["--", "-"] * 3
-
-    def test_terms_are_named_from_left_to_right(self):
-        x = np.linspace(0.0, 10.0, 60)[:, None]
-        centers = SubtractiveClustering(radius=0.6).fit(x).cluster_centers_[:, 0]
-        assert (np.diff(centers) < 0.0).any()
-        model = quick(partition=SubtractiveClustering(radius=0.6), max_iter=0)
-        display = MembershipDisplay.from_estimator(model.fit(x, np.sin(x[:, 0])))
-        (axes,) = display.axes_
-        near = [float(one.get_text().split()[1]) for one in axes.get_legend().get_texts()]
-        assert near == sorted(near)
-        curves = [line for line in axes.get_lines() if line.get_linestyle() == "-"]
-        peaks = [display.inputs[0].grid[line.get_ydata().argmax()] for line in curves]
-        assert_allclose(peaks, near, atol=0.05)
-
 
 class TestSurface:
     @EACH
@@ -106,14 +77,6 @@ class TestSurface:
         assert_array_equal(display.points, X)
         corner = pd.DataFrame([X.max()])
         assert display.response[-1, -1] == pytest.approx(target.predict(corner)[0], rel=1e-9)
-
-    def test_colours_are_set_by_where_the_data_are(self):
-        display = ResponseSurfaceDisplay.from_estimator(A_GRID, grid_resolution=41)
-        seen = display.response[display.coverage >= 0.5]
-        assert 0 < seen.size < display.response.size
-        levels = drawn(display).surface_.levels
-        assert levels[0] <= seen.min() < levels[1]
-        assert levels[-2] < seen.max() <= levels[-1]
 
     @pytest.mark.parametrize(
         ("settings", "error", "message"),
@@ -156,11 +119,6 @@ def test_panels_are_drawn_on_given_axes(display, count):
         display.from_estimator(A_GRID, X, ax=axes[:2])
 
 
-def test_a_surface_is_drawn_where_asked():
-    _, ax = plt.subplots()
-    assert ResponseSurfaceDisplay.from_estimator(A_GRID, ax=ax).ax_ is ax
-
-
 def test_displays_say_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "matplotlib.pyplot", None)
     with pytest.raises(ImportError, match=r"pip install matplotlib .*'\.\[plot\]'"):
@@ -195,13 +153,6 @@ def test_what_no_reader_sees_is_escaped(text, shown):
     assert printable(text) == shown
 
 
-@pytest.mark.parametrize("name", ["$$", r"$\frac{0$", r"\$", "a$b", "\x1b[2J", "\udcff", "a\nb"])
-def test_a_label_is_drawn_as_it_is(name):
-    # matplotlib's own reading of a text: whether it is mathematics, and what it is without.
-    text = plt.figure().text(0, 0, as_label(name))
-    assert text._preprocess_math(as_label(name)) == (printable(name), False)
-
-
 # Those that cannot be drawn as they are: no picture has forgotten to ask for a label.
 @pytest.mark.filterwarnings("ignore:Glyph .* missing")
 def test_every_picture_takes_every_name():
@@ -217,37 +168,6 @@ def test_every_picture_takes_every_name():
     assert [axes.get_xlabel() for axes in memberships.axes_] == labels
     surface = drawn(ResponseSurfaceDisplay.from_estimator(model, None, model.input_names[:2]))
     assert [surface.ax_.get_xlabel(), surface.ax_.get_ylabel()] == labels[:2]
-
-
-@pytest.mark.parametrize("n_inputs", [1, 2])
-def test_long_names_and_notes_stay_in_the_picture(n_inputs, rng):
-    names = [f"the long name of input number {j} in milliwatts per kelvin" for j in range(n_inputs)]
-    X = pd.DataFrame(rng.uniform(-1.0, 1.0, (60, n_inputs)), columns=names)
-    y = pd.Series(np.tanh(9.0 * X.prod(axis=1)), name=names[0].replace("input", "output"))
-    model = quick(n_mfs=2).fit(X, y)
-    kinds = [MembershipDisplay, EffectsDisplay, ResponseSurfaceDisplay][: n_inputs + 1]
-    for display in (drawn(kind.from_estimator(model, X)) for kind in kinds):
-        figure = display.figure_
-        page, own = figure.bbox, [axes.get_tightbbox() for axes in figure.axes]
-        note = [figure._supxlabel.get_window_extent()] if figure._supxlabel else []
-        for box in own + note:
-            assert_array_equal(Bbox.union([page, box]).bounds, page.bounds)
-
-
-def test_means_that_are_held_have_the_digits_of_their_deviation(rng):
-    """No rounding's rest in place of zero, and a time stamp that names a second."""
-    X = rng.uniform(-1.0, 1.0, (60, 4))
-    X -= X.mean(axis=0)
-    X[:, 3] = 1.7e9 + 100.0 * X[:, 3]
-    display = ResponseSurfaceDisplay.from_estimator(ANFISRegressor(n_mfs=1).fit(X, X[:, 0]))
-    assert display.ax_.get_title(loc="left").startswith("x2 = 0; x3 = 1700000000")
-
-
-def test_a_title_names_a_few_of_the_inputs_that_are_held():
-    held = {f"x{k}": 0.5 * k for k in range(9)}
-    assert title_of(dict(list(held.items())[:2]), "pale") == "x0 = 0; x1 = 0.5; pale"
-    assert title_of(held) == "x0 = 0; x1 = 0.5; x2 = 1; x3 = 1.5; 5 more inputs held"
-    assert title_of(dict(list(held.items())[:5])).endswith("x3 = 1.5; 1 more input held")
 
 
 @pytest.mark.parametrize(

@@ -57,14 +57,6 @@ def test_both_shares_are_those_of_the_definition(rules, order):
         assert_allclose(found["rows"].reindex(every), parts, rtol=0, atol=1e-10)
 
 
-def test_an_input_called_as_the_rest_keeps_its_share():
-    model = MODELS["grid, order 1, 1 outputs"]
-    X, names = rows_of(model, 1.0, 20), ("three or more", *NAMES[1:])
-    expected, found = effects(model, X).table, effects(replace(model, input_names=names), X).table
-    assert list(found.index) == [text.replace("time", names[0]) for text in expected.index]
-    assert_allclose(found, expected, rtol=0, atol=1e-15)
-
-
 def test_what_fit_keeps_is_what_its_rows_give(rng):
     X = rng.uniform([250.0, -1e-3, 0.0], [330.0, 1e-3, 5.0], (60, 3))
     y = np.column_stack([np.sin(X[:, 0] / 20.0) + 1e6 * X[:, 1] ** 2 + X[:, 2], X[:, 2]])
@@ -208,16 +200,6 @@ def test_what_does_nothing_is_printed_as_one_row(rng):
     assert nothing == {"x1", "27 inputs and 27 pairs more", "three or more"}
     assert printed.keys() == nothing | {"x0", "x2", "x0 and x1", "x0 and x2"}
     assert_allclose(sum(float(own) for own, _ in printed.values()), 1.0, atol=0.002)
-
-
-def test_draws_are_said():
-    model = MODELS["scattered, order 1, 1 outputs"]
-    X = rows_of(model, 1.0, 9)
-    found = effects(model, X)
-    expected = product_shares(on_the_product(model, X)[..., 0], np.full(9, 1.0 / 9.0))
-    assert_allclose(found.table["sobol"].reindex(LABELS), expected[:6], rtol=0, atol=0.03)
-    assert "20,000 draws" in found.notes[-1]
-    assert_allclose(found.table, effects(model, X).table)
 
 
 def test_what_was_kept_of_a_tree_is_not_taken_for_its_rule_table(rng):

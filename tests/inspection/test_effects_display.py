@@ -1,6 +1,5 @@
 """The picture of effects against means over the product of the inputs' values."""
 
-import re
 from dataclasses import replace
 from itertools import pairwise
 
@@ -8,12 +7,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.cluster import KMeans
 from sklearn.compose import make_column_transformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder
 
-from skanfis import ANFISRegressor
 from skanfis.inspection import EffectsDisplay, effects
 
 from ..export.rule_bases import MODELS, build, rows_of
@@ -88,18 +85,6 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
         EffectsDisplay.from_estimator(model, X, groups={"all": range(3)})
 
 
-def test_the_band_is_the_deviation_of_the_mean_over_other_inputs(rng):
-    X = rng.normal([10.0, -2.0], [3.0, 0.5], (60, 2))
-    fitted = quick(n_mfs=1).fit(X, X @ [1.0, 2.0] + rng.normal(size=60))
-    display = drawn(EffectsDisplay.from_estimator(fitted))
-    # On a line the mean over rows is the output at their mean.
-    curve = next(one for one in display.curves if one["input"] == "x0")
-    rows = np.column_stack([curve["points"], np.full(61, X[:, 1].mean())])
-    deviation = fitted.predict(rows, return_std=True)[1]
-    expected = np.sqrt(deviation**2 - fitted.noise_std_**2)
-    assert_allclose(curve["deviation"], expected, rtol=0.03)
-
-
 @pytest.mark.parametrize(("drop", "levels"), [(None, "abc"), (["a"], "bca"), ("if_binary", "ba")])
 def test_a_category_is_drawn_by_its_levels(drop, levels):
     X, y = categories()
@@ -142,28 +127,3 @@ def test_labels_of_many_levels_stand_apart(rng):
     for labels in sides:
         boxes = [one.get_window_extent() for one in labels]
         assert not any(one.overlaps(next_one) for one, next_one in pairwise(boxes))
-
-
-def test_a_pair_that_does_nothing_is_not_drawn_and_zero_though_by_draws(rng):
-    # Heavy tails, and rules that differ by the first input alone: no two do anything together.
-    X = rng.standard_t(3, (300, 9))
-    model = ANFISRegressor(
-        partition=KMeans(3, random_state=0), premise_features=[0], agreement=0.0, max_iter=0
-    ).fit(X, np.abs(X[:, 0]))
-    model = model.model_
-    coefficients = model.coefficients.copy()
-    coefficients[:, 2:] = model.target.spread / model.spread[1:, None]
-    model = replace(model, coefficients=coefficients)
-    found = effects(model, X)
-    shares = found.table["sobol"]
-    assert_allclose(shares[shares.index.str.contains(" and ")], 0.0, atol=1e-4)
-    # Nor is it printed by itself.
-    assert "x0 and x1" in shares
-    assert "x0 and x1" not in str(found)
-    assert re.search(r"\n\d pairs more ", str(found))
-    display = drawn(EffectsDisplay.from_estimator(model, X))
-    assert display.pairs == []
-    # By draws a share may be less than nothing.
-    display.curves[0]["share"] = -0.01
-    assert "alone 0 %" in display.plot().axes_[0].get_title(loc="left")
-    assert not any("-0 %" in axes.get_title(loc="left") for axes in display.axes_)

@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent
-from skanfis.inspection import measures
 from skanfis.inspection.measures import measure
 from skanfis.inspection.sentences import Sentences
 from skanfis.membership import Gaussian
@@ -91,17 +90,6 @@ def test_measures_are_what_loops_find(model, unit):
     assert_alike(found_of(model, *data), by_loops(model, *data), rtol=1e-6)
 
 
-@pytest.mark.parametrize("has_target", [True, False])
-def test_blocks_do_not_matter(monkeypatch, has_target):
-    X, y, weight = data_of(A_TABLE, n_rows=1000)
-    weight[300:400] = 0.0  # a block without weight
-    y = y if has_target else None
-    expected = found_of(A_TABLE, X, y, weight)
-    monkeypatch.setattr(measures, "LARGE_BLOCK_ROWS", 70)
-    monkeypatch.setattr(measures, "fitting_rows", lambda _: 64)
-    assert_alike(found_of(A_TABLE, X, y, weight), expected)
-
-
 def of_two_rules(first, second):
     """Constants of two rules on the input in the middle, whose terms have a width of one."""
     theta = np.array([[-1.0, 1.0], [0.0, 0.0]])
@@ -115,14 +103,6 @@ def of_two_rules(first, second):
         reference=np.zeros(3),
         spread=np.ones(3),
     )
-
-
-def test_of_equally_strong_rules_the_first_counts():
-    model = of_two_rules(1.0, 4.0)
-    found = found_of(model, np.zeros((1, 3)), np.array([[2.0]]))  # yhat is 2.5, both miss by 1.5
-    assert_allclose(found.rule_rows, [1.0, 0.0])
-    assert_array_equal(found.rule_spreads, [[0.0], [np.nan]])
-    assert_allclose(found.alone, 1.5)
 
 
 def test_a_constant_target_has_a_deviation_of_one():

@@ -6,17 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from sklearn.compose import TransformedTargetRegressor
-from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.digits import in_digits
-from skanfis.inspection import explain, export_text, measures, readability, rules_html
+from skanfis.inspection import explain, export_text, measures, readability
 from skanfis.inspection.readability import readability_of_rows
 
-from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
+from ..export.rule_bases import MODELS, rows_of
 from ..quick import quick
 
 A_GRID = MODELS["grid, order 1, 1 outputs"]
@@ -33,23 +32,6 @@ def found_of(model, **changes):
     passing["rule_spreads"] = found.measures.rule_errors / 1.05
     measures = replace(found.measures, **(passing | changes))
     return replace(found, model=replace(model, rule_rows=rows), measures=measures)
-
-
-@pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
-def test_tables_hold_the_measures(model):
-    found = readability_of_rows(
-        model, rows_of(model, 1.0), 2.0 * rows_of(model, 1.0)[:, -1:] + np.zeros(model.n_outputs)
-    )
-    measures, rules = found.measures, found.rules
-    for k, output in enumerate(model.output_names):
-        own = rules[rules["output"] == output]
-        assert_array_equal(own.index, np.arange(model.n_rules))
-        assert_array_equal(own["weight"], measures.rule_weights)
-        assert_array_equal(own["rows"], measures.rule_rows)
-        assert_array_equal(own["alone"], measures.rule_alone[:, k])
-        assert_array_equal(own["error"], measures.rule_errors[:, k] * measures.deviation[k])
-    ratio = (measures.printed_errors / measures.errors).max()
-    assert_array_equal(found.summary, [measures.alone.max(), ratio])
 
 
 def test_errors_are_in_the_units_of_the_target_whatever_the_rows(rng):
@@ -146,27 +128,6 @@ def assert_same(found, expected, rtol=1e-9):
     assert_allclose(found.rules["alone"], expected.rules["alone"], rtol=rtol)
 
 
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
-def test_estimators_around_the_model_are_measured_in_their_own_units(fitted):
-    pipe, X = fitted
-    y = 1e3 + np.sin(X["kelvin"] / 20) + 1e6 * X["rate"] ** 2
-    found = readability(pipe, X, y)
-    assert_same(found, readability(pipe[-1], pipe[:-1].transform(X), y))
-    assert found.rules["if"][0] == "kelvin is low AND rate is low"
-    assert_same(readability(pipe, X), readability(pipe, X, pipe.predict(X)))
-
-
-def test_predictions_have_no_error_that_the_text_could_raise(rng):
-    X = rng.uniform(0.0, 1.0, (200, 3))
-    y = 1e3 + X @ [1.0, 2.0, 3.0] + 0.5 * rng.normal(size=200)
-    model = quick(n_mfs=[2, 1, 1]).fit(X, y)
-    assert "errs" in readability(model, X, y).line
-    found = readability(model, X)
-    assert found.measures.errors[0] > 0.0  # by rounding
-    assert found.line == f"{found.reading_cost} numbers"
-    assert not [one for one in found.findings if "text as printed" in one]
-
-
 def test_errors_name_the_row_and_the_column(monkeypatch):
     X = rows_of(A_GRID, 1.0)
     monkeypatch.setattr(measures, "LARGE_BLOCK_ROWS", 10)
@@ -189,18 +150,3 @@ def test_errors_name_the_row_and_the_column(monkeypatch):
         readability(A_GRID, X[:0])
     with pytest.raises(TypeError, match="must be a fitted ANFIS estimator"):
         readability(None, X)
-
-
-def test_findings_of_the_fit_are_in_the_names_of_the_whole():
-    X = pd.DataFrame({"rate": np.linspace(-300.0, 300.0, 201)})
-    y = np.abs(X["rate"]) + np.random.default_rng(0).normal(size=201)
-    model = ANFISRegressor(partition="tree", max_rules=2)
-    pipeline = make_pipeline(StandardScaler().set_output(transform="default"), model).fit(X, y)
-    assert "by x0 up in rule 0 and down in rule 1." in pipeline[-1].readability_.findings[0]
-    assert "by rate up in rule 0 and down in rule 1." in export_text(pipeline)
-    text = export_text(pipeline, feature_names=["turn rate"])
-    assert "by turn rate up in rule 0 and down in rule 1." in text
-    page = rules_html(pipeline)
-    assert "by rate up in rule 0 and down in rule 1." in page.partition("<details>")[2]
-    # In other digits than those that the fit has measured nothing is said of them.
-    assert "errs" not in export_text(pipeline, precision=5).splitlines()[-1]

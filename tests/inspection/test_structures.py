@@ -5,10 +5,7 @@ import copy
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
-from skanfis import ANFISRegressor
 from skanfis.inspection import StructureDisplay
 
 from ..quick import quick
@@ -94,20 +91,6 @@ def test_numbers_on_the_axes_are_plain(line):
 def test_a_structure_that_was_given_stands_alone(line, error):
     display = shown(line, [candidate("grid", 2, 6, error, chosen=True)])
     assert display.tolerance == pytest.approx(1.05 * error)
-
-
-def test_of_a_search_behind_a_scaler_and_on_given_axes(rng):
-    X = rng.uniform(-2.0, 2.0, (120, 2))
-    y = np.abs(X[:, 0]) + 0.1 * rng.normal(size=120)
-    pipe = make_pipeline(StandardScaler(), ANFISRegressor(max_rules=4, agreement=0.1, alpha=1e-3))
-    _, ax = plt.subplots()
-    display = StructureDisplay.from_estimator(pipe.fit(X, y), ax=ax)
-    assert display.ax_ is ax
-    assert display.structures == pipe[-1].structures_
-    errors = {one["chosen"]: one["expected_error"] for one in display.structures}
-    assert errors[True] <= display.tolerance
-    costs = {one["chosen"]: one["reading_cost"] for one in display.structures}
-    assert pipe[-1].readability_.reading_cost == costs[True]
 
 
 def test_what_has_compared_nothing_has_no_picture(line):

@@ -8,9 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.compose import make_column_transformer
 from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import OneHotEncoder, StandardScaler
+from sklearn.preprocessing import OneHotEncoder
 
-from skanfis import ANFISRegressor
 from skanfis.inspection import explain, readability, rules_table
 
 from ..export.every_model import FEWEST
@@ -42,43 +41,6 @@ def test_rules_table_holds_consequents_and_support(model):
         assert_allclose(said[list(NAMES)], model.consequents[:, 1:, k], rtol=1e-12)
         at_center = model.consequents[:, 0, k] + np.sum(table["at"] * said[list(NAMES)], axis=1)
         assert_allclose(said["value"], at_center, rtol=1e-9, atol=1e-9)
-
-
-def test_what_a_rule_does_not_look_at_is_missing():
-    table = rules_table(A_GRID)["if"]
-    assert list(table) == list(NAMES)
-    assert list(table["chip temperature"].iloc[:6]) == ["low"] * 2 + ["medium"] * 2 + ["high"] * 2
-    table = rules_table(A_TABLE)["if"]
-    missing = A_TABLE.antecedent.rule_terms < 0
-    assert missing.any()
-    assert_array_equal(table.isna(), missing)
-    assert list(rules_table(MODELS["scattered on two inputs, order 0, 1 outputs"])["if"]) == [
-        "chip temperature",
-        "rate",
-    ]
-    assert "if" not in rules_table(MODELS["one rule, order 1, 1 outputs"])
-
-
-def test_an_input_called_value_has_a_column_of_its_own():
-    names = ("value", *NAMES[1:])
-    table, other = rules_table(replace(A_GRID, input_names=names)), rules_table(A_GRID)
-    assert list(table["then y"]) == ["value", *names]
-    assert_array_equal(table["then y"], other["then y"])
-    assert_array_equal(table["at"], other["at"])
-
-
-def test_a_pipeline_is_told_in_raw_units(rng):
-    X = pd.DataFrame(
-        rng.uniform([250.0, -1e-3], [330.0, 1e-3], (80, 2)), columns=["kelvin", "rate"]
-    )
-    y = 1e3 + np.sin(X["kelvin"] / 20) + 100 * X["rate"]
-    pipe = make_pipeline(StandardScaler(), ANFISRegressor(n_mfs=[2, 1], agreement=1.0)).fit(X, y)
-    table = rules_table(pipe)
-    scaled = rules_table(pipe[-1])
-    assert_allclose(table["then y", "value"], scaled["then y", "value"], rtol=1e-9)
-    strengths = pipe[-1].model_.strengths(pipe[0].transform(X))
-    centers = strengths.T @ X.to_numpy() / strengths.sum(axis=0)[:, None]
-    assert_allclose(table["at"], centers, rtol=1e-6)
 
 
 @pytest.mark.parametrize("case", FEWEST, ids=[case.label for case in FEWEST])

@@ -1,7 +1,6 @@
 """Pictures of a tree whose shape, values and shares are known."""
 
 import re
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -11,7 +10,7 @@ from sklearn.compose import make_column_transformer
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder
 
-from skanfis.inspection import TreeDisplay, export_text, rules_html
+from skanfis.inspection import TreeDisplay, export_text
 
 from ..export.rule_bases import MODELS, a_tree, build
 from ..quick import quick
@@ -124,18 +123,3 @@ def test_what_cannot_be_drawn_is_refused(rng):
         TreeDisplay.from_estimator(A_TREE, kind="forest")
     with pytest.raises(ValueError, match="'y2' is no output"):
         TreeDisplay.from_estimator(A_TREE, output="y2")
-
-
-def test_text_says_sides_with_the_length_over_which_they_turn():
-    # Of 1,000,360 plus or minus 527.334 as many digits are written as the outputs ask for.
-    path = (
-        "IF time > 1000360 ± 527.334 and > 1000660 ± 263.667 AND chip temperature < 14 ± 26.3667\n"
-    )
-    text = export_text(A_TREE)
-    assert path in text
-    assert "x > c ± h is 1 / (1 + 9^((c - x) / h)) true" in text
-    # They say all: no list repeats them.
-    assert "sigmoid" not in text
-    renamed = replace(A_TREE, term_names=("late", *A_TREE.term_names[1:]))
-    assert "    late: sigmoid_rising, center 1000360, width 240\n" in export_text(renamed)
-    assert "&lt; 14 ± 26" in rules_html(A_TREE)
