@@ -3,22 +3,15 @@
 What only reads a model goes through frozen models of every kind where it is tested.
 """
 
-import pickle
 from functools import cache
 
-import joblib
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, TreeAntecedent
-from skanfis.bounds import FixedPoint, OutputLimits, bounds, gradient_bounds, monotonicity
-from skanfis.exceptions import ForgottenRowsWarning
-from skanfis.export import export_json, fold, read_json
-from skanfis.export.json_reader import parse_json
+from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
 from skanfis.learning import VariableProjection
 from skanfis.membership import Gaussian
 
@@ -75,16 +68,6 @@ class TestAnswers:
         # As many as max_rules allows, and no candidate with more.
         assert 3 < max(one["rules"] for one in compared) <= 5
 
-    def test_deviations_and_coverage(self, kind):
-        estimator = fitted(kind)
-        y, deviation = estimator.predict(X, return_std=True)
-        assert_array_equal(y, estimator.predict(X))
-        within = np.abs(y - Y) < 2.0 * deviation
-        assert 0.85 < within.mean() <= 1.0
-        covered = estimator.coverage(np.array([[0.0, 5.0, 1.0], [40.0, 5.0, 1.0]]))
-        assert covered[0] > 0.9
-        assert covered[1] < 1e-9
-
 
 class TestFits:
     def test_families_are_of_grids_and_scattered_rules(self, kind):
@@ -119,58 +102,8 @@ class TestFits:
         slopes = estimator.model_.coefficients[:, 1:]
         assert_array_equal(np.flatnonzero(slopes.any(axis=(0, 2))), [1])
 
-    @pytest.mark.parametrize("settings", [{"max_iter": 15}, {"solver": "lse"}, {"max_iter": 0}])
-    def test_solvers_and_none(self, kind, settings):
-        estimator = onward(kind, **settings).fit(X, Y)
-        assert_is(estimator, kind)
-        start = fitted(kind)
-        if settings == {"max_iter": 15}:
-            moved = estimator.model_.antecedent.parameters != start.model_.antecedent.parameters
-            assert moved.any()
-        if settings == {"max_iter": 0}:
-            assert_array_equal(estimator.predict(X), start.predict(X))
-
-    def test_early_stopping_groups_and_losses(self, kind):
-        assert_is(searched(kind, early_stopping=True, loss="huber").fit(X, Y), kind)
-        assert_is(searched(kind).fit(X, Y, groups=np.arange(N_ROWS) // 20), kind)
-
-    def test_parts_add_up(self, kind):
-        whole = onward(kind, solver="lse").partial_fit(X, Y)
-        first, second = (pickle.loads(pickle.dumps(whole)) for _ in range(2))
-        first.partial_fit(X[:100], Y[:100])
-        second.partial_fit(X[:100], Y[:100])
-        assert_allclose(first.predict(X), second.predict(X))
-        merged = first.merge(second)
-        assert_is(merged, kind)
-        again = first.partial_fit(X, Y).partial_fit(X[:100], Y[:100])
-        assert_allclose(merged.predict(X), again.predict(X), rtol=1e-6, atol=1e-8)
-        with pytest.warns(ForgottenRowsWarning):
-            assert_is(pickle.loads(pickle.dumps(fitted(kind))).partial_fit(X, Y), kind)
-
-    def test_scaler_is_folded_in(self, kind):
-        pipeline = make_pipeline(StandardScaler(), searched(kind)).fit(X, Y)
-        model = fold(pipeline)
-        assert type(model.antecedent) is KINDS[kind]
-        assert_allclose(model.predict(X)[:, 0], pipeline.predict(X), rtol=1e-9, atol=1e-10)
-        deviation = pipeline.predict(X, return_std=True)[1]
-        assert_allclose(model.standard_deviation(X)[:, 0], deviation, rtol=1e-6)
-
 
 class TestProofs:
-    def test_bounds_hold_and_are_met(self, kind):
-        found = bounds(fitted(kind))
-        rows = np.random.default_rng(0).uniform(X.min(axis=0), X.max(axis=0), (20_000, 3))
-        y = fitted(kind).model_.predict(rows)[:, 0]
-        assert found.converged
-        assert found.lower[0] <= y.min()
-        assert y.max() <= found.upper[0]
-        taken = np.ptp(np.concatenate([y, found.lowest, found.highest]))
-        assert found.upper[0] - found.lower[0] < 1.03 * taken
-        slopes = gradient_bounds(fitted(kind), "x1")
-        steep = fitted(kind).model_.gradient(rows)[:, 1, 0]
-        assert slopes.lower[0] <= steep.min()
-        assert steep.max() <= slopes.upper[0]
-
     @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
     def test_constraints_are_kept(self, kind):
         settings = {"monotonic_cst": {"x1": 1}, "constraints": [FixedPoint([0.5, 5.0, 1.0], 0.7)]}
@@ -181,24 +114,3 @@ class TestProofs:
         top = float(fitted(kind).predict(X).max()) - 0.1
         limited = onward(kind, constraints=[OutputLimits(upper=top)]).fit(X, np.minimum(Y, top))
         assert bounds(limited).upper[0] <= top + 1e-9
-
-
-def test_rules_without_one_can_be_trained_and_written(kind):
-    left = fitted(kind).without_rules([1])
-    again = ANFISRegressor(**GIVEN | {"partition": left}).fit(X, Y)
-    assert again.score(X, Y) > 0.7
-    for model in (left, again.model_):
-        read = parse_json(export_json(model))
-        assert type(read.antecedent) is type(model.antecedent)
-        assert_array_equal(read.predict(X), model.predict(X))
-
-
-def test_json_and_pickles(kind, tmp_path):
-    estimator = fitted(kind)
-    export_json(estimator, tmp_path / "model.json", posterior=True)
-    read = read_json(tmp_path / "model.json")
-    assert type(read.antecedent) is KINDS[kind]
-    assert_array_equal(read.predict(X), estimator.model_.predict(X))
-    assert_array_equal(read.standard_deviation(X), estimator.model_.standard_deviation(X))
-    joblib.dump(estimator, tmp_path / "model.joblib")
-    assert_array_equal(joblib.load(tmp_path / "model.joblib").predict(X), estimator.predict(X))

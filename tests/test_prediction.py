@@ -7,10 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.base import BaseEstimator, TransformerMixin, clone
-from sklearn.decomposition import PCA
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
+from sklearn.base import clone
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import OutOfBoundsWarning
@@ -94,24 +91,6 @@ def test_line_is_followed_for_as_many_deviations_as_the_target_has_of_the_noise(
         held = min(expected[0, 0], y.max() + limit * y.std())
         found = model.predict(edge[None] + way * X.std(axis=0))
         assert_allclose(found, held, rtol=1e-6)
-
-
-class Shifted(TransformerMixin, BaseEstimator):
-    """A transformer that is not told how many columns it has."""
-
-    def fit(self, X, y=None):
-        return self
-
-    def transform(self, X):
-        return np.asarray(X) + 1.0
-
-
-@pytest.mark.parametrize("front", [Shifted(), StandardScaler(), PCA(2)], ids=str)
-def test_pipeline_warns_of_rows_out_of_bounds(front):
-    pipeline = make_pipeline(front, quick(2)).fit(FRAME, Y)
-    with pytest.warns(OutOfBoundsWarning, match=r"'x[01]' in \d of 4 rows"):
-        found = pipeline.predict(OUTSIDE)
-    assert np.isfinite(found).all()
 
 
 def test_policy_may_be_changed_after_training(trained):

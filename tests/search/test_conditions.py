@@ -68,18 +68,3 @@ def test_the_condition_that_a_rule_does_not_have_goes(rng):
     found = conditions.with_fewer_conditions(tuned, FREE)
     assert_array_equal(found.evaluation.antecedent.table, [[0, -1], [1, 2], [3, 4]])
     assert found.expected_error < 1.02 * tuned.expected_error
-
-
-def test_every_rule_keeps_a_condition_and_the_evidence_rises(rng):
-    tuned = tuned_rules(rng)
-    # Of noise no condition is worth anything.
-    noise = rng.normal(size=tuned.problem.rows.y.shape)
-    rows = StandardisedData.of(tuned.problem.rows.X, noise)
-    problem = SeparableProblem(rows, tuned.problem.antecedent, tuned.penalty)
-    premise = Premise.of(problem.antecedent, *rows.inputs.box)
-    tuned = tuning.tune(problem, premise, FREE, 200.0, turns=1)
-    found = conditions.with_fewer_conditions(tuned, FREE)
-    assert found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
-    assert_array_equal((found.evaluation.antecedent.table >= 0).sum(axis=1), 1)
-    moved = Premise.of(found.problem.antecedent, *rows.inputs.box).parameters(found.displacement)
-    assert_allclose(moved, found.evaluation.antecedent.parameters)

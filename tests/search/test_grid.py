@@ -62,14 +62,6 @@ class TestSpacing:
         expected = np.interp(np.linspace(0.0, 31.0, 4), levels, values)
         assert_allclose(places(rows, 4), expected, rtol=1e-9, atol=1e-9)
 
-    def test_density_of_terms_is_that_of_the_optimal_quantiser(self):
-        # Of exponential inputs f^(1/3) is exponential with a third of the rate.
-        share = (np.arange(20_000) + 0.5) / 20_000
-        rows = rows_of(-np.log1p(-share))
-        edges = 1.0 - np.cbrt(1.0 - np.array([_EDGE, 1.0 - _EDGE]))
-        expected = -3.0 * np.log1p(-np.linspace(*edges, 5))
-        assert_allclose(places(rows, 5), expected, rtol=1e-2)
-
     def test_a_single_far_row_draws_no_term_to_it(self, rng):
         x = np.append(rng.uniform(size=500), 1000.0)
         assert places(rows_of(x), 3)[-1] < 1.0

@@ -1,11 +1,8 @@
 """Structure by itself: what the search finds, what it says of it, and that nothing else matters."""
 
-from functools import cache
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from sklearn.base import clone
 from sklearn.linear_model import LinearRegression
 
@@ -44,20 +41,6 @@ def test_linear_truth_gets_next_to_a_linear_model(rng):
     assert np.sqrt(np.mean(error**2)) < 2.5 * 0.01
 
 
-def test_noise_alone_gets_a_single_rule(rng):
-    """Nine times of ten (``benchmarks structure``, 94 of 100); here four of five at least."""
-    draws = [(inputs(rng, 150, 8), rng.standard_normal(150)) for _ in range(5)]
-    assert sum(ANFISRegressor().fit(*draw).n_rules_ == 1 for draw in draws) >= 4
-
-
-def test_constant_consequents_get_terms_where_linear_ones_need_none(rng):
-    X = inputs(rng, n_inputs=1)
-    y = X[:, 0] + 0.05 * rng.standard_normal(400)
-    linear = ANFISRegressor().fit(X, y).n_rules_
-    assert linear <= 2
-    assert ANFISRegressor(order=0).fit(X, y).n_rules_ > linear
-
-
 def test_expected_error_is_that_on_new_rows(rng):
     def surface(n):
         X = inputs(rng, n)
@@ -90,45 +73,6 @@ def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
     ]
     assert errors[0] < 0.03
     assert_allclose(errors[0], errors[1], rtol=0.05)
-
-
-def test_of_many_inputs_only_those_that_bend_the_surface_get_terms(rng):
-    X = inputs(rng, 300, 12)
-    y = np.sin(3.0 * X[:, 7]) + np.abs(X[:, 2]) + X[:, [0, 7, 11]] @ [0.3, 0.2, -0.4]
-    model = ANFISRegressor(partition="grid").fit(X, y + 0.05 * rng.standard_normal(300))
-    assert {term["input"] for term in model.memberships_} == {"x2", "x7"}
-
-
-DRAWS = {
-    "lognormal": lambda g, shape: g.lognormal(size=shape),
-    "clusters": lambda g, shape: (
-        g.choice([-4.0, 0.0, 3.0], size=shape) + 0.2 * g.standard_normal(shape)
-    ),
-    "integers": lambda g, shape: g.integers(0, 5, size=shape).astype(float),
-}
-
-
-@pytest.mark.parametrize("draw", DRAWS)
-def test_terms_of_a_grid_mean_something(rng, draw):
-    X = DRAWS[draw](rng, (300, 3))
-    scale = X.std(axis=0)
-    y = np.tanh(2.0 * X[:, 0] / scale[0]) + 0.5 * np.sin(2.0 * X[:, 1] / scale[1])
-    y += 0.1 * rng.standard_normal(300)
-    model = ANFISRegressor(partition="grid").fit(X, y)
-    terms = model.memberships_
-    assert len(terms) > 1
-    for j in range(3):
-        own = [term for term in terms if term["input"] == f"x{j}"]
-        own.sort(key=lambda term: term["center"])
-        truth = [gaussian(X[:, j], term).max() for term in own]
-        assert all(t > 0.5 for t in truth)
-        for left, right in pairwise(own):
-            axis = np.linspace(left["center"], right["center"], 501)
-            assert np.minimum(gaussian(axis, left), gaussian(axis, right)).max() < 0.9
-
-
-def gaussian(x, term):
-    return np.exp(-0.5 * ((x - term["center"]) / term["width"]) ** 2)
 
 
 @pytest.mark.parametrize("n_rows", [2, 3, 40])
@@ -172,26 +116,6 @@ def test_runs_that_differ_by_chance_are_not_modelled_where_they_are_given():
     for model, least, most in ((grouped, 0.5, 1.5), (alone, 0.0, 0.5)):
         error = np.sqrt(np.mean((model.predict(X_new) - y_new) ** 2)) / y.std()
         assert least * error <= chosen(model)["expected_error"] < most * error
-
-
-def test_groups_may_have_names_and_a_single_one_says_nothing():
-    X, y, run = runs(4, 20)
-    grid = ANFISRegressor(partition="grid", max_rules=4)
-    names = list(np.array(["a", "b", "c", "d"])[run])
-    by_number, by_name, one, none = (
-        clone(grid).fit(X, y, groups=groups) for groups in (run, names, 0 * run, None)
-    )
-    assert_array_equal(by_name.predict(X), by_number.predict(X))
-    assert_array_equal(one.predict(X), none.predict(X))
-    assert by_name.structures_[0]["expected_error"] != none.structures_[0]["expected_error"]
-
-
-def test_without_iterations_the_terms_of_a_searched_structure_stay_at_their_start(rng):
-    X = inputs(rng, 100)
-    y = np.sin(3.0 * X[:, 0]) + 0.1 * rng.standard_normal(100)
-    model = ANFISRegressor(partition="grid", max_iter=0).fit(X, y)
-    assert model.n_rules_ > 1
-    assert model.memberships_ == model.initial_memberships_
 
 
 @pytest.mark.parametrize(
@@ -346,51 +270,3 @@ def test_a_parabola_is_not_told_by_rules_of_one_slope(seed):
     strongest = alone[model.apply(x), np.arange(150)]
     # Else 1.2.
     assert np.std(strongest - model.predict(x)) < 0.7 * np.std(x[:, 0] ** 2)
-
-
-# ------------------------------------------------------------------------------------ nothing else
-
-
-@cache
-def plain_fit(partition):
-    X, y = bumps(np.random.default_rng(0))
-    return X, y, ANFISRegressor(partition=partition, max_rules=4).fit(X, y)
-
-
-@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
-@pytest.mark.parametrize("partition", ["grid", "scattered"])
-def test_the_same_model_whatever_form_the_rows_have(partition):
-    """In other units, the other way round, columns in another order, a constant one among them."""
-    X, y, plain = plain_fit(partition)
-    turned = (X * [1e6, 1e-3, 1.0] + [0.0, 1.0, 0.0])[::-1, [2, 0, 1]]
-    X_other, y_other = np.insert(turned, 1, 3.0, axis=1), 1e-3 * y[::-1] + 4.0
-    found = clone(plain).fit(X_other, y_other)
-    assert [o["rules"] for o in found.structures_] == [o["rules"] for o in plain.structures_]
-    predicted = 1e3 * (found.predict(X_other) - 4.0)
-    assert_allclose(predicted, plain.predict(X)[::-1], atol=1e-5 * y.std())
-
-
-@pytest.mark.parametrize("partition", ["grid", "scattered"])
-def test_of_columns_that_are_equal_their_order_says_nothing(partition):
-    X, y, plain = plain_fit(partition)
-    twice = X[:, [0, 0, 1, 2, 2]]
-    turned = twice[:, ::-1].copy()
-    found, other = (clone(plain).fit(columns, y).predict(columns) for columns in (twice, turned))
-    assert_allclose(other, found, atol=1e-5 * y.std())
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_the_share_of_an_outer_term_rises_to_the_end_of_the_axis(seed):
-    """ "High" is a shoulder in what it decides, if not in its own membership."""
-    rng = np.random.default_rng(seed)
-    X = np.column_stack([rng.lognormal(size=400), rng.standard_normal((400, 2))])
-    y = np.log(X[:, 0]) * np.tanh(2.0 * X[:, 1]) + 0.5 * X[:, 2] ** 2
-    model = ANFISRegressor(partition="grid").fit(X, y + 0.1 * rng.standard_normal(400)).model_
-    along = np.linspace(model.minimum, model.maximum, 200).T
-    shares, antecedent = model.antecedent.strengths_and_shares(along)[1], model.antecedent
-    assert antecedent.n_terms >= 4
-    for j in np.unique(antecedent.term_inputs):
-        own = np.flatnonzero(antecedent.term_inputs == j)
-        low, *_, high = own[np.argsort(antecedent.term_places[own])]
-        assert (np.diff(shares[low]) < 1e-3).all()
-        assert (np.diff(shares[high]) > -1e-3).all()

@@ -73,9 +73,3 @@ def test_cuts_are_as_wide_as_half_of_the_leaf_and_crisp_between_two_values(rng):
             spread = np.sqrt(np.cov(z, aweights=w, ddof=0))
             expected = max(0.5 * spread, LEAST_WIDTH)
         assert_allclose(np.exp(split.log_width), expected)
-
-
-def test_an_input_that_is_constant_is_not_split(rng):
-    X = np.column_stack([rng.normal(size=50), np.ones(50)])
-    splits = best_splits(model_of(X, X[:, 0] ** 2), range(2), np.arange(2), 5)
-    assert {split.input for split in splits} == {0}

@@ -8,9 +8,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LinearRegression
 
 from skanfis import ANFISRegressor
-from skanfis.cluster import FuzzyCMeans
 from skanfis.exceptions import OutOfBoundsWarning
-from skanfis.learning import VariableProjection
 from skanfis.options import EarlyStopping, Huber
 from skanfis.training import fit, robust
 
@@ -59,21 +57,6 @@ def test_one_rule_is_the_linear_huber_estimator(epsilon, weighted, monkeypatch):
     expected = [linear.intercept_, *linear.coef_]
     assert_allclose(model.consequents_[0], expected, rtol=1e-6)
     assert_allclose(model.robust_weights_, weights, rtol=1e-5, atol=1e-8)
-
-
-@pytest.mark.parametrize(
-    "settings", [{"max_rules": 6}, {"partition": FuzzyCMeans(6, random_state=0)}]
-)
-def test_outliers_do_little(settings):
-    X, y, truth, is_outlier = with_outliers()
-    error = {}
-    for loss in ("squared_error", "huber"):
-        model = ANFISRegressor(loss=loss, solver=VariableProjection(tol=1e-2), **settings).fit(X, y)
-        error[loss] = np.sqrt(np.mean((model.predict(X) - truth) ** 2))
-    assert error["huber"] < 0.06
-    assert error["huber"] < 0.2 * error["squared_error"]
-    assert model.robust_weights_[is_outlier].max() < 0.1
-    assert np.median(model.robust_weights_[~is_outlier]) == 1.0
 
 
 def test_exact_data_with_a_few_outliers_are_met_exactly():

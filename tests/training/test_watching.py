@@ -8,9 +8,6 @@ import pytest
 import sklearn
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.base import clone
-from sklearn.model_selection import GridSearchCV
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor, regressor
 from skanfis.datasets import make_jang_sinc
@@ -114,23 +111,6 @@ class TestCallbacks:
         with pytest.raises(ValueError, match="NaN"):
             model.fit(np.full((5, 1), np.nan), np.arange(5.0))
         assert seen.torn_down
-
-    def test_those_of_scikit_learn_work_through_searches(self, capsys):
-        from sklearn.callback import ProgressBar, ScoringMonitor
-
-        pytest.importorskip("rich")
-        monitor = ScoringMonitor(scoring="neg_mean_squared_error")
-        inner = quick().set_callbacks(monitor)
-        search = GridSearchCV(
-            make_pipeline(StandardScaler(), inner),
-            {"anfisregressor__n_mfs": [2, 3]},
-            cv=2,
-            n_jobs=1,
-        )
-        search.set_callbacks(ProgressBar())
-        search.fit(X, Y)
-        assert "GridSearchCV" in capsys.readouterr().out
-        assert np.isfinite(search.best_score_)
 
 
 @pytest.mark.parametrize(
