@@ -18,7 +18,6 @@ from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 
 from .memory import traced
-from .quick import quick
 
 NAMES = ["time", "temperature", "rate"]
 N_ROWS = 60
@@ -407,35 +406,6 @@ def test_setting_of_a_word(given, setting, advice):
     # The object may come with it, or be there.
     model.set_params(solver=Hybrid(), solver__step_size=0.5)
     assert model.set_params(solver__step_size=0.25).solver.step_size == 0.25
-
-
-# A second fit that fails
-
-
-@pytest.mark.parametrize(
-    ("second", "targets"),
-    [
-        (FRAME, with_entry(Y, 3, np.nan)),
-        (FRAME.assign(rate=np.nan), Y),
-        (FRAME[["rate", "time", "temperature"]], with_entry(Y, 3, np.nan)),
-        (FRAME[["rate"]].assign(rate=np.nan), Y),
-        (with_entry(X[:, :2], (0, 0), np.nan), Y),
-        (FRAME.rename(columns={"time": "hour"}), Y[:-1]),
-    ],
-    ids=["y", "x", "columns in another order", "one column", "array", "other name"],
-)
-def test_fit_that_fails_leaves_the_model_as_it_was_or_none(second, targets):
-    model = quick().fit(FRAME, Y)
-    before = model.predict(FRAME)
-    with pytest.raises(ValueError, match=r"NaN|inconsistent"):
-        model.fit(second, targets)
-    try:
-        after = model.predict(FRAME)
-    except NotFittedError:
-        return
-    assert_array_equal(after, before)
-    with pytest.raises(ValueError, match="feature names should match"):
-        model.predict(FRAME[["rate", "time", "temperature"]])
 
 
 @pytest.mark.parametrize(
