@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import LinearConstraint, minimize
 
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, TreeAntecedent
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.bounds.certified import training_box
 from skanfis.bounds.construction import RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
@@ -19,16 +19,14 @@ from skanfis.learning.penalty import Penalty
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import TSKModel
 
+from .. import oracles
+
 FREE = (-np.inf, np.inf)
 
 
 def tree(rng, n_inputs):
-    """Cuts of random leaves, of random inputs; two cuts of an input on a path among them."""
-    found = TreeAntecedent.build([], np.empty((2, 0)), [[]])
-    for _ in range(rng.integers(1, 6)):
-        leaf, j = rng.integers(found.n_rules), rng.integers(n_inputs)
-        found = found.split(leaf, j, rng.normal(), np.log(rng.uniform(0.02, 1.0)))
-    return found
+    """With two cuts of an input on a path, or more, among them."""
+    return oracles.random_tree(rng, rng.integers(2, 7), range(n_inputs))
 
 
 def grid(rng, n_inputs):
@@ -91,10 +89,10 @@ def kept(problem, evaluation, order):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_in_order_rises(kind):
-    """300 random models of a kind: rows, and the proof that knows nothing of an order."""
+    """60 random models of a kind: rows, and the proof that knows nothing of an order."""
     rng = np.random.default_rng(5)
     falls = n_proven = n_asked = 0
-    for place in range(300):
+    for place in range(60):
         # One input rises or falls, or two; scattered rules may be in other orders by the other.
         signs, order = np.array([1, -1, 0])[rng.integers(0, 3, 2)], place % 2
         if not signs.all() or kind == "scattered":
