@@ -26,7 +26,6 @@ X = G.uniform(-1.0, 1.0, (N_ROWS, 3)) * [1.0, 10.0, 1.0] + [0.0, 5.0, 0.0]
 X[:, 2] = G.integers(0, 2, N_ROWS)
 Y = np.where(X[:, 0] > 0.2, 0.3 * X[:, 1], 1.0 - 0.1 * X[:, 1]) + X[:, 2] * (X[:, 1] > 5.0)
 Y += 0.05 * G.normal(size=N_ROWS)
-WEIGHT = np.random.default_rng(1).integers(0, 3, N_ROWS)
 
 
 def searched(kind, **settings):
@@ -85,14 +84,6 @@ class TestFits:
         assert_is(estimator, kind)
         assert estimator.predict(X).shape == (N_ROWS, 2)
         assert estimator.model_.order == order
-
-    def test_weight_of_two_is_the_row_twice(self, kind):
-        kept = WEIGHT > 0
-        weighted = searched(kind).fit(X[kept], Y[kept], sample_weight=WEIGHT[kept])
-        repeated = searched(kind).fit(np.repeat(X, WEIGHT, axis=0), np.repeat(Y, WEIGHT))
-        assert_allclose(weighted.predict(X[kept]), repeated.predict(X[kept]), atol=1e-4)
-        errors = [[o["expected_error"] for o in m.structures_] for m in (weighted, repeated)]
-        assert_allclose(errors[1], errors[0], rtol=1e-4)
 
     def test_features_of_both_parts(self, kind):
         settings = {"premise_features": ["x0", "x2"], "consequent_features": [1]}

@@ -186,8 +186,6 @@ def test_without_knowledge_of_data_there_is_no_coverage(rng):
     assert_array_equal(frozen.coverage(around(frozen, rng)), 0.0)
 
 
-# Outputs that are held -------------------------------------------------------------------------
-
 TARGET = TargetRange(np.array([-0.5]), np.array([0.5]), np.array([0.4]))
 
 

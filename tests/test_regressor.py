@@ -57,9 +57,6 @@ def textbook_strengths(estimator, memberships, data):
     return oracles.textbook_strengths(memberships, estimator.rules_, names, data)
 
 
-# ----------------------------------------------------------------------------------- what it learns
-
-
 def planted(data):
     """A known TSK model: two terms per input, four rules."""
     centers, width = np.array([[-1.2, 0.9], [-0.8, 1.1]]), 0.9
@@ -94,15 +91,6 @@ def test_one_rule_is_ridge_regression_of_standardised_data(alpha, weighted):
     assert model.n_rules_ == 1
     assert model.n_iter_ == 1
     assert model.memberships_ == []
-
-
-def test_one_constant_rule_is_the_weighted_mean():
-    weight = np.random.default_rng(0).uniform(0.1, 3.0, len(X))
-    model = ANFISRegressor(n_mfs=1, order=0).fit(X, Y, weight)
-    assert_allclose(model.predict(X), np.average(Y, weights=weight), rtol=1e-13)
-
-
-# ------------------------------------------------------------------ attributes, in the user's units
 
 
 SETTINGS = {
@@ -170,16 +158,10 @@ def test_max_iter_reached_is_said():
     assert "max_iter" in model.status_
 
 
-# ------------------------------------------------------------------------------------------ outputs
-
-
 def test_one_column_of_targets_is_the_vector_in_another_shape():
     flat, column = (quick().fit(X, y) for y in (Y, Y[:, None]))
     assert_array_equal(column.predict(X), flat.predict(X)[:, None])
     assert_array_equal(column.consequents_, flat.consequents_[:, :, None])
-
-
-# ------------------------------------------------------------------------------ the same every time
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
@@ -219,9 +201,6 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     same_bits(models[2], models[None])
 
 
-# ------------------------------------------------------------------------------------ forms of data
-
-
 LIBRARIES = pytest.mark.parametrize("library", ["pandas", "polars"])
 
 
@@ -251,9 +230,6 @@ def test_frame_without_names_that_are_text_is_an_array():
     assert not hasattr(model, "feature_names_in_")
     assert model.memberships_[0]["input"] == "x0"
     assert_array_equal(model.predict(pd.DataFrame(X)), model.predict(X))
-
-
-# -------------------------------------------------------------- parameters and scikit-learn's tools
 
 
 @pytest.mark.parametrize(

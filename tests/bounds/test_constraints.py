@@ -12,7 +12,6 @@ from scipy.optimize import lsq_linear
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
-from skanfis.bounds.fitting import _ConstrainedFit
 from skanfis.exceptions import ConstraintWarning
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
@@ -212,18 +211,6 @@ def test_a_known_input_that_says_nothing_is_not_read():
     free, held = (ANFISRegressor(monotonic_cst=cst).fit(X, y) for cst in (None, [0, 0, 1]))
     assert not held.consequents_[:, 3].any()
     assert held.readability_.reading_cost == free.readability_.reading_cost
-
-
-def test_no_way_back_to_the_free_rules_leaves_a_point(monkeypatch):
-    known = [FixedPoint([0.0, 0.0], 3.0)]
-
-    def regardless_of_points(fit, ordered):
-        return fit.free.normal.coefficients
-
-    monkeypatch.setattr(_ConstrainedFit, "_nearest_at_points", regardless_of_points)
-    with pytest.warns(ConstraintWarning, match="contradict FixedPoint"):
-        held = ANFISRegressor(**QUICK, constraints=known).fit(X, Y)
-    assert_allclose(held.predict([[0.0, 0.0]]), [3.0], atol=1e-9)
 
 
 @pytest.mark.parametrize("policy", ["linear", "clip", LinearExtrapolation(np.inf)])

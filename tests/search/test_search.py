@@ -169,9 +169,6 @@ def test_every_row_is_searched_where_one_group_alone_is_judged(rng):
     assert search.trials.rows.n_rows == 110
 
 
-# ----------------------------------------------------------------------------- what is said of it
-
-
 def bumps(rng, n_rows=100):
     X = inputs(rng, n_rows)
     return X, np.sin(3.0 * X[:, 0]) + X[:, 1] * X[:, 2] + 0.1 * rng.standard_normal(n_rows)

@@ -8,7 +8,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.evidence import FREE
 from skanfis.membership import Gaussian
 from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.judging import dealt_rows
@@ -27,17 +26,14 @@ def plan_of(n_inputs, n_all, weights=(), order=1, max_rules=None):
     return replace(request, weights=dict(weights), n_all=n_all)
 
 
-def trials_of(X, y, n_all=None, **settings):
+def trials_of(X, y, **settings):
     rows = dealt_rows(StandardisedData.of(X, y.reshape(len(X), -1)))
-    return Trials(rows, plan_of(X.shape[1], n_all or float(len(X)), **settings))
+    return Trials(rows, plan_of(X.shape[1], float(len(X)), **settings))
 
 
 def surface(rng, n_rows=300, n_inputs=3):
     X = rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
     return X, np.sin(3.0 * X[:, 0]) + X[:, 0] * X[:, 1] + 0.1 * rng.normal(size=n_rows)
-
-
-NOTHING = dict.fromkeys(FREE, 0.0)  # pays for nothing
 
 
 @pytest.mark.parametrize("order", [0, 1])
@@ -71,20 +67,6 @@ def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order)
     expected = ((answers - rest.y) ** 2).sum(axis=1)
     assert_allclose(trials.squared_errors(tuned, rest, None), expected, rtol=1e-4, atol=1e-6)
     assert way.any()
-
-
-def test_what_parameters_cost_falls_as_the_rows_rise(rng):
-    # A plane through noise alone: the mean square on new rows is the noise's times 1 + k / n, and
-    # k is 3 for all but the pull on the slopes. The fold has 600 rows, all of the fit 8,000.
-    X, y = rng.uniform(-1.0, 1.0, (600, 2)), rng.normal(size=600)
-    trials = trials_of(X, y + X @ [3.0, 2.0], n_all=8000.0)
-    tuned = trials.tuned(trials.one_rule)
-    assert_allclose(tuned.posterior.n_effective, 3.0, atol=0.05)
-    noise = tuned.evaluation.mean_squared_error / (1.0 - 3.0 / 600.0)
-    assert_allclose(tuned.expected_error, noise * (1.0 + 3.0 / 600.0), rtol=3e-3)
-    assert_allclose(trials.expected(tuned), noise * (1.0 + 3.0 / 8000.0), rtol=3e-3)
-    factor = (1.0 + 3.0 / 8000.0) / (1.0 + 3.0 / 600.0)
-    assert_allclose(trials.with_more_rows(tuned), factor, rtol=1e-4)
 
 
 class TestSequences:
