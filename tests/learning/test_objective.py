@@ -194,16 +194,6 @@ def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
         assert_all_close(one, other, 1e-9)
 
 
-def test_reference_coefficients_do_not_change_the_answer(case, rng):
-    plain = case.problem.evaluate(case.point)
-    for size in (0.0, 1.0, 30.0):
-        reference = size * rng.normal(size=plain.coefficients.shape)
-        other = case.problem.evaluate(case.point, reference)
-        # The reference costs the digits by which its own cost exceeds the least.
-        assert_allclose(other.cost, plain.cost, rtol=1e-11 * (1.0 + size**2))
-        assert_all_close(other.coefficients, plain.coefficients, 1e-9 * (1.0 + size))
-
-
 def test_other_weights_of_the_penalty_need_no_pass(case, monkeypatch):
     before = case.problem.evaluate(case.point)
     other = case.problem.with_penalty(Penalty(agreement=0.02, alpha=3e-3, slope=1e-3))

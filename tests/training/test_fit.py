@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from sklearn.base import BaseEstimator, ClusterMixin
-from sklearn.cluster import KMeans
+from sklearn.cluster import AgglomerativeClustering, KMeans
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import UnderdeterminedWarning
@@ -18,25 +17,12 @@ def data(n_rows=120, n_inputs=2):
     return X, np.sin(4.0 * X[:, 0]) + X[:, -1] ** 2
 
 
-class Remembers(ClusterMixin, BaseEstimator):
-    """Two clusters by the sign of the first column; keeps what it was given."""
-
-    seen = ()
-
-    def fit_predict(self, X, y=None):
-        type(self).seen = (*self.seen, np.array(X))
-        return (X[:, 0] > 0).astype(int)
-
-    def fit(self, X, y=None):
-        return self
-
-
-def test_clusterer_without_weights_sees_repeated_rows():
-    Remembers.seen = ()
-    table, weight = np.array([[1.0, 5.0], [-1.0, 6.0], [2.0, 7.0]]), np.array([2.0, 1.0, 3.0])
-    labels = _labels(Remembers(), 0, table, weight)
-    assert_array_equal(labels, [1, 0, 1])
-    assert_array_equal(Remembers.seen[0], table[[0, 0, 1, 2, 2, 2]])
+def test_clusterer_without_weights_sees_repeated_rows(rng):
+    table, times = rng.normal(size=(40, 2)), rng.integers(1, 9, 40)
+    ward = AgglomerativeClustering(3)
+    expected = ward.fit_predict(table.repeat(times, axis=0))[np.cumsum(times) - times]
+    assert_array_equal(_labels(ward, 0, table, times.astype(float)), expected)
+    assert (ward.fit_predict(table) != expected).any()
 
 
 def test_clusterer_that_takes_weights_is_given_them(rng):
