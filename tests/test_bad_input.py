@@ -88,7 +88,10 @@ REFUSED = {
         {"X": FRAME.assign(kind="p", site="q")},
         ["text in column 'kind', first at row 0", "the columns 'site'", "OneHot"],
     ),
-    "text as y": ({"y": np.array(["low", "high"] * 30)}, ["y holds text", "'low'"]),
+    "text as y": (
+        {"y": np.array(["low", "high"] * 30)},
+        ["y holds text", "'low'", "must be a number"],
+    ),
     "text in a series as y": (
         {"y": pd.Series(LO_HI, name="error")},
         ["y holds text in column 'error', first at row 0", "'lo'"],

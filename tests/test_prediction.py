@@ -56,16 +56,11 @@ def with_policy(estimator, policy):
     return clone(estimator).set_params(out_of_bounds=policy).fit(FRAME, Y)
 
 
-def accounts(rng, noise, n_rows=200):
-    """Four long-tailed items, and a total of them."""
-    X = rng.lognormal(sigma=1.0, size=(n_rows, 4))
-    return X, X @ [1.0, 2.0, 0.5, 1.5] + noise * rng.normal(size=n_rows)
-
-
 @pytest.mark.parametrize("noise", [0.0, 0.1, 0.3])
 def test_line_is_followed_for_as_many_deviations_as_the_target_has_of_the_noise(rng, noise):
     """Or as far as the outermost rows tell, where that is farther; accounts that add up, far."""
-    X, y = accounts(rng, noise)
+    X = rng.lognormal(sigma=1.0, size=(200, 4))
+    y = X @ [1.0, 2.0, 0.5, 1.5] + noise * rng.normal(size=200)
     model = ANFISRegressor(n_mfs=1).fit(X, y)
     limit = model.model_.max_extrapolation
     told = model.model_.rows_extrapolation

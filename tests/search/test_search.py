@@ -267,3 +267,30 @@ def test_a_parabola_is_not_told_by_rules_of_one_slope(seed):
     strongest = alone[model.apply(x), np.arange(150)]
     # Else 1.2.
     assert np.std(strongest - model.predict(x)) < 0.7 * np.std(x[:, 0] ** 2)
+
+
+@pytest.mark.parametrize("partition", ["grid", "scattered"])
+def test_of_columns_that_are_equal_their_order_says_nothing(partition, rng):
+    X, y = bumps(rng)
+    twice = X[:, [0, 0, 1, 2, 2]]
+    turned = twice[:, ::-1].copy()
+    model = ANFISRegressor(partition=partition, max_rules=4)
+    found, other = (clone(model).fit(columns, y).predict(columns) for columns in (twice, turned))
+    assert_allclose(other, found, atol=1e-5 * y.std())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_share_of_an_outer_term_rises_to_the_end_of_the_axis(seed):
+    """ "High" is a shoulder in what it decides, if not in its own membership."""
+    rng = np.random.default_rng(seed)
+    X = np.column_stack([rng.lognormal(size=400), rng.standard_normal((400, 2))])
+    y = np.log(X[:, 0]) * np.tanh(2.0 * X[:, 1]) + 0.5 * X[:, 2] ** 2
+    model = ANFISRegressor(partition="grid").fit(X, y + 0.1 * rng.standard_normal(400)).model_
+    along = np.linspace(model.minimum, model.maximum, 200).T
+    shares, antecedent = model.antecedent.strengths_and_shares(along)[1], model.antecedent
+    assert antecedent.n_terms >= 4
+    for j in np.unique(antecedent.term_inputs):
+        own = np.flatnonzero(antecedent.term_inputs == j)
+        low, *_, high = own[np.argsort(antecedent.term_places[own])]
+        assert (np.diff(shares[low]) < 1e-3).all()
+        assert (np.diff(shares[high]) > -1e-3).all()
