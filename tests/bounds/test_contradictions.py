@@ -1,4 +1,4 @@
-"""What data say against a constraint: against a t statistic, on shapes, and on what is true."""
+"""What data say against a constraint: against a t statistic, and on what is true."""
 
 import numpy as np
 import pytest

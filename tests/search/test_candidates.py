@@ -1,4 +1,4 @@
-"""Kinds of rule bases as sequences, and which input the residual of a model asks terms for."""
+"""Which input the residual of a model asks terms for."""
 
 from itertools import product
 

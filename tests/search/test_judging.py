@@ -1,4 +1,4 @@
-"""Which rows judge, and that nothing but what they say decides on it."""
+"""Which rows judge."""
 
 import numpy as np
 import pytest

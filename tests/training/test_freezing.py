@@ -1,4 +1,4 @@
-"""How far the tangent is followed: against the definition row by row, and on planted functions."""
+"""How far the tangent is followed: against the definition row by row."""
 
 from dataclasses import replace
 
