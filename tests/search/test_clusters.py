@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
-from skanfis.membership import Gaussian
+from skanfis.membership import Bell, Gaussian
 from skanfis.search.clusters import clustered_antecedent
 
 
@@ -79,3 +79,8 @@ class TestRules:
         model = ANFISRegressor(partition=KMeans(2, random_state=0)).fit(np.ones((100, 2)), y)
         assert model.n_rules_ == 1
         assert_allclose(model.predict(np.ones((1, 2))), 0.5)
+
+    def test_of_several_families_each_rule_has_terms_of_its_own(self, rng):
+        rows = StandardisedData.of(*blobs(rng))
+        mixed = clustered_antecedent([Gaussian, Bell], rows, by_k_means, np.arange(2))
+        assert_array_equal(mixed.rule_terms, [[0, 3], [1, 4], [2, 5]])
