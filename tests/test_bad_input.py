@@ -18,7 +18,6 @@ from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 
 from .memory import traced
-from .quick import quick
 
 NAMES = ["time", "temperature", "rate"]
 N_ROWS = 60
@@ -82,17 +81,17 @@ NAN_IN_Y1 = with_entry(np.column_stack([Y, Y]), (4, 1), np.nan)
 REFUSED = {
     "nullable": ({"X": FRAME.assign(n=COUNTS)}, ["NaN", "'n'", "row 2", "20 of its 60"]),
     "NaN in y": ({"y": with_entry(Y, 3, np.nan)}, ["Input y contains NaN", "row 3", "1 of its 60"]),
-    "infinite y": ({"y": with_entry(Y, 3, -np.inf)}, ["Input y contains infinity", "row 3"]),
     "second y": ({"y": NAN_IN_Y1}, ["Input y contains NaN", "'y1'", "row 4"]),
-    "complex X": ({"X": X + 1j}, ["Complex data not supported"]),
     "complex y": ({"y": Y + 1j}, ["Complex data not supported"]),
     "text": ({"X": FRAME.assign(rate="warm")}, ["could not convert string to float", "'warm'"]),
     "columns of text": (
         {"X": FRAME.assign(kind="p", site="q")},
         ["text in column 'kind', first at row 0", "the columns 'site'", "OneHot"],
     ),
-    "text as y": ({"y": np.array(["low", "high"] * 30)}, ["y holds text", "'low'"]),
-    "text in a list as y": ({"y": LO_HI}, ["y holds text, first at row 0", "must be a number"]),
+    "text as y": (
+        {"y": np.array(["low", "high"] * 30)},
+        ["y holds text", "'low'", "must be a number"],
+    ),
     "text in a series as y": (
         {"y": pd.Series(LO_HI, name="error")},
         ["y holds text in column 'error', first at row 0", "'lo'"],
@@ -104,13 +103,8 @@ REFUSED = {
         {"y": pd.DataFrame(np.ones((N_ROWS, 2)), columns=["e", "e"])},
         ["y has 2 columns of the name 'e'"],
     ),
-    "no rows": ({"X": X[:0], "y": Y[:0]}, ["0 sample(s)", "minimum of 2", "ANFISRegressor"]),
     "one row": ({"X": X[:1], "y": Y[:1]}, ["1 sample(s)", "minimum of 2", "ANFISRegressor"]),
-    "no columns": ({"X": X[:, :0]}, ["0 feature(s)", "minimum of 1", "ANFISRegressor"]),
-    "1D": ({"X": X[:, 0]}, ["Expected 2D array, got 1D array", "reshape(-1, 1)"]),
-    "3D": ({"X": X[None]}, ["Found array with dim 3", "ANFISRegressor"]),
     "3D y": ({"y": Y[:, None, None]}, ["Found array with dim 3", "ANFISRegressor"]),
-    "no y": ({"y": None}, ["requires y to be passed"]),
     "lengths": ({"y": Y[:-1]}, ["inconsistent numbers of samples", "60", "59"]),
     "other groups": ({"groups": [1, 2]}, ["groups has 2 entries for 60 rows", "every row"]),
     "kinds of groups": ({"groups": [1, "a"] * 30}, ["groups holds int and str", "text alone"]),
@@ -132,7 +126,6 @@ REFUSED = {
         ["sample_weight leaves 1 of 60 rows", "at least 2"],
     ),
     "NaN weight": ({"sample_weight": with_entry(ONES, 4, np.nan)}, ["sample_weight contains NaN"]),
-    "inf weight": ({"sample_weight": with_entry(ONES, 4, np.inf)}, ["sample_weight contains inf"]),
     "other weights": ({"sample_weight": ONES[:-1]}, ["sample_weight.shape == (59,)", "(60,)"]),
     "text as weights": (
         {"sample_weight": LO_HI},
@@ -169,7 +162,6 @@ TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "Drop the colum
         (pd.Series([[1]] * N_ROWS), ["holds a list in column 'rate', first at row 0"]),
         (TIMES, ["X holds times in column 'rate' (datetime64", "number of seconds"]),
         (TIMES.tz_localize("UTC"), ["X holds times in column 'rate' (datetime64", "UTC"]),
-        (TIMES - TIMES[0], ["X holds times in column 'rate' (timedelta64"]),
         (TIMES.to_period(), ["X holds times in column 'rate' (period"]),
         (TIMES.date.astype(object), ["a date in column 'rate', first at row 0", "of seconds"]),
         (pd.Categorical(TIMES), ["X holds times in column 'rate' (datetime64", "of seconds"]),
@@ -263,12 +255,6 @@ def test_before_fit(name):
     assert hasattr(ANFISRegressor(), name) is (name in METHODS)
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_wrong_number_of_columns_after_training(method):
-    with refused(ValueError, "X has 2 features", "expecting 3 features"):
-        getattr(line(), method)(X[:, :2])
-
-
 # ----------------------------------------------------------------------------- data without content
 
 
@@ -322,13 +308,6 @@ def test_rows_that_are_all_the_same_give_the_mean(settings, order):
     assert_allclose(model.predict(X[:1]), Y.mean(), rtol=1e-12)
 
 
-@pytest.mark.parametrize("settings", [{}, {"n_mfs": 2}, {"partition": KMEANS}])
-def test_constant_target_is_predicted_everywhere(settings):
-    model = ANFISRegressor(**settings).fit(X, np.full(N_ROWS, 7.1))
-    # Strengths sum to one but for rounding.
-    assert_allclose(model.predict(2.0 * X - X.mean(axis=0)), 7.1, rtol=1e-14)
-
-
 # -------------------------------------------------------------------------------------------- n_mfs
 
 COUNT = "must be 'auto', a whole number, or one whole number per input"
@@ -338,20 +317,16 @@ COUNT = "must be 'auto', a whole number, or one whole number per input"
     ("n_mfs", "error", "said"),
     [
         ([2, 2], ValueError, ["has 2 entries", "3 columns (time, temperature, rate)"]),
-        (np.array([3]), ValueError, ["has 1 entries", "3 columns"]),
         ([], ValueError, ["has 0 entries", "3 columns"]),
         (0, ValueError, ["n_mfs=0 must be 1 or more", "1 means"]),
         ([2, 2, -3], ValueError, ["n_mfs=[2, 2, -3] must be 1 or more", "1 means"]),
         (True, TypeError, [COUNT]),
         (np.array(2), TypeError, [COUNT]),
         ([[2, 2, 2]], TypeError, [COUNT]),
-        ({"time": 2}, TypeError, [COUNT]),
         ([2, 2.5, 2], TypeError, ["n_mfs=[2, 2.5, 2]", "whole numbers only"]),
-        (["2", 2, 2], TypeError, ["whole numbers only"]),
         ([None, 2, 2], TypeError, ["whole numbers only"]),
         (np.array([True, True, True]), TypeError, ["whole numbers only"]),
         ("3", ValueError, ["'n_mfs' parameter of ANFISRegressor", "'auto'", "Got '3'"]),
-        (2.0, ValueError, ["'n_mfs' parameter", "'auto'", "Got 2.0"]),
         (None, ValueError, ["'n_mfs' parameter", "'auto'", "Got None"]),
     ],
     ids=repr,
@@ -375,7 +350,6 @@ LIMIT = "limit is 1,024 MiB (sklearn.set_config(working_memory"
         ),
         (10, {"n_mfs": [9] * 10}, ["on 10 inputs", "3,486,784,401 rules", "10^15 MiB"]),
         (8, {"n_mfs": 3}, ["6,561 rules with 59,049", LIMIT, "n_mfs=2 makes 256 rules"]),
-        (40, {"n_mfs": 2}, ["n_mfs=2 on 40", "1,099,511,627,776 rules", "10^15 MiB"]),
         (400, {"n_mfs": 3}, ["n_mfs=3 on 400 inputs", "10^15 MiB"]),
         (1, {"n_mfs": 10**9}, ["1,000,000,000 rules", "10^15 MiB"]),
     ],
@@ -395,20 +369,16 @@ def test_more_rules_than_memory(n_inputs, settings, said, rng):
     ("parameter", "value", "allowed"),
     [
         ("mf", "triangel", "'gaussian'"),
-        ("mf", None, "'gaussian'"),
         ("solver", "adam", "'varpro'"),
         ("partition", "forest", "'grid'"),
         ("partition", 3, "'fit_predict'"),
         ("out_of_bounds", "wrap", "'clip'"),
         ("order", 2, "[0, 1]"),
-        ("order", -1, "[0, 1]"),
         ("alpha", -1e-9, "[0.0, inf)"),
-        ("alpha", np.nan, "[0.0, inf)"),
         ("alpha", "large", "'auto'"),
         ("loss", "absolute", "'huber'"),
         ("early_stopping", 0.1, "'skanfis.options.EarlyStopping'"),
         ("max_iter", -1, "[0, inf)"),
-        ("max_iter", 2.5, "[0, inf)"),
         ("random_state", "lucky", "RandomState"),
         ("n_jobs", 1.5, "'int'"),
     ],
@@ -419,11 +389,6 @@ def test_parameter_of_the_wrong_type_or_range(parameter, value, allowed):
         estimator.fit(X, Y)
     assert allowed in str(refusal.value)
     assert f"Got {value!r} instead" in str(refusal.value)
-
-
-def test_unknown_parameter():
-    with refused(ValueError, "Invalid parameter 'mfs'", "n_mfs"):
-        ANFISRegressor().set_params(mfs=3)
 
 
 @pytest.mark.parametrize(
@@ -446,40 +411,10 @@ def test_setting_of_a_word(given, setting, advice):
     assert model.set_params(solver__step_size=0.25).solver.step_size == 0.25
 
 
-# A second fit that fails
-
-
-@pytest.mark.parametrize(
-    ("second", "targets"),
-    [
-        (FRAME, with_entry(Y, 3, np.nan)),
-        (FRAME.assign(rate=np.nan), Y),
-        (FRAME[["rate", "time", "temperature"]], with_entry(Y, 3, np.nan)),
-        (FRAME[["rate"]].assign(rate=np.nan), Y),
-        (with_entry(X[:, :2], (0, 0), np.nan), Y),
-        (FRAME.rename(columns={"time": "hour"}), Y[:-1]),
-    ],
-    ids=["y", "x", "columns in another order", "one column", "array", "other name"],
-)
-def test_fit_that_fails_leaves_the_model_as_it_was_or_none(second, targets):
-    model = quick().fit(FRAME, Y)
-    before = model.predict(FRAME)
-    with pytest.raises(ValueError, match=r"NaN|inconsistent"):
-        model.fit(second, targets)
-    try:
-        after = model.predict(FRAME)
-    except NotFittedError:
-        return
-    assert_array_equal(after, before)
-    with pytest.raises(ValueError, match="feature names should match"):
-        model.predict(FRAME[["rate", "time", "temperature"]])
-
-
 @pytest.mark.parametrize(
     ("parameter", "option", "wrong"),
     [
         ("solver", VariableProjection(tol=-1e-4), "tol"),
-        ("solver", VariableProjection(tol=np.nan), "tol"),
         ("solver", Hybrid(stiffness=-0.1), "stiffness"),
         ("solver", Hybrid(step_size=0.0), "step_size"),
         ("solver", GradientDescent(error_goal=-1.0), "error_goal"),

@@ -182,14 +182,6 @@ def test_whole_weights_are_repeated_rows_in_any_order(case):
     assert np.abs(weighted.predict(case.X) - case.predictions).max() > 1e-5 * case.span
 
 
-def test_common_factor_of_the_weights_where_nothing_is_found_by_the_evidence(case):
-    weight = np.random.default_rng(3).uniform(0.5, 2.0, len(case.y))
-    one, other = (case.fit(case.X, case.y, factor * weight, **GIVEN) for factor in (1.0, 1e-3))
-    difference = one.predict(case.X) - other.predict(case.X)
-    assert np.abs(difference).max() < TOLERANCE * case.span
-    assert_allclose(one.coverage(case.X), other.coverage(case.X), atol=1e-4)
-
-
 def test_row_without_weight_is_absent(case):
     # Far out in every input and in the target: range, mean, deviation and clusters would show it.
     outlier = case.X.max(axis=0) + 50.0 * np.ptp(case.X, axis=0)

@@ -186,8 +186,6 @@ def test_without_knowledge_of_data_there_is_no_coverage(rng):
     assert_array_equal(frozen.coverage(around(frozen, rng)), 0.0)
 
 
-# Outputs that are held -------------------------------------------------------------------------
-
 TARGET = TargetRange(np.array([-0.5]), np.array([0.5]), np.array([0.4]))
 
 
@@ -201,18 +199,6 @@ def test_outputs_are_held_beside_the_range_of_the_target(policy, limit):
     assert (said < low).any()
     assert (said > high).any()
     assert_array_equal(answer, np.clip(said, low, high))
-
-
-def test_no_row_however_far_is_answered_beyond_the_limits(rng):
-    X, weight = rng.standard_t(1.5, (200, 3)), rng.integers(0, 3, 200)
-    y = np.sin(X[:, 0]) + 0.1 * rng.standard_normal(200)
-    estimator = ANFISRegressor(3).fit(X, y, sample_weight=weight)
-    own = y[weight > 0]
-    limits = [own.min() - 0.25 * np.ptp(own), own.max() + 0.25 * np.ptp(own)]
-    assert_allclose(estimator.model_.output_limits[:, 0], limits, rtol=1e-12)
-    anywhere = estimator.model_.predict(rng.standard_t(0.5, (2000, 3)))
-    assert anywhere.min() >= limits[0]
-    assert anywhere.max() <= limits[1]
 
 
 class TestAsRuleTable:

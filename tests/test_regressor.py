@@ -1,6 +1,5 @@
 """ANFISRegressor as a user meets it: what it learns, what it says, and the tools it works with."""
 
-import pickle
 import threading
 from dataclasses import replace
 
@@ -13,8 +12,6 @@ from sklearn.base import clone
 from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
-from sklearn.metrics import get_scorer
-from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
@@ -60,9 +57,6 @@ def textbook_strengths(estimator, memberships, data):
     return oracles.textbook_strengths(memberships, estimator.rules_, names, data)
 
 
-# ----------------------------------------------------------------------------------- what it learns
-
-
 def planted(data):
     """A known TSK model: two terms per input, four rules."""
     centers, width = np.array([[-1.2, 0.9], [-0.8, 1.1]]), 0.9
@@ -82,24 +76,6 @@ def test_planted_model_is_found(rng):
     assert_allclose(model.predict(check), truth, rtol=0, atol=1e-6 * np.ptp(truth))
 
 
-@pytest.mark.theory
-@pytest.mark.parametrize(
-    ("settings", "most"),
-    [
-        ({"max_rules": 5}, 0.02),
-        ({"n_mfs": 2, "mf": "bell"}, 0.02),
-        ({"n_mfs": 3, "order": 0}, 0.05),
-        # Four clusters of rows without gaps between them share most of their terms.
-        ({"partition": KMEANS, "mf": "bell"}, 0.2),
-    ],
-)
-def test_surface_is_learnt_between_the_points(settings, most):
-    train, check = surface(150), surface(500, seed=1)
-    model = ANFISRegressor(**settings).fit(*train)
-    # Of the target's deviation; a linear model leaves 0.4.
-    assert np.sqrt(1 - model.score(*check)) < most
-
-
 @pytest.mark.parametrize("alpha", [1e-12, 1e-6, 1e-2, 1.0])
 @pytest.mark.parametrize("weighted", [False, True])
 def test_one_rule_is_ridge_regression_of_standardised_data(alpha, weighted):
@@ -115,15 +91,6 @@ def test_one_rule_is_ridge_regression_of_standardised_data(alpha, weighted):
     assert model.n_rules_ == 1
     assert model.n_iter_ == 1
     assert model.memberships_ == []
-
-
-def test_one_constant_rule_is_the_weighted_mean():
-    weight = np.random.default_rng(0).uniform(0.1, 3.0, len(X))
-    model = ANFISRegressor(n_mfs=1, order=0).fit(X, Y, weight)
-    assert_allclose(model.predict(X), np.average(Y, weights=weight), rtol=1e-13)
-
-
-# ------------------------------------------------------------------ attributes, in the user's units
 
 
 SETTINGS = {
@@ -191,9 +158,6 @@ def test_max_iter_reached_is_said():
     assert "max_iter" in model.status_
 
 
-# ------------------------------------------------------------------------------------------ outputs
-
-
 def test_one_column_of_targets_is_the_vector_in_another_shape():
     flat, column = (quick().fit(X, y) for y in (Y, Y[:, None]))
     assert_array_equal(column.predict(X), flat.predict(X)[:, None])
@@ -212,9 +176,6 @@ def test_outputs_share_the_premises_and_have_their_own_consequents():
     assert np.abs(error).max() < 1e-6
     for found in (model, quick().fit(X, targets)):
         assert_allclose(found.predict(X)[:, 1], -5e6 * found.predict(X)[:, 0] + 1.0, rtol=1e-9)
-
-
-# ------------------------------------------------------------------------------ the same every time
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
@@ -254,41 +215,6 @@ def test_number_of_workers_changes_no_bit(monkeypatch, settings):
     same_bits(models[2], models[None])
 
 
-def test_pickled_model_is_the_same_to_the_last_bit_and_small():
-    model = quick(3).fit(X, Y)
-    pickled = pickle.dumps(model)
-    same_bits(pickle.loads(pickled), model)
-    # Most of it is the posterior that standard deviations need.
-    assert model.n_rules_ == 27
-    assert len(pickled) < 90_000
-
-
-# ------------------------------------------------------------------------------------ forms of data
-
-
-def test_whole_numbers_lists_and_order_of_memory():
-    whole = np.round(X).astype(np.int32)
-    expected = quick().fit(whole.astype(float), Y)
-    by_column = np.asfortranarray(whole, dtype=float)
-    for data in (whole, whole.tolist(), by_column, whole.astype(object)):
-        model = quick().fit(data, Y.tolist())
-        # Sums run along the memory: equal but for rounding.
-        assert_allclose(model.predict(data), expected.predict(whole), rtol=0, atol=1e-10)
-
-
-@pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_memory_map_is_as_good_as_memory(tmp_path, dtype):
-    data = X.astype(dtype)
-    np.save(tmp_path / "X.npy", data)
-    np.save(tmp_path / "y.npy", Y)
-    mapped, target = (np.load(tmp_path / f"{name}.npy", mmap_mode="r") for name in "Xy")
-    model, expected = (quick().fit(*both) for both in ((mapped, target), (data, Y)))
-    same_bits(model, expected, data)
-    # Single precision is trained in double.
-    assert_array_equal(model.predict(mapped), expected.predict(data))
-    assert model.predict(mapped).dtype == np.float64
-
-
 LIBRARIES = pytest.mark.parametrize("library", ["pandas", "polars"])
 
 
@@ -320,9 +246,6 @@ def test_frame_without_names_that_are_text_is_an_array():
     assert_array_equal(model.predict(pd.DataFrame(X)), model.predict(X))
 
 
-# -------------------------------------------------------------- parameters and scikit-learn's tools
-
-
 @pytest.mark.parametrize(
     "n_mfs", [2, np.int64(2), [2, 2, 2], (2, 2, 2), np.array([2, 2, 2]), pd.Series([2, 2, 2])]
 )
@@ -343,31 +266,3 @@ def test_representations_show_what_was_changed_and_the_rules():
     assert rules[:40] not in model._repr_html_()
     with config_context(display="text"):
         assert list(fitted._repr_mimebundle_()) == ["text/plain"]
-
-
-def test_weights_are_routed_through_pipeline_and_search():
-    weight = np.random.default_rng(0).uniform(size=len(X)) ** 4
-    noisy = Y + 0.01 * np.random.default_rng(1).normal(size=len(X))
-    with config_context(enable_metadata_routing=True):
-        inner = quick()
-        inner.set_fit_request(sample_weight=True).set_score_request(sample_weight=True)
-        scaler = StandardScaler().set_fit_request(sample_weight=False)
-        search = GridSearchCV(
-            make_pipeline(scaler, inner),
-            {"anfisregressor__n_mfs": [1, 2]},
-            # Without it, the search of scikit-learn 1.6 does not ask the pipeline's last step.
-            scoring=get_scorer("r2").set_score_request(sample_weight=True),
-            cv=2,
-        ).fit(X, noisy, sample_weight=weight)
-        found = search.predict(X)
-    scaled = StandardScaler().fit_transform(X)
-    best = ANFISRegressor(**search.best_estimator_[-1].get_params(deep=False))
-    assert_array_equal(found, best.fit(scaled, noisy, weight).predict(scaled))
-    assert np.abs(found - best.fit(scaled, noisy).predict(scaled)).max() > 1e-3 * np.ptp(Y)
-    half = len(X) // 2
-    expected = []
-    for train, check in ((slice(half, None), slice(half)), (slice(half), slice(half, None))):
-        scaler = StandardScaler().fit(X[train])
-        best.fit(scaler.transform(X[train]), noisy[train], weight[train])
-        expected.append(best.score(scaler.transform(X[check]), noisy[check], weight[check]))
-    assert_allclose(search.best_score_, np.mean(expected), rtol=1e-12)

@@ -20,16 +20,6 @@ def test_results_come_in_order_whoever_is_done_first(n_jobs):
     assert found == [k**2 for k in range(20)]
 
 
-def test_error_of_a_worker_reaches_the_caller():
-    def fails_at_five(k):
-        if k == 5:
-            raise FloatingPointError("five")
-        return k
-
-    with pytest.raises(FloatingPointError, match="five"):
-        list(map_in_threads(2)(fails_at_five, list(range(10))))
-
-
 def blas_threads():
     return [pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"]
 

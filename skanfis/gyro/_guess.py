@@ -15,6 +15,7 @@ from .errors import LogError
 
 _SAMPLE_ROWS = 100_000
 _HEAT = "temp temperature temperatur température tmp therm thermistor ntc rtd celsius 温度"
+_WARM = f"{_HEAT} chamber oven"
 _RATE = "rate omega w angular velocity speed drehrate"
 _OUTPUT = (
     "gyro gyr gyroscope fog output out signal raw counts count adc measured meas indicated sensor "
@@ -37,7 +38,7 @@ _WORDS = {
         -3.5: "start set setpoint target chamber oven ambient amb room min max board",
     },
     "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} {_WISH} {_HEAT}"},
-    "rate": {6.0: f"{_TRUTH} ist actual", 5.0: _WISH, 2.0: _RATE, -4.5: _OUTPUT, -99.0: _HEAT},
+    "rate": {6.0: f"{_TRUTH} ist actual", 5.0: _WISH, 2.0: _RATE, -4.5: _OUTPUT, -99.0: _WARM},
 }
 _SCORES = {
     part: {word: score for score, words in table.items() for word in words.split()}

@@ -67,18 +67,6 @@ def test_strengths_sum_to_one_wherever_a_row_lies(antecedent, rng, distance):
     assert_allclose(strengths.sum(axis=0), 1.0, rtol=1e-13)
 
 
-def test_without_terms_one_rule_always_fires(Z):
-    antecedent = GridAntecedent((), counts=())
-    assert_array_equal(antecedent.strengths(Z), np.ones((1, 60)))
-    assert antecedent.n_rules == 1
-    assert antecedent.n_terms == 0
-    assert antecedent.rule_terms.shape == (1, 0)
-    assert antecedent.parameters.size == 0
-    moved = antecedent.change_units(np.ones(3), np.ones(3))
-    for same in (antecedent.with_parameters(np.empty(0)), moved):
-        assert_array_equal(same.strengths(Z), np.ones((1, 60)))
-
-
 SMALL = grid(("g", 3), ("b", 2))
 
 

@@ -78,15 +78,6 @@ def test_gradient_and_gauss_newton_by_cuts_and_widths(agreement, order, n_output
     assert_allclose(gauss_newton, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
 
 
-def test_both_sides_of_a_cut_move_as_one(rng):
-    start = tree(6)
-    premise = Premise.of(start, np.full(3, -3.0), np.full(3, 3.0))
-    moved = start.with_parameters(premise.parameters(0.3 * rng.normal(size=premise.size)))
-    above, below = moved.groups
-    assert_array_equal(above.theta, below.theta)
-    assert (above.theta != start.groups[0].theta).all()
-
-
 def test_widths_have_a_floor_and_crisp_cuts_stay():
     theta = np.array([[0.5, 0.0], np.log([0.5 / CRISP, 0.3])])
     start = TreeAntecedent.build([0, 1], theta, [[(0, True)], [(0, False), (1, True)]])
@@ -105,20 +96,6 @@ def test_change_of_units_moves_cuts_and_rows_together(offset, scale, rng):
     moved = found.change_units(np.full(3, offset), np.full(3, scale))
     assert isinstance(moved, TreeAntecedent)
     assert_allclose(moved.strengths(offset + scale * Z), found.strengths(Z), atol=1e-6)
-
-
-@SIZES
-def test_a_walk_from_the_root_meets_every_place_once(n_rules, rng):
-    found, Z = tree(n_rules), rng.normal(size=(3, 50))
-    order, ends = found.walk
-    assert sorted(order.tolist()) == list(range(n_rules - 1))
-    come = np.zeros((2 * n_rules - 1, 50))
-    come[n_rules if n_rules > 1 else 0] = 1.0
-    above = sides(found, Z)
-    for k, (node, (up, down)) in enumerate(zip(order, ends, strict=True)):
-        here = come[n_rules + k]
-        come[up], come[down] = here * above[node], here * (1 - above[node])
-    assert_allclose(come[:n_rules], found.strengths(Z), rtol=1e-9, atol=1e-14)
 
 
 class TestOneTermEach:

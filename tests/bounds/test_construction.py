@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import LinearConstraint, minimize
 
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, TreeAntecedent
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.bounds.certified import training_box
 from skanfis.bounds.construction import RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
@@ -19,16 +19,14 @@ from skanfis.learning.penalty import Penalty
 from skanfis.membership import Bell, Gaussian
 from skanfis.model import TSKModel
 
+from .. import oracles
+
 FREE = (-np.inf, np.inf)
 
 
 def tree(rng, n_inputs):
-    """Cuts of random leaves, of random inputs; two cuts of an input on a path among them."""
-    found = TreeAntecedent.build([], np.empty((2, 0)), [[]])
-    for _ in range(rng.integers(1, 6)):
-        leaf, j = rng.integers(found.n_rules), rng.integers(n_inputs)
-        found = found.split(leaf, j, rng.normal(), np.log(rng.uniform(0.02, 1.0)))
-    return found
+    """With two cuts of an input on a path, or more, among them."""
+    return oracles.random_tree(rng, rng.integers(2, 7), range(n_inputs))
 
 
 def grid(rng, n_inputs):

@@ -8,7 +8,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from sklearn import config_context
 from sklearn.base import clone
-from sklearn.dummy import DummyRegressor
 from sklearn.frozen import FrozenEstimator
 from sklearn.linear_model import BayesianRidge, LinearRegression
 from sklearn.model_selection import GroupKFold, KFold, ShuffleSplit
@@ -159,46 +158,6 @@ def test_leave_one_out_is_that_of_refits(weighting, rng):
     assert_allclose(plain.scores_, np.sort(residuals), rtol=1e-6)
 
 
-def test_by_group_covers_new_groups_where_by_row_does_not(rng):
-    """Every run has an offset of its own: rows of a known run say nothing of a new one."""
-    by_row, by_group, by_run = [], [], []
-    for _ in range(8):
-        run = np.repeat(np.arange(60), rng.integers(3, 12, size=60))
-        y = rng.normal(size=60)[run] + 0.1 * rng.normal(size=run.size)
-        X, known = np.zeros((run.size, 1)), run < 12
-        # Each run's mean is learnt from its own rows, as a flexible model does.
-        X[:, 0] = run
-        model = ConformalRegressor(NearestRun(), scaled=False, cv=20)
-        by_row.append(covered(model.fit(X[known], y[known]).predict_interval(X[~known]), y[~known]))
-        model.fit(X[known], y[known], groups=run[known])
-        lower, upper = model.predict_interval(X[~known], 0.9, confidence=None)
-        by_group.append(covered((lower, upper), y[~known]))
-        assert model.n_units_ == 12
-        # By default it is every run that counts.
-        assert_array_equal(model.predict_interval(X, 0.7), model.predict_interval(X, 0.7, 0.7))
-        lower, upper = model.predict_interval(X[~known], 0.7, confidence=0.9)
-        inside = ((lower <= y[~known]) & (y[~known] <= upper)).astype(float)
-        by_run += list(np.bincount(run[~known] - 12, inside) / np.bincount(run[~known] - 12))
-    assert np.mean(by_row) < 0.5
-    assert 0.87 < np.mean(by_group) < 0.97
-    assert np.mean(np.array(by_run) >= 0.7) > 0.88
-
-
-class NearestRun(DummyRegressor):
-    """The mean of the run, and of all where it is new."""
-
-    def fit(self, X, y, sample_weight=None):
-        super().fit(X, y)
-        run = X[:, 0].astype(int)
-        counts = np.bincount(run, minlength=60)
-        means = np.bincount(run, y, minlength=60) / np.maximum(counts, 1)
-        self.means_ = np.where(counts > 0, means, y.mean())
-        return self
-
-    def predict(self, X):
-        return self.means_[X[:, 0].astype(int)]
-
-
 @pytest.mark.parametrize("method", ["folds", "split", "loo"])
 def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(method, rng):
     X, y = bent(rng, 300)
@@ -289,12 +248,18 @@ def test_levels_and_missing_numbers_are_refused_by_name():
     with pytest.raises(ValueError, match="confidence is of whole groups, and fit was given none"):
         model.predict_interval(X, confidence=0.9)
     model.fit(X, y, groups=np.arange(24) // 2)
+    assert model.n_units_ == 12
+    # By default it is every group that counts.
+    assert_array_equal(model.predict_interval(X, 0.7), model.predict_interval(X, 0.7, 0.7))
     with pytest.raises(ValueError, match="confidence='all' must be a number between 0 and 1"):
         model.predict_interval(X, confidence="all")
     with pytest.raises(ValueError, match=r"confidence=0\.95 needs 19 groups or more; there are 12"):
         model.predict_interval(X, 0.99, confidence=0.95)
     with pytest.raises(ValueError, match=r"confidence=2 must be a number between 0 and 1"):
         model.predict_interval(X, 0.9, confidence=2)
+    # Where every group has one row, the coverage of rows is the confidence of groups.
+    model.fit(X, y, groups=np.arange(24))
+    assert_array_equal(model.predict_interval(X, 0.9, None), model.predict_interval(X, 0.5, 0.9))
 
 
 def test_fit_that_is_interrupted_leaves_what_was_there(monkeypatch, rng):

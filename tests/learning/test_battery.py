@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import GridAntecedent
 from skanfis.learning import SOLVERS
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
-from skanfis.learning.premise import Premise
 
-from .. import oracles
 from .test_varpro import assert_is_as_planted, planted
 
 ITERATIVE = sorted(set(SOLVERS) - {"lse"})
@@ -112,30 +109,6 @@ def test_max_iter_is_the_number_of_iterations(name, max_iter):
     assert result.n_iter == max_iter
     assert result.status == ("epochs" if name in RESTLESS else "max_iter")
     assert result.converged is (name in RESTLESS)
-
-
-@every_iterative_solver
-def test_stiffness_holds_the_premises(name):
-    rows, premise = noisy()
-    moved = []
-    for stiffness in (0.0, 1e3):
-        result = solve(name, rows, premise, stiffness=stiffness)
-        parameters = result.evaluation.antecedent.parameters
-        moved.append(np.linalg.norm(parameters - premise.antecedent.parameters))
-    assert moved[1] < 0.1 * moved[0]
-
-
-@every_solver
-def test_one_rule_has_nothing_to_iterate_on(name):
-    rows, _ = noisy()
-    premise = Premise.of(GridAntecedent((), counts=()), *oracles.box(rows))
-    result = solve(name, rows, premise)
-    assert result.status == "no_premise"
-    assert result.converged
-    Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
-    target = (rows.y - rows.targets.offset) / rows.targets.scale
-    line, *_ = np.linalg.lstsq(np.vstack([np.ones(Z.shape[1]), Z]).T, target, rcond=None)
-    assert_allclose(result.evaluation.coefficients, line, atol=1e-6)
 
 
 @every_iterative_solver

@@ -63,11 +63,6 @@ def posterior(rows, antecedent, order, penalty):
     return laplace_at(problem, problem.evaluate(antecedent.parameters), penalty)
 
 
-def n_effective(found):
-    """Effective number of parameters, consequents of one output and premises."""
-    return found.n_columns + found.curvature.size - found.trace_after.sum()
-
-
 def with_pulls(penalty, line, g):
     """The penalty with a pull for every slope and component, whose geometric means are one."""
 
@@ -161,16 +156,6 @@ class TestAtGivenPremises:
                 expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
                 assert_allclose(in_full(found), expected + prior_of_pulls(penalty), atol=1e-7)
                 assert_allclose(found.noise_variance, variance, rtol=1e-5)
-
-    def test_effective_parameters_are_the_trace_of_the_hat_matrix(self, rng):
-        rows, antecedent = oracles.bumpy_rows(rng, 40, 2, 1, True), rules(rng, 3)
-        for penalty in PENALTIES:
-            dense = Dense(rows, antecedent, 1, penalty)
-            weighted = dense.phi.T * (dense.weight / dense.n)
-            matrix = weighted @ dense.phi + dense.penalty
-            hat = dense.phi @ np.linalg.solve(matrix, weighted)
-            found = posterior(rows, antecedent, 1, penalty)
-            assert_allclose(n_effective(found), np.trace(hat), rtol=1e-7)
 
 
 def at_fixed_premises(seed):

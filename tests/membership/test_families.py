@@ -7,7 +7,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis.antecedent import GridAntecedent
 from skanfis.membership import FAMILIES as EVERY_FAMILY
 from skanfis.membership import (
-    MEMBERSHIPS,
     Bell,
     Gaussian,
     SigmoidDifference,
@@ -88,16 +87,6 @@ def gradient_by_complex_step(family, x, theta):
     own = np.stack([full[t, :, :, t] for t in range(theta.shape[1])])
     assert np.count_nonzero(full) == np.count_nonzero(own)
     return np.moveaxis(own, 2, 0) / floored(family, x, theta)
-
-
-@FAMILIES
-def test_registered_under_its_own_name(family):
-    assert EVERY_FAMILY[family.name] is family
-    # A side of a cut is not for whole inputs.
-    assert (family.name in MEMBERSHIPS) != (family.name in SIDES | SIDES_TWICE)
-    kinds = [parameter.kind for parameter in family.parameters]
-    assert kinds[0] == "location"
-    assert set(kinds) <= {"location", "log_width", "log_shape"}
 
 
 @FAMILIES

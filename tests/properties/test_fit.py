@@ -13,7 +13,6 @@ from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning, Underde
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
 from skanfis.inspection import export_text
-from skanfis.learning.data import column_statistics
 
 from .strategies import settings_of_fit, tables
 
@@ -71,15 +70,3 @@ def test_a_fit_is_no_worse_than_the_mean_answers_everywhere_and_comes_back(table
             raise
         return
     np.testing.assert_array_equal(parse_json(text).predict(rows), frozen.predict(rows))
-
-
-@given(tables())
-def test_statistics_are_those_of_exact_arithmetic(table):
-    found = column_statistics(table.X, None)
-    for j, column in enumerate(table.X.T):
-        values, size = column.astype(np.longdouble), np.abs(column).max()
-        spread = np.sqrt(np.mean((values - values.mean()) ** 2))
-        assert found.minimum[j] == column.min()
-        assert found.maximum[j] == column.max()
-        if np.ptp(column) > 0.0:
-            np.testing.assert_allclose(found.scale[j], spread, rtol=1e-6, atol=1e-15 * size)

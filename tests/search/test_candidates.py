@@ -1,6 +1,5 @@
-"""Kinds of rule bases as sequences, and which input the residual of a model asks terms for."""
+"""Which input the residual of a model asks terms for."""
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -11,9 +10,8 @@ from skanfis.antecedent import GridAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
-from skanfis.membership import Gaussian
 from skanfis.search import tuning
-from skanfis.search.candidates import Candidate, TermScores, rule_base
+from skanfis.search.candidates import TermScores
 from skanfis.search.grid import Spacing
 from skanfis.search.sample import search_sample
 
@@ -29,56 +27,6 @@ def solved(rows, antecedent):
     problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     premise = Premise.of(antecedent, *rows.inputs.box)
     return tuning.tune(problem, premise, ["slope"], rows.sample_weight.sum(), turns=0)
-
-
-def test_kinds_are_told_in_words():
-    one = Candidate((1, 1, 1))
-    grid = one.with_more_terms(2).with_more_terms(0).with_more_terms(2)
-    scattered = one.with_more_clusters([2, 0])
-    for found, kind, n_rules, n_terms, words in (
-        (one, "one rule", 1, 0, "one rule"),
-        (grid, "grid", 6, 5, "grid of 6 rules"),
-        (scattered, "scattered", 2, 4, "2 scattered rules"),
-    ):
-        assert (found.kind, found.n_rules, found.n_terms) == (kind, n_rules, n_terms)
-        assert found.describe() == words
-
-
-def test_scattered_rules_are_half_as_many_again_and_their_inputs_stay():
-    found = [Candidate((1,))]
-    for _ in range(6):
-        found.append(found[-1].with_more_clusters([0]))
-    assert [c.n_rules for c in found] == [1, 2, 3, 5, 8, 12, 18]
-    larger = Candidate((1,) * 4).with_more_clusters([3, 1]).with_more_clusters([0, 1])
-    assert larger == Candidate((1,) * 4, 3, (0, 1, 3))
-
-
-def test_scattered_rules_stand_on_the_clusters_of_k_means(rng):
-    """Of two inputs and the target; whatever the order of the columns."""
-    clump = np.repeat([[0.0, 0.0], [9.0, 0.0], [0.0, 9.0]], 30, axis=0)
-    asked = clump + rng.normal(size=(90, 2))
-    X = np.column_stack([asked[:, 0], 9.0 * rng.normal(size=90), asked[:, 1]])
-    rows = sample_of(X, clump.sum(axis=1), rng.uniform(0.5, 2.0, 90))
-    turned = replace(rows, X=rows.X[:, ::-1])
-    found = [
-        rule_base(Candidate((1, 1, 1), 3, (0, 2)), own, [Gaussian] * 3, Spacing(own), 7)
-        for own in (rows, turned)
-    ]
-    labels = rows.X[:, [0, 2]] > 0.5
-    centers = []
-    for antecedent, inputs in zip(found, ([0, 2], [2, 0]), strict=True):
-        (group,) = antecedent.groups
-        own = [group.theta[0, group.inputs == j] for j in inputs]
-        centers.append(np.column_stack(own))
-    assert_allclose(centers[0], centers[1])
-    expected = [
-        np.average(
-            rows.X[:, [0, 2]], axis=0, weights=rows.sample_weight * (labels == one).all(axis=1)
-        )
-        for one in ([False, False], [True, False], [False, True])
-    ]
-    order = np.lexsort(centers[0].T), np.lexsort(np.transpose(expected))
-    assert_allclose(centers[0][order[0]], np.array(expected)[order[1]])
 
 
 @pytest.mark.parametrize("told", [[], [(0, 2)], [(0, 3), (2, 2)]])

@@ -36,20 +36,6 @@ class TestPrefer:
             assert judges.are_less(after, before) is is_preferred
         assert not judges.are_less(before, before)
 
-    def test_a_weight_is_so_many_repeats_in_one_group(self, rng):
-        gain, times = rng.normal(size=40), rng.integers(1, 5, 40)
-        gain -= np.average(gain, weights=times)
-        repeated, weighted = (
-            alike(times.sum(), np.repeat(np.arange(40), times)),
-            Judges(times.astype(float), np.arange(40)),
-        )
-        for excess in np.linspace(0.0, 0.6, 25):
-            found = [
-                judges.are_less(-of - excess, np.zeros(of.size))
-                for judges, of in ((repeated, gain.repeat(times)), (weighted, gain))
-            ]
-            assert found[0] is found[1]
-
     def test_rows_of_one_group_are_alike_in_whatever_fold(self):
         X, y, group = np.zeros((3, 1)), np.zeros((3, 1)), np.array([7, 3, 7])
         weight = np.arange(1.0, 4.0)

@@ -42,15 +42,6 @@ class TestRepresentativeRows:
         assert_allclose(np.average(table, axis=0, weights=weight), 0.0, atol=0.15)
         assert_allclose(np.average(table**2, axis=0, weights=weight), 1.0, atol=0.2)
 
-    def test_heavy_rows_stand_for_more(self, rng):
-        X = rng.normal(size=(1000, 1))
-        weight = np.where(X[:, 0] > 0.0, 9.0, 1.0)
-        rows = StandardisedData.of(X, np.zeros((1000, 1)), weight)
-        table, share, _ = representative_rows(rows, 200)
-        heavy = table[:, 0] > -rows.inputs.offset[0] / rows.inputs.scale[0]
-        expected = weight[X[:, 0] > 0.0].sum() / weight.sum()
-        assert_allclose(share[heavy].sum() / share.sum(), expected, atol=0.01)
-
 
 class TestCounts:
     @pytest.mark.parametrize("unit", [1e-300, 1e-6, 0.5])
@@ -63,20 +54,6 @@ class TestCounts:
         assert_allclose(effective_weight(even), 300.0, rtol=1e-12)
         half = StandardisedData.of(X, y, np.where(np.arange(300) < 150, unit, 1e-9 * unit))
         assert_allclose(effective_weight(half), 150.0, rtol=1e-6)
-
-    @pytest.mark.parametrize("most", [10_000, 100])
-    def test_a_search_sees_repeated_rows_as_weighted_ones(self, rng, most):
-        X, y, times = many(rng)
-        weighted = search_sample(StandardisedData.of(X, y, times.astype(float)), most)
-        repeated = search_sample(
-            StandardisedData.of(np.repeat(X, times, axis=0), np.repeat(y, times, axis=0)), most
-        )
-        assert_allclose(repeated.X, weighted.X, atol=1e-12)
-        assert_allclose(repeated.y, weighted.y, atol=1e-12)
-        assert_array_equal(repeated.sample_weight, weighted.sample_weight)
-        # Already in the units of all rows: what they are is not standardised again.
-        assert_array_equal(weighted.inputs.scale, 1.0)
-        assert_array_equal(weighted.inputs.offset, 0.0)
 
     def test_a_search_knows_the_group_of_each_of_its_rows(self, rng):
         X, y = rng.normal(size=(500, 2)), rng.normal(size=(500, 1))

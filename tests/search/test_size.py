@@ -7,21 +7,8 @@ from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
 from skanfis.exceptions import ConstantInputWarning
-from skanfis.learning import VariableProjection
-from skanfis.search import size
 
 from ..memory import traced
-
-
-def test_size_of_a_grid_is_not_far_from_what_training_takes(rng):
-    X = rng.normal(size=(1000, 3))
-    y = np.sin(X[:, 0]) + rng.normal(size=1000)
-    solver = VariableProjection(stiffness=1.0, tol=0.5)
-    estimator = ANFISRegressor(n_mfs=5, order=1, agreement=0.1, alpha=1e-3, solver=solver)
-    with traced() as peak:
-        estimator.fit(X, y)
-    expected = size.n_bytes(125, 15, n_basis=4, n_outputs=1)
-    assert 0.3 * peak[0] < expected < 3.0 * peak[0]
 
 
 def test_limit_is_that_of_scikit_learn(rng):

@@ -75,12 +75,6 @@ def test_cuts_are_as_wide_as_half_of_the_leaf_and_crisp_between_two_values(rng):
         assert_allclose(np.exp(split.log_width), expected)
 
 
-def test_an_input_that_is_constant_is_not_split(rng):
-    X = np.column_stack([rng.normal(size=50), np.ones(50)])
-    splits = best_splits(model_of(X, X[:, 0] ** 2), range(2), np.arange(2), 5)
-    assert {split.input for split in splits} == {0}
-
-
 def test_of_inputs_that_part_the_rows_alike_the_order_of_columns_does_not_decide(rng):
     x = rng.uniform(-1.0, 1.0, 200)
     X, y = np.column_stack([x, x**3, np.exp(2.0 * x)]), np.abs(x)[:, None]

@@ -1,16 +1,12 @@
 """Where training starts: rules that are given, their weights, and when terms are unbounded."""
 
 import numpy as np
-import pytest
-from numpy.testing import assert_allclose
 
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
 from skanfis.search import start
 from skanfis.search.grid import Spacing, grid_antecedent
-from skanfis.search.judging import dealt_rows
-from skanfis.search.trials import Trials
 
 from .test_trials import plan_of
 
@@ -54,25 +50,3 @@ def test_of_rules_that_are_given_simplicity_raises_the_agreement(rng):
     _, given = of_grid(3, sine, rng, 0.3, weights={"agreement": 1e-3}, simplicity=0.5)
     assert given.penalty.agreement == 1e-3
     assert not given.agreement_is_raised
-
-
-@pytest.mark.parametrize("left", [1.0, 1.5])
-def test_a_candidate_begins_where_its_trial_ended(rng, left):
-    """With the weights of as many rows as there are; raised agreement holds for any number."""
-    X = rng.uniform(-1.0, 1.0, (200, 1))
-    rows = dealt_rows(StandardisedData.of(X, sine(X) + 0.3 * rng.normal(size=X.shape)))
-    plan = plan_of(1, 1000.0)
-    trials = Trials(rows, plan)
-    tuned = trials.tuned(trials.larger("grid", trials.one_rule))
-    found = start.started(tuned, plan, left, ["told"])
-    assert found.candidates == ["told"]
-    assert found.antecedent is tuned.problem.antecedent
-    assert found.agreement_is_raised is (left > 1.0)
-    weights = [found.penalty.alpha, found.penalty.slope, found.penalty.stiffness]
-    own = [tuned.penalty.alpha, tuned.penalty.slope, tuned.penalty.stiffness]
-    assert_allclose(weights, np.multiply(own, 0.2), rtol=5e-3)
-    if left == 1.0:
-        assert_allclose(found.displacement, tuned.displacement, atol=1e-5)
-        assert_allclose(found.penalty.agreement, 0.2 * tuned.penalty.agreement, rtol=5e-3)
-    else:
-        assert found.penalty.agreement > 2.0 * tuned.penalty.agreement

@@ -34,19 +34,6 @@ def two_rules(rng):
     return two_rules_of_a_sine(rng, 0.1)
 
 
-@pytest.mark.theory
-def test_weights_arrive_where_there_are_more_columns_than_rows(rng):
-    """Of noise on 150 inputs, nothing is learnt from 100 rows."""
-    X, y = rng.normal(size=(100, 150)), rng.normal(size=(100, 1))
-    problem, premise = problem_of(X, y, 1)
-    found = tuning.tune(problem, premise, FREE, 100.0)
-    penalties = [replace(tuning.FIRST_PENALTY, slope=slope) for slope in np.logspace(-4, 4, 33)]
-    scanned = [tuning.tune(problem.with_penalty(p), premise, [], 100.0) for p in penalties]
-    least = min(one.posterior.minus_twice_log for one in scanned)
-    assert found.posterior.minus_twice_log < least + 0.01
-    assert found.posterior.n_effective < 25.0
-
-
 def test_large_models_find_nearly_the_same_in_few_turns(monkeypatch, two_rules):
     whole = tuning.tune(*two_rules, FREE, 100.0)
     monkeypatch.setattr(tuning, "MANY_COLUMNS", two_rules[0].n_columns - 1)

@@ -8,12 +8,7 @@ from sklearn.mixture import GaussianMixture
 from skanfis import ANFISRegressor
 from skanfis.learning import VariableProjection, sampling
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.objective import SeparableProblem
-from skanfis.learning.penalty import Penalty
-from skanfis.learning.sampling import with_sample
-from skanfis.membership import Gaussian
 
-from .. import oracles
 from ..quick import quick
 
 N_ROWS, N_SAMPLE = 12_000, 3000
@@ -79,19 +74,6 @@ def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeyp
     difference = quick.predict(new) - full.predict(new)
     # Less than the noise's own effect on 9 rules of 3 coefficients.
     assert np.sqrt(np.mean(difference**2)) < 0.1 * np.sqrt(27 / N_ROWS)
-
-
-@pytest.mark.parametrize("agreement", [0.0, 0.3])
-def test_gradient_is_that_of_all_rows(agreement, rng):
-    rows = with_sample(oracles.bumpy_rows(rng, 600, 2, 2, weighted=True), 150)
-    antecedent = oracles.random_grid(rng, [Gaussian, Gaussian], [2, 3])
-    penalty = Penalty(agreement=agreement, alpha=1e-3, slope=1e-3)
-    problem = SeparableProblem(rows.sample, antecedent, penalty).on_all(rows)
-    found = problem.linearise(problem.evaluate(antecedent.parameters))
-    expected = oracles.central_difference(
-        lambda theta: problem.evaluate(theta).cost, antecedent.parameters
-    )
-    assert_allclose(found.gradient, expected, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(

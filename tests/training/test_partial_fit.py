@@ -2,7 +2,6 @@
 
 import pickle
 from copy import deepcopy
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,8 +11,7 @@ from sklearn.base import clone
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc
-from skanfis.exceptions import ForgottenRowsWarning, OutOfBoundsWarning
-from skanfis.options import LinearExtrapolation
+from skanfis.exceptions import ForgottenRowsWarning
 
 from ..quick import quick
 
@@ -273,17 +271,6 @@ def test_rows_of_before_a_jump_stay_covered(premises):
     assert model.coverage(jumped) == pytest.approx(once.coverage(jumped), abs=1e-3)
 
 
-def test_unseen_ranges_are_flagged_until_they_are_seen(premises):
-    model = chunk(premises).partial_fit(X, Y)
-    beyond = np.add(X[:1], [900.0, 0.0])
-    assert not model.in_bounds(beyond)[0]
-    assert model.coverage(beyond)[0] < 0.1
-    rows = beyond + [[0.1 * i, 1e-3 * (i % 7 - 3)] for i in range(-20, 20)]
-    model.partial_fit(rows, np.full(40, Y[0]))
-    assert model.in_bounds(beyond)[0]
-    assert model.coverage(beyond)[0] > 0.9
-
-
 @pytest.mark.parametrize("forgetting", [0.0, 1.01, np.nan, "0.9", True, None])
 def test_forgetting_out_of_range(premises, forgetting):
     with pytest.raises(ValueError, match=r"forgetting=.*above 0 and at most 1"):
@@ -374,17 +361,6 @@ def test_a_constant_target_at_first_settles_nothing():
     assert model.score(X[100:], y[100:]) > 0.9
 
 
-def test_auto_is_the_limit_of_the_rules_that_were_given(premises):
-    """And not the limit that was asked for at an earlier call."""
-    unknown = replace(premises.model_, rows_extrapolation=None, posterior=None)
-    beyond = np.add(X[:5], [3e3, 0.0])
-    model = chunk(unknown, out_of_bounds=LinearExtrapolation(np.inf)).partial_fit(X, Y)
-    model.set_params(out_of_bounds="linear")
-    with pytest.warns(OutOfBoundsWarning, match=f"={unknown.max_extrapolation}"):
-        found = model.predict(beyond)
-    assert np.array_equal(found, chunk(unknown).partial_fit(X, Y).model_.predict(beyond)[:, 0])
-
-
 def test_a_chunk_without_weight_in_any_form_changes_nothing(premises):
     model = chunk(premises).partial_fit(X, Y)
     before = model.predict(X)
@@ -399,12 +375,3 @@ def test_rows_that_differ_by_their_target_alone_are_distinct_in_any_unit(rng):
     found, small = (chunk(premises).partial_fit(table, y * unit) for unit in (1.0, 1e-20))
     assert found.alpha_ == small.alpha_
     np.testing.assert_allclose(small.predict(table) * 1e20, found.predict(table), rtol=LAST_DIGIT)
-
-
-def test_constants_are_learnt_from_the_first_chunk_on():
-    model = quick(3, order=0).partial_fit(X[:200], Y[:200])
-    np.testing.assert_array_equal(
-        model.predict(X), quick(3, order=0).fit(X[:200], Y[:200]).predict(X)
-    )
-    before = np.mean((model.predict(X) - Y) ** 2)
-    assert np.mean((model.partial_fit(X[200:], Y[200:]).predict(X) - Y) ** 2) < before

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor
 from skanfis.antecedent import RuleTableAntecedent
 from skanfis.learning.firing import RuleFiring
-from skanfis.membership import Bell, Gaussian
+from skanfis.membership import Gaussian
 from skanfis.training.pruning import redundant_rules
 
 from .. import oracles
@@ -22,17 +22,6 @@ def scattered(centers, width=0.5):
 def statistics(rows, antecedent):
     firing = RuleFiring.of(rows, antecedent, 0)
     return firing.overlap / rows.total_weight, firing.peak
-
-
-@pytest.mark.parametrize("weighted", [False, True])
-def test_statistics_are_those_of_the_dense_strengths(weighted, rng):
-    rows = oracles.bumpy_rows(rng, 300, 2, 1, weighted)
-    antecedent = oracles.random_grid(rng, [Gaussian, Bell], [3, 2])
-    dense = oracles.DenseProblem(rows, antecedent, 1, 1.0)
-    w = oracles.strengths(antecedent, antecedent.parameters, dense.Z)
-    overlap, peak = statistics(rows, antecedent)
-    assert_allclose(overlap, (w * dense.weight) @ w.T, rtol=1e-10)
-    assert_allclose(peak, w.max(axis=1), rtol=1e-10)
 
 
 def test_rules_far_away_and_rules_alike_are_found():

@@ -16,14 +16,10 @@ from skanfis import ANFISRegressor, regressor
 from skanfis.datasets import make_jang_sinc
 from skanfis.learning import VariableProjection
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.objective import SeparableProblem
-from skanfis.learning.penalty import Penalty
-from skanfis.membership import Bell, Gaussian
 from skanfis.options import EarlyStopping
 from skanfis.training import watching
 from skanfis.training.watching import hold_out
 
-from .. import oracles
 from ..quick import quick
 
 X, Y = make_jang_sinc()
@@ -55,28 +51,6 @@ class Recorder:
             self.errors.append(np.mean((fitted_estimator.predict(X) - y) ** 2) / np.var(y))
         self.metadata = metadata
         return self.most is not None and len(self.tasks) >= self.most
-
-
-@pytest.mark.parametrize("weighted", [False, True])
-@pytest.mark.parametrize("consequent_inputs", [[0, 1], [1]])
-def test_rows_beyond_the_range_count_at_its_edge(monkeypatch, weighted, consequent_inputs, rng):
-    monkeypatch.setattr(watching, "BLOCK_ROWS", 7)
-    rows, used = oracles.bumpy_rows(rng, 200, 2, 2, weighted), np.array(consequent_inputs)
-    antecedent = oracles.random_grid(rng, [Gaussian, Bell], [3, 2])
-    penalty = Penalty(alpha=1e-3, slope=1e-3)
-    problem = SeparableProblem(rows, antecedent, penalty, consequent_inputs=used)
-    evaluation = problem.evaluate(antecedent.parameters)
-    # On either side of the box of every input, and in it.
-    low, high = rows.inputs.minimum, rows.inputs.maximum
-    X_rest = low + (high - low) * rng.uniform(-0.5, 1.5, (100, 2))
-    weight = rng.uniform(0.5, 2.0, 100) if weighted else None
-    rest = StandardisedData(X_rest, rng.normal(size=(100, 2)), weight, rows.inputs, rows.targets)
-    at_edge = rest.inputs.apply(np.clip(X_rest, low, high).T)
-    design = oracles.dense_design(antecedent, antecedent.parameters, at_edge, 1, used)
-    target = (rest.y - rows.targets.offset) / rows.targets.scale
-    squares = ((target - design @ evaluation.coefficients) ** 2).sum(axis=1)
-    expected = np.average(squares, weights=weight)
-    assert_allclose(watching.held_out_loss(rest, used, evaluation), expected, rtol=1e-9)
 
 
 def test_verbose_writes_a_line_per_iteration(capsys):
