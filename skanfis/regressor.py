@@ -155,7 +155,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     structures_ : list of dict
         What was compared, best first, or the one given: "structure" in words, "kind", "rules",
         "n_mfs" of a grid, "reading_cost" (numerals in the rules' sentences), "expected_error" (RMS
-        on new rows, in sd of the target), "chosen". Empty where nothing was fitted.
+        on new rows, in sd of the target), "rules_beat_mean" (whether its rules, before they are
+        made to agree, err less than the mean one by one: those of which they do come first),
+        "chosen". Empty where nothing was fitted.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
         Standard deviation of the noise of a row of mean weight, in the units of y.
     readability_ : skanfis.inspection.Readability

@@ -22,14 +22,15 @@ class StructureDisplay:
     """Error expected of new rows against reading cost, of every structure that was compared.
 
     The one that was chosen is ringed; below the dashed line errors are surely within the tolerance
-    of ``simplicity``. What stands there further to the left has more rules than the best, or rules
-    that are worse than the mean one by one. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
+    of ``simplicity``. What stands there further to the left has more rules than the best, or is
+    crossed out: its rules are worse than the mean one by one. ``ax_`` and ``figure_`` are
+    matplotlib's, once drawn.
 
     Parameters
     ----------
     structures : list of dict
         As ``structures_`` of an estimator: of each its "kind", "rules", "reading_cost",
-        "expected_error" and whether it was "chosen".
+        "expected_error", whether "rules_beat_mean" and whether it was "chosen".
     tolerance : float
         Error, in standard deviations of the target, up to which a candidate is near enough to the
         best. The search takes for the best what is better by more than chance, and may tolerate a
@@ -89,6 +90,9 @@ class StructureDisplay:
             own = _places([one for one in structures if one["kind"] == kind])
             color, marker = _KINDS[kind]
             ax.plot(*own, "-", marker=marker, color=color, linewidth=0.8, label=kind)
+        if poor := [one for one in structures if not one["rules_beat_mean"]]:
+            label = "rules worse than the mean, one by one"
+            ax.plot(*_places(poor), "x", color="black", markersize=8, label=label)
         (chosen,) = [one for one in self.structures if one["chosen"]]
         rules = "one rule" if chosen["rules"] == 1 else f"{chosen['rules']} rules"
         ring = {"markersize": 13, "markerfacecolor": "none", "markeredgecolor": "black"}

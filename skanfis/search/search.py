@@ -65,7 +65,9 @@ class StructureSearch:
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
         room = most / error if error > 0.0 else 1.0
-        return started(self.trials.tuned(found.candidate), self.plan, room, self._report(found))
+        return started(
+            self.trials.tuned(found.candidate), self.plan, room, self._report(found, variance)
+        )
 
     def _grow(self, kind, one_rule):
         """Judge a kind from small to large, some steps further than the best.
@@ -130,8 +132,8 @@ class StructureSearch:
             squares.append(np.sum((rows.y - mean) ** 2, axis=1))
         return self.judges.mean(np.concatenate(squares))
 
-    def _report(self, found):
-        """Every candidate in words and numbers, best first."""
+    def _report(self, found, variance):
+        """Every candidate in words and numbers, best first; ``variance`` is the mean's error."""
         return [
             {
                 "structure": one.candidate.describe(),
@@ -140,6 +142,7 @@ class StructureSearch:
                 "n_mfs": list(one.candidate.counts) if one.candidate.is_grid else None,
                 "reading_cost": one.cost,
                 "expected_error": float(np.sqrt(one.squared_error)),
+                "rules_beat_mean": one.squared_error_of_rules <= variance,
                 "chosen": one is found,
             }
             for one in sorted(self.judged, key=lambda one: one.squared_error)

@@ -98,15 +98,15 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     room, worths = 1.0, SLOPE_WORTHS if turns else ()
     sparse = [with_sparse_slopes(best, free, worth) for worth in worths]
     error = min(one.expected_error for one in (best, *sparse))
+    variance = float(np.count_nonzero(~rows.targets.is_constant))
     if turns and 0.0 < error < np.inf:
-        variance = float(np.count_nonzero(~rows.targets.is_constant))
         most = tolerated(error, variance, simplicity)
         best = next(one for one in (*sparse[::-1], best) if one.expected_error <= most)
         room = most / best.expected_error
-    return started(best, plan, room, [_as_given(best)], is_unbounded)
+    return started(best, plan, room, [_as_given(best, variance)], is_unbounded)
 
 
-def _as_given(tuned: Tuned):
+def _as_given(tuned: Tuned, variance):
     """What there is to say of rules that were given."""
     antecedent, n_mfs = tuned.problem.antecedent, None
     n_rules = antecedent.n_rules
@@ -122,6 +122,7 @@ def _as_given(tuned: Tuned):
         "n_mfs": n_mfs,
         "reading_cost": cost_of(tuned),
         "expected_error": float(np.sqrt(tuned.expected_error)),
+        "rules_beat_mean": bool(tuned.expected_error + tuned.disagreement <= variance),
         "chosen": True,
     }
 

@@ -19,16 +19,16 @@ def line():
     return quick(1).fit(x, x[:, 0])
 
 
-def candidate(kind, rules, cost, error, chosen=False):
+def candidate(kind, rules, cost, error, chosen=False, beat=True):
     known = {"kind": kind, "rules": rules, "reading_cost": cost}
-    return known | {"expected_error": error, "chosen": chosen}
+    return known | {"expected_error": error, "rules_beat_mean": beat, "chosen": chosen}
 
 
 # Best first, as they come.
 CLEAR = [
     candidate("grid", 8, 40, 0.20),
     candidate("grid", 4, 20, 0.205, chosen=True),
-    candidate("grid", 6, 12, 0.21),
+    candidate("grid", 6, 12, 0.21, beat=False),
     candidate("scattered", 6, 30, 0.22),
     candidate("scattered", 2, 10, 0.25),
     candidate("grid", 2, 9, 0.30),
@@ -58,6 +58,8 @@ def test_every_candidate_is_where_its_cost_and_error_put_it(line):
     assert_array_equal(lines["scattered"].get_xydata(), [[10, 0.25], [30, 0.22]])
     assert_array_equal(lines["one rule"].get_xydata(), [[3, 0.60]])
     assert_array_equal(lines["chosen: 4 rules"].get_xydata(), [[20, 0.205]])
+    poor = lines["rules worse than the mean, one by one"]
+    assert_array_equal(poor.get_xydata(), [[12, 0.21]])
     assert len({lines[kind].get_marker() for kind in ("one rule", "grid", "scattered")}) == 3
 
 

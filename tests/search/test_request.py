@@ -171,6 +171,14 @@ def test_rules_that_are_given_are_one_candidate(data):
         # On the rows that it was trained on it leaves less, but not much.
         left = np.std(y - model.predict(X)) / y.std()
         assert left < told["expected_error"] < 1.3 * left
+    # A line says more than the mean, and rules of noise less.
+    assert told["rules_beat_mean"]
+    (told,) = (
+        ANFISRegressor(n_mfs=2, alpha=1e-9)
+        .fit(X, np.random.default_rng(0).normal(size=len(y)))
+        .structures_
+    )
+    assert not told["rules_beat_mean"]
 
 
 @pytest.mark.theory
