@@ -315,7 +315,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             the row's absence. Those that say how precise a row is are to have the mean one.
         groups : array-like of shape (n_samples,), default=None
             The run, device or level that each row belongs to. The structure is chosen by its error
-            on groups left out, and ``early_stopping`` holds out whole groups.
+            on groups left out, and ``early_stopping`` holds out whole groups. One group is none.
 
         Raises
         ------

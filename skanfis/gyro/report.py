@@ -172,7 +172,7 @@ def _interval(figure, value, rows, samples, draws, kind):
     if spread.size < _FEWEST_DEFINED * len(draws):
         return nothing, "no interval: too many resamples do not have this figure"
     # A resample has fewer different rows, and so more noise: of such it tells the spread alone.
-    own = value / np.median(spread) if figure.name in metrics.SIZES_WITH_NOISE else 1.0
+    own = value / (np.median(spread) or 1.0) if figure.name in metrics.SIZES_WITH_NOISE else 1.0
     return own * np.percentile(spread, _PERCENTILES), ""
 
 

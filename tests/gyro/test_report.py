@@ -117,6 +117,9 @@ def test_sizes_of_means_lie_in_their_intervals_and_the_truth_does(rng):
     for name, truth in planted.items():
         value, low, high = table.loc[name, VALUES[:3]]
         assert low < min(value, truth) <= max(value, truth) < high
+    # Where there is no error there is none in any resample.
+    none = gyro_report(0.0 * rate, 0.0 * rate, run=run, **heat, n_resamples=10, full_scale=100.0)
+    assert (figures(none).loc["hysteresis", VALUES[:3]] == 0.0).all()
 
 
 def test_refused_rows_are_left_out_of_both_sides(log):
