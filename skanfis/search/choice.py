@@ -35,6 +35,10 @@ class Judged:
     cost: int  # to read it
     squared_error_of_rules: float  # of the rules one by one, each on the rows on which it fires
 
+    def rules_beat_mean(self, variance):
+        """Whether they do one by one, ``variance`` being the mean's squared error."""
+        return self.squared_error_of_rules <= variance
+
 
 @dataclass(frozen=True, eq=False)
 class Judges:
@@ -90,7 +94,7 @@ def chosen(found, variance):
     """What is read soonest, ``variance`` being the mean's squared error; see the module."""
 
     def key(one):
-        is_poor, has_own = one.squared_error_of_rules > variance, one.candidate.kind == "scattered"
-        return is_poor, one.cost, has_own, one.squared_error
+        has_own = one.candidate.kind == "scattered"
+        return not one.rules_beat_mean(variance), one.cost, has_own, one.squared_error
 
     return min(found, key=key)

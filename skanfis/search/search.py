@@ -142,7 +142,7 @@ class StructureSearch:
                 "n_mfs": list(one.candidate.counts) if one.candidate.is_grid else None,
                 "reading_cost": one.cost,
                 "expected_error": float(np.sqrt(one.squared_error)),
-                "rules_beat_mean": one.squared_error_of_rules <= variance,
+                "rules_beat_mean": one.rules_beat_mean(variance),
                 "chosen": one is found,
             }
             for one in sorted(self.judged, key=lambda one: one.squared_error)
