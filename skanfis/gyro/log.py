@@ -384,9 +384,11 @@ def _joined_by_clock(table, runs, paths):
     is_new = np.append(True, is_new | (np.diff(table["file"])[ends] == 0))
     run = (np.cumsum(is_new, dtype=np.int32) - 1)[table["run"]]
     table = table.assign(run=run, power_on=table["power_on"].groupby(run).transform("first"))
-    places = runs["file"][~is_new].tolist()
-    told = (f"{counted(len(places), 'file')}, first {paths[place]}" for place in places[:1])
-    return table, runs[is_new], [f"the run goes on in {each}, as the clock does" for each in told]
+    places, told = runs["file"][~is_new].tolist(), []
+    if places:
+        files = f"{counted(len(places), 'file')}, first {paths[places[0]]}"
+        told.append(f"the run goes on in {files}, as the clock does")
+    return table, runs[is_new], told
 
 
 def _since_power_on(log):

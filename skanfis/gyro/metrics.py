@@ -266,8 +266,9 @@ def rows_for_allan(time, run, answered):
 
     ValueError says why there is no Allan deviation.
     """
-    stretches, runs = [], rows_by_run(run, time.size)
-    usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs]))
+    runs = [rows for rows in rows_by_run(run, time.size) if rows.size >= _ROWS_PER_TIME]
+    usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs])) if runs else np.nan
+    stretches = []
     for rows in runs:
         is_next = np.abs(np.diff(time[rows]) - usual) <= _UNEVEN * usual
         is_next &= answered[rows[1:]] & answered[rows[:-1]]
