@@ -20,9 +20,8 @@ from itertools import accumulate
 import numpy as np
 
 from ..blocks import add_each, fitting_rows, row_blocks
-from ..learning.data import Scale, StandardisedData
+from ..learning.data import ROUNDING, Scale, StandardisedData
 from ..search import representative_rows, weighted_quantile
-from .measures import CONSTANT
 
 # Values of every input that a fit keeps, from so many rows at most; draws in place of closed forms,
 # and those that each point of a curve is a mean over.
@@ -226,7 +225,7 @@ def _outer(of_rules):
 
 def _but_rounding(variance, mean):
     """Zero where an output varies by rounding errors only."""
-    return variance if variance > (CONSTANT * mean) ** 2 else 0.0
+    return variance if variance > (ROUNDING * mean) ** 2 else 0.0
 
 
 class DrawnAnova:

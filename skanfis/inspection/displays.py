@@ -15,6 +15,7 @@ from ..digits import rounded
 from ..export import fold, fold_with_rows
 from ..export.columns import by_column
 from ..export.folding import fold_with_reader
+from ..learning.data import never_changes
 from .labels import as_label, on_axis, title_of
 from .rules import has_training_data
 from .sentences import PRECISION
@@ -213,7 +214,7 @@ class ResponseSurfaceDisplay:
         if both[0] == both[1]:
             raise ValueError(f"features={features!r} is the same input twice.")
         for j in both:
-            if model.minimum[j] == model.maximum[j]:
+            if never_changes(model.minimum[j], model.maximum[j]):
                 raise ValueError(
                     f"features={features!r}: {model.input_names[j]!r} has one value, "
                     f"{model.minimum[j]:g}. Name two inputs that vary."

@@ -19,9 +19,6 @@ from ..blocks import LARGE_BLOCK_ROWS, add_each, fitting_rows, row_blocks
 from ..learning.data import column_statistics
 from .sentences import Sentences
 
-# A target that varies by rounding errors only, as the predictions of a constant do, is constant.
-CONSTANT = 16.0 * np.finfo(float).eps
-
 
 @dataclass(frozen=True, eq=False)
 class Measures:
@@ -55,19 +52,12 @@ def measure(model, read, n_rows, y=None, sample_weight=None):
     return measures_of(target, reduce(add_each, sums))
 
 
-def _scale(target):
-    """Standard deviations of a target, 1 for a constant."""
-    largest = np.maximum(np.abs(target.minimum), np.abs(target.maximum))
-    is_constant = target.maximum - target.minimum <= CONSTANT * largest
-    return np.where(is_constant, 1.0, target.scale)
-
-
 def rule_sums(model, printed, target, rows, y, weight):
     """What :func:`measures_of` takes, of some rows; the sums over more rows add up.
 
     ``target`` is the scale of all of them; ``printed`` the model as it is printed.
     """
-    kept, scale = weight > 0.0, _scale(target)
+    kept, scale = weight > 0.0, target.scale
     rows, y, weight = rows[kept], y[kept], weight[kept]
     by_rule, by_printed = (_standardised(one, target.offset, scale) for one in (model, printed))
     mass, lead = np.zeros((2, model.n_rules))
@@ -100,7 +90,7 @@ def measures_of(target, sums):
     rows = lead[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         return Measures(
-            deviation=_scale(target),
+            deviation=target.scale,
             rule_weights=mass / weight,
             rule_rows=lead,
             rule_alone=np.sqrt(alone / rows),

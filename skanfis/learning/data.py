@@ -20,6 +20,9 @@ _BLOCKS_PER_CHUNK = 16
 # one column by another, neither overflow nor vanish.
 LARGEST_NUMBER = 1e100
 
+# What varies by less than this part of its size varies by rounding errors only.
+ROUNDING = 16.0 * np.finfo(float).eps
+
 # Any fixed number would do.
 _FINGERPRINT_SEED = 20090101
 
@@ -53,8 +56,8 @@ class Scale:
 
     @property
     def is_constant(self):
-        """Which columns never change."""
-        return self.minimum == self.maximum
+        """Which columns never change, but for rounding errors."""
+        return never_changes(self.minimum, self.maximum)
 
     def varying(self, columns):
         """Some columns as a list, with None in place of those that never change."""
@@ -90,7 +93,7 @@ def column_statistics(values, sample_weight=None):
         total += float(block.shape[1] if sample_weight is None else sample_weight[part].sum())
         first += _sum(block - origin, sample_weight, part)
     mean = origin + (first / total)[:, None]
-    constant = minimum == maximum
+    constant = never_changes(minimum, maximum)
     # In parts of the range: else squares of what varies by next to nothing would vanish, unseen.
     span = np.where(constant, 1.0, maximum - minimum)
     for part in row_blocks(values.shape[0], BLOCK_ROWS):
@@ -99,10 +102,15 @@ def column_statistics(values, sample_weight=None):
     scale = span * np.sqrt(second / total)
     return Scale(
         np.where(constant, minimum, mean[:, 0]),
-        np.where(scale == 0.0, 1.0, scale),
+        np.where(constant | (scale == 0.0), 1.0, scale),
         minimum,
         maximum,
     )
+
+
+def never_changes(minimum, maximum):
+    """Whether columns between these are constant, but for rounding errors."""
+    return maximum <= minimum + ROUNDING * np.maximum(np.abs(minimum), np.abs(maximum))
 
 
 def _columns(values, part):

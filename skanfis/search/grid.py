@@ -14,7 +14,7 @@ import numpy as np
 
 from ..antecedent import GridAntecedent
 from ..learning.data import StandardisedData
-from .sample import representative_rows, weighted_quantile
+from .sample import DIGITS, representative_rows, weighted_quantile
 
 # Neighbouring terms cross at this membership at the start. From the customary 0.5, Jang's sinc gets
 # stuck; elsewhere it makes little difference.
@@ -55,6 +55,7 @@ class Spacing:
 
 def _levels(column, weight):
     """Values between the outer quantiles, and G there, from 0 to 1."""
+    column = np.round(column, DIGITS)  # what differs by rounding alone is one value
     low, high = (weighted_quantile(column, weight, _EDGE, side) for side in (1, -1))
     values = np.unique(column)
     if low == high:

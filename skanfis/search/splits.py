@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..antecedent.tree import CRISP, LEAST_WIDTH
-from .sample import counting_weight, in_deviations, to_six_digits
+from .sample import DIGITS, counting_weight, in_deviations, to_six_digits
 from .tuning import Tuned
 
 # Cuts that are looked at are next to so many quantiles of a leaf.
@@ -45,7 +45,9 @@ def best_splits(tuned: Tuned, inputs, crossed, n_most):
     weight = counting_weight(rows)
     variance = np.average(residual**2, axis=0, weights=weight)
     crossed = rows.X[:, crossed if crossed.size <= _MOST_CROSSED else []]
-    found = []
+    # Values that differ by rounding alone are one.
+    columns = {j: np.round(rows.X[:, j], DIGITS) for j in inputs}
+    orders, found = {j: np.argsort(columns[j], kind="stable") for j in inputs}, []
     for leaf, strength in enumerate(tuned.evaluation.antecedent.strengths(rows.X.T)):
         own = weight * strength
         center = np.average(crossed, axis=0, weights=own)
@@ -53,10 +55,10 @@ def best_splits(tuned: Tuned, inputs, crossed, n_most):
         along = own[:, None, None] * basis[:, :, None] * residual[:, None]
         sums = np.column_stack([own, own[:, None] * basis**2, along.reshape(rows.n_rows, -1)])
         for j in inputs:
-            cuts, statistics = _scored(rows.X[:, j], sums, basis.shape[1], variance)
+            cuts, statistics = _scored(columns[j], orders[j], sums, basis.shape[1], variance)
             if cuts.size:
                 best = int(statistics.argmax())
-                log_width = np.log(_width(rows.X[:, j], own, cuts[best]))
+                log_width = np.log(_width(columns[j], own, cuts[best]))
                 split = Split(leaf, int(j), float(cuts[best]), float(log_width))
                 found.append((statistics[best], split))
     # Two inputs may part the rows alike: not the order of columns decides then.
@@ -64,26 +66,33 @@ def best_splits(tuned: Tuned, inputs, crossed, n_most):
     return [split for _, split in found[:n_most]]
 
 
-def _scored(column, sums, n_basis, variance):
-    """Cuts of an input, and the statistic at each; ``sums`` are what is summed over rows."""
-    order = np.argsort(column, kind="stable")
-    column, upto = column[order], np.cumsum(sums[order, 0])
-    wanted = np.arange(1, _QUANTILES) / _QUANTILES * upto[-1]
-    places = np.minimum(np.searchsorted(upto, wanted), column.size - 1)
-    ends = np.unique(np.searchsorted(column, column[places], side="right"))
-    ends = ends[ends < column.size]
-    if not ends.size:
-        return ends, ends
-    below = np.add.reduceat(sums[order], np.append(0, ends), axis=0).cumsum(axis=0)
-    below, whole = below[:-1], below[-1]
-    part = below[:, :1] / whole[0]
-    mass = slice(1, 1 + n_basis)
-    norm = (1.0 - 2.0 * part) * below[:, mass] + part**2 * whole[mass]
-    along = below[:, 1 + n_basis :] - part * whole[1 + n_basis :]
-    squares = along.reshape(ends.size, n_basis, -1) ** 2
+def _scored(column, order, sums, n_basis, variance):
+    """Cuts of an input, and the statistic at each; ``sums`` are what is summed over rows.
+
+    ``order`` is that of the rows by the input.
+    """
+    cuts = _cuts(column[order], sums[order, 0])
+    is_below = (column < cuts[:, None]).astype(float)
+    # Each summed by itself: of what is next to nothing, a difference would leave rounding errors.
+    below, above = is_below @ sums, (1.0 - is_below) @ sums
+    whole = below[:, :1] + above[:, :1]
+    part, rest = below[:, :1] / whole, above[:, :1] / whole
+    mass, moment = slice(1, 1 + n_basis), slice(1 + n_basis, None)
+    norm = rest**2 * below[:, mass] + part**2 * above[:, mass]
+    along = rest * below[:, moment] - part * above[:, moment]
+    squares = along.reshape(cuts.size, n_basis, variance.size) ** 2
     squares /= np.maximum(norm[:, :, None] * variance, np.finfo(float).tiny)
-    statistics = in_deviations(squares.sum(axis=(1, 2)), n_basis * variance.size)
-    return 0.5 * (column[ends - 1] + column[ends]), statistics
+    return cuts, in_deviations(squares.sum(axis=(1, 2)), n_basis * variance.size)
+
+
+def _cuts(values, own):
+    """Half-way between values next to the quantiles of a leaf, the values being in order."""
+    upto = np.cumsum(own)
+    wanted = np.arange(1, _QUANTILES) / _QUANTILES * upto[-1]
+    places = np.minimum(np.searchsorted(upto, wanted), values.size - 1)
+    ends = np.unique(np.searchsorted(values, values[places], side="right"))
+    ends = ends[ends < values.size]
+    return 0.5 * (values[ends - 1] + values[ends])
 
 
 def _width(column, own, cut):

@@ -25,7 +25,7 @@ from .candidates import Candidate, TermScores, rule_base
 from .conditions import with_fewer_conditions
 from .grid import Spacing
 from .lasso import lasso_inputs
-from .sample import effective_weight, to_six_digits, unit_scale
+from .sample import DIGITS, effective_weight, to_six_digits, unit_scale
 from .splits import best_splits
 from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
@@ -151,7 +151,8 @@ class Trials:
     def _crossed(self, candidate):
         """Inputs that terms and cuts may act together with: those of the lasso, or all."""
         is_all = candidate.has_all_slopes or self.slope_inputs is self.plan.consequent_inputs
-        return np.flatnonzero(np.ptp(self.rows.X, axis=0)) if is_all else self.slope_inputs
+        varying = np.ptp(np.round(self.rows.X, DIGITS), axis=0) > 0.0
+        return np.flatnonzero(varying) if is_all else self.slope_inputs
 
     def n_parameters(self, candidate):
         """Of consequents and, two each, of terms."""

@@ -15,7 +15,7 @@ from ..blocks import fitting_rows, row_blocks
 from ..consequent import LocalBasis, basis, in_user_units
 from ..learning import SolverResult
 from ..learning.covariance import posterior_of
-from ..learning.data import Scale, StandardisedData, check_scales, fingerprint
+from ..learning.data import Scale, StandardisedData, check_scales, fingerprint, never_changes
 from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.gram import DesignMoments
 from ..learning.objective import SeparableProblem
@@ -154,7 +154,7 @@ def joined_scales(one: Scale, other: Scale, weight: float, other_weight: float) 
         # From the heavier side: what little is added to it costs no digits.
         one, other, weight, other_weight = other, one, other_weight, weight
     share = other_weight / (weight + other_weight)
-    is_constant = low == high
+    is_constant = never_changes(low, high)
     # In parts of the range, whose squares neither overflow nor vanish.
     span = np.where(is_constant, 1.0, high - low)
     step = (other.offset - one.offset) / span
@@ -207,10 +207,10 @@ class _ProblemOfSums(SeparableProblem):
 def inputs_with_slopes(model: TSKModel, inputs):
     """Those by which a model has slopes, or may yet: nothing is known of what has not changed."""
     assert model.target is not None
-    if not model.order or (model.target.minimum == model.target.maximum).all():
+    if not model.order or never_changes(model.target.minimum, model.target.maximum).all():
         return inputs
-    has_slope = model.coefficients[:, 1:].any(axis=(0, 2)) | (model.minimum == model.maximum)
-    return inputs[has_slope[inputs]]
+    may_yet = never_changes(model.minimum, model.maximum)
+    return inputs[(model.coefficients[:, 1:].any(axis=(0, 2)) | may_yet)[inputs]]
 
 
 def fitted_weights(estimator, sums: RowSums):
@@ -218,7 +218,8 @@ def fitted_weights(estimator, sums: RowSums):
     place, n_rows = list(sums.base.input_names).index, sums.effective_weight
     model = estimator.model_
     is_absent = (model.coefficients[:, 1:] == 0.0).all(axis=2)
-    varying = sums.consequent_inputs[(model.maximum > model.minimum)[sums.consequent_inputs]]
+    is_constant = never_changes(model.minimum, model.maximum)
+    varying = [j for j in sums.consequent_inputs if not is_constant[j]]
 
     def by_input(is_marked):
         found = [[int(j), np.flatnonzero(is_marked[:, j]).tolist()] for j in varying]

@@ -39,11 +39,14 @@ def test_columns_far_from_the_origin_lose_no_digits(rng, offset):
 
 def test_constant_column_has_scale_one_and_its_own_value(rng):
     # 0.1 is no binary fraction: the mean of many copies need not be 0.1 to the last bit.
-    values = np.column_stack([np.full(N_ROWS, 0.1), rng.normal(size=N_ROWS), np.zeros(N_ROWS)])
+    # 0.1 + 0.2 is the neighbour of 0.3.
+    sums = np.where(np.arange(N_ROWS) % 2, 0.3, 0.1 + 0.2)
+    still = np.full(N_ROWS, 0.1), np.zeros(N_ROWS), sums
+    values = np.column_stack([still[0], rng.normal(size=N_ROWS), *still[1:]])
     found = column_statistics(values, rng.uniform(size=N_ROWS))
-    assert_array_equal(found.is_constant, [True, False, True])
-    assert_array_equal(found.offset[[0, 2]], [0.1, 0.0])
-    assert_array_equal(found.scale[[0, 2]], 1.0)
+    assert_array_equal(found.is_constant, [True, False, True, True])
+    assert_array_equal(found.offset[[0, 2, 3]], [0.1, 0.0, 0.3])
+    assert_array_equal(found.scale[[0, 2, 3]], 1.0)
 
 
 def test_part_of_the_rows_keeps_the_scales_of_all(rng):

@@ -41,7 +41,7 @@ def test_the_statistic_is_the_formula_at_every_cut(rng, n_outputs):
         along = (own[:, None, None] * b[:, :, None] * residual[:, None]).reshape(rows.n_rows, -1)
         sums = np.column_stack([own, own[:, None] * b**2, along])
         for j in range(3):
-            cuts, found = _scored(rows.X[:, j], sums, 4, variance)
+            cuts, found = _scored(rows.X[:, j], np.argsort(rows.X[:, j]), sums, 4, variance)
             expected = []
             for cut in cuts:
                 assert not np.isin(cut, rows.X[:, j])
@@ -82,3 +82,16 @@ def test_of_inputs_that_part_the_rows_alike_the_order_of_columns_does_not_decide
     forth = best_splits(model_of(X, y), range(3), np.empty(0, dtype=int), 3)
     back = best_splits(model_of(X[:, order], y), range(3), np.empty(0, dtype=int), 3)
     assert [split.input for split in forth] == [order[split.input] for split in back]
+
+
+def test_values_that_differ_by_rounding_are_one(rng):
+    """Half-way between two neighbouring numbers there is no third."""
+    flag, x = rng.integers(0, 2, 200), rng.normal(size=200)
+    wobble = np.where(rng.random(200) < 0.3, np.nextafter(flag, 2.0), flag)
+    y = np.where(flag, x, -x)[:, None] + (wobble > 1.0)[:, None]
+    exact, found = (
+        best_splits(model_of(np.column_stack([column, x]), y), [0], np.arange(2), 1)[0]
+        for column in (flag, wobble)
+    )
+    assert_allclose(found.cut, exact.cut, atol=1e-8)
+    assert_allclose(found.log_width, exact.log_width, atol=1e-8)  # crisp
