@@ -64,5 +64,6 @@ def _in_range(X, grow, judge):
 
     The model of all rows has seen their like; to this fold they are beyond the data.
     """
+    X = np.round(X, DIGITS)
     low, high = X[grow].min(axis=0), X[grow].max(axis=0)
     return judge[((X[judge] >= low) & (X[judge] <= high)).all(axis=1)]

@@ -38,7 +38,7 @@ def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
     weighted makes any difference.
     """
     groups = np.zeros(rows.n_rows) if rows.groups is None else rows.groups
-    numbers = rows.numbers(lambda *block: fingerprint(np.concatenate(block)))
+    numbers = rows.numbers(lambda *block: fingerprint(np.round(np.concatenate(block), DIGITS)))
     keys = np.stack([groups, numbers, rows.numbers(place_in_sample)])
     order = np.lexsort(keys)
     first = np.flatnonzero(np.diff(keys[:2, order], prepend=-np.inf).any(axis=0))

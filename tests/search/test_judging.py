@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.learning.data import StandardisedData
 from skanfis.search.judging import dealt_rows, judging_folds
@@ -74,6 +74,17 @@ class TestSplits:
         assert_array_equal(
             np.sort(np.concatenate([j for _, j in judging_folds(rows)])), np.arange(300)
         )
+
+    def test_rounding_neither_parts_rows_nor_takes_them_out_of_range(self, rng):
+        X, y = measured(rng, 120)
+        X[:, 1], X[60:], y[60:] = np.sign(X[:, 1]), X[:60], y[:60]
+        wobble = X * (1.0 + 2e-16 * rng.integers(-1, 2, X.shape))
+        exact, found = dealt(X, y), dealt(wobble, y)
+        assert_array_equal(found.sample_weight, exact.sample_weight)
+        assert_allclose(found.X, exact.X, atol=1e-12)
+        parts = zip(judging_folds(found), judging_folds(exact), strict=True)
+        for (_, own), (_, expected) in parts:
+            assert_array_equal(own, expected)
 
     def test_one_row_judges_itself(self, rng):
         (fold,) = judging_folds(dealt(*measured(rng)).part([0]))
