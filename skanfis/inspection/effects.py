@@ -75,11 +75,6 @@ def effects(
         where the output would be held within its limits, from 10,000 draws. ``notes``: sentences.
         Printed, many rows that do nothing, or no more than draws are off by, are one.
 
-    Raises
-    ------
-    ValueError
-        If distributions are not known and X is not given; if a column is not there.
-
     References
     ----------
     .. [1] G. Li and H. Rabitz, "Global sensitivity analysis for systems with independent and/or

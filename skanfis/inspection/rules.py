@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_count
 from ..digits import MOST_DIGITS
-from ..export import fold
 from ..export.folding import fold_with_reader, last_step
 from .sentences import Sentences
 
@@ -116,11 +115,6 @@ def rules_table(estimator: Any) -> Any:
         strongest. ``"at"``: its centre, the mean of the rows by its strength, or a place near it.
         ``"then y"``, per output: the "value" that it says there, and the slope by each input.
 
-    Raises
-    ------
-    ValueError
-        If a step of a pipeline cannot be folded.
-
     Examples
     --------
     >>> from skanfis import ANFISRegressor
@@ -132,7 +126,7 @@ def rules_table(estimator: Any) -> Any:
     >>> list(rules["then y"])
     ['value', 'x0', 'x1']
     """
-    model = fold(estimator)
+    model = fold_with_reader(estimator)[0]
     asked, said = conditions(model), Sentences.of(model, MOST_DIGITS)
     # Pairs: an input may be called "value" too.
     columns: list = [
