@@ -163,12 +163,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
         there; "contribution", strength times value. **The sum of the contributions is the
         prediction**. Lines without a number are "held" at the limits of training, and "beyond x",
         the way from the nearest point of the range along the tangent. With
-        ``out_of_bounds="nan"`` rows outside have missing values.
-
-    Raises
-    ------
-    ValueError
-        If X does not fit the model, or lies outside the range with ``out_of_bounds="raise"``.
+        ``out_of_bounds="nan"`` rows outside have missing values, and "raise" refuses them.
 
     Examples
     --------

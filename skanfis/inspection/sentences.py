@@ -67,7 +67,7 @@ class Sentences:
         if precision < MOST_DIGITS:
             # A case that all rows of a rule are, or none is, changes nothing there.
             is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
-            _tell_from_levels(model, levels, told, places, ~is_fixed)
+            _tell_from_levels(model, levels, told, places, is_common, ~is_fixed)
         values = np.einsum("rj,rjo->ro", places - model.reference, slopes)
         values += model.coefficients[:, 0]
         slopes = rounded(told, noise / model.spread[:, None], precision)
@@ -91,7 +91,7 @@ class Sentences:
         """The model that the written numbers are."""
         model = self.model
         own = np.where(self.is_own, self.slopes, 0.0)
-        part = np.where(model.common_slopes[:, :, None], self.common, 0.0)
+        part = np.where(self.is_own, 0.0, self.common)
         constant = self.values - self.of_common
         constant -= np.einsum("rj,rjo->ro", self.places - model.reference, own)
         constant -= np.einsum("j,rjo->ro", self.common_place - model.reference, part)
@@ -115,7 +115,7 @@ def columns_of(model, levels):
     return [levels.get(name, (name,))[0] for name in model.input_names]
 
 
-def _tell_from_levels(model, levels, slopes, places, is_told):
+def _tell_from_levels(model, levels, slopes, places, is_common, is_told):
     """Let rules say their value at the commonest level of a category, and how others differ.
 
     In place; where all rows have an indicator, which then sum to one, and that is no more to say.
@@ -123,8 +123,15 @@ def _tell_from_levels(model, levels, slopes, places, is_told):
     centers, names = model.rule_centers, list(model.input_names)
     for indicators in by_column(levels)[0].values():
         own = [names.index(name) for name in indicators if name in names]
-        is_all = np.round(model.reference[own].sum(), _DIGITS_OF_CASE) == 1.0
-        if not is_all or model.common_slopes[:, own].any():
+        if np.round(model.reference[own].sum(), _DIGITS_OF_CASE) != 1.0:
+            continue
+        if is_common[:, own].any():
+            # Of two levels one slope says all, in place of the common one.
+            for r in np.flatnonzero(is_common[:, own].sum(axis=1) == 1) if len(own) == 2 else ():
+                j, other = sorted(own, key=is_common[r].__getitem__, reverse=True)
+                if (slopes[r, other] * is_told[r, other]).any():
+                    slopes[r, j], slopes[r, other] = slopes[r, j] - slopes[r, other], 0.0
+                    is_common[r, j], places[r, other] = False, 1.0 - places[r, j]
             continue
         base = centers[:, own].argmax(axis=1)[:, None] == np.arange(len(own))
         now, said = slopes[:, own], is_told[:, own, None]

@@ -230,7 +230,7 @@ def _common_lines(said):
 def _conclusion(said, r, k):
     """What rule r says of output k: "about 33.6, of it +4.2 from the common line: ..."."""
     own = _slopes(said, said.slopes[r, :, k], said.places[r], said.is_own[r, :, k])
-    has_common = (said.model.common_slopes[r] & (said.common[:, k] != 0.0)).any()
+    has_common = np.any(~said.is_own[r, :, k] & (said.common[:, k] != 0.0))
     text = f"{'about ' if own or has_common else ''}{plain(said.values[r, k])}"
     if said.of_common[r, k]:
         text += f", of it {_signed(said.of_common[r, k])} from the common line"

@@ -15,7 +15,7 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
 from skanfis.export import export_json, read_json
-from skanfis.inspection import export_text, readability, rules_html
+from skanfis.inspection import explain, export_text, readability, rules_html
 from skanfis.inspection.rules import parts_led
 from skanfis.inspection.sentences import Sentences
 from skanfis.inspection.text import percent
@@ -269,6 +269,34 @@ def test_a_value_is_that_of_a_level_and_others_are_told_from_it(handle_unknown, 
         by_hand += float(change) * (X[column] == level)
     assert np.abs(by_hand - pipe.predict(X)).max() < 0.1
     assert f"\n{2 + len(told)} numbers;" in export_text(pipe)
+
+
+@pytest.mark.parametrize("handle_unknown", ["error", "ignore"])
+def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(handle_unknown, rng):
+    X = pd.DataFrame({"rate": rng.normal(size=300), "on": rng.choice(["n", "y"], 300)})
+    encoder = OneHotEncoder(sparse_output=False, handle_unknown=handle_unknown)
+    encoder = make_column_transformer((encoder, ["on"]), remainder="passthrough")
+    model = ANFISRegressor(partition="tree", max_rules=3, order=1)
+    y = np.where(X["rate"] > 0.7, 9.0, np.where(X["rate"] < -0.7, -9.0, 0.0))
+    pipe = make_pipeline(encoder, model).fit(X, y + 0.1 * rng.normal(size=300))
+    # By the one indicator two rules have a common slope, by the other the third has its own.
+    coefficients = np.zeros((3, 4, 1))
+    coefficients[:, 0, 0], coefficients[1:, 2, 0], coefficients[0, 1, 0] = [1.0, 5.0, 9.0], 2.0, 4.0
+    coefficients[0, 2, 0] = 2.0
+    pipe[-1].model_ = replace(pipe[-1].model_, coefficients=coefficients)
+    text = export_text(pipe)
+    line = re.search(r"Common to the rules, y: (.*)\.", text)[1]
+    told = re.findall(r"Rule (\d)[\s\S]*?THEN y is about (\S+)(?:, of it (\S+) .*)?(: .*)?\n", text)
+    assert {r for r, *_, slopes in told if slopes} == {"0"}
+    # What a rule says itself is said in place of the line.
+    for level in "ny":
+        row = pd.DataFrame({"rate": [0.0], "on": [level]})
+        values = explain(pipe, row).set_index("rule")["value"]
+        for r, value, part, slopes in told:
+            said = re.search(r"([-+]\S+) if on is (not )?([ny])", slopes or line)
+            holds = (level == said[3]) != bool(said[2])
+            by_hand = float(value) - float(part or 0.0) + float(said[1]) * holds
+            assert by_hand == pytest.approx(values[int(r)], abs=0.05)
 
 
 def test_that_it_is_no_other_level_is_not_said(rng):
