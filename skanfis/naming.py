@@ -91,7 +91,11 @@ def _written(group, own, low, high, fewest):
     for digits in range(fewest, most + 1):
         written = {}
         for place, length, is_alone in terms:
-            text = sign + plain(rounded(place, length, digits))
+            at = rounded(place, length, digits)
+            # A cut between rows is not said to be beyond them all.
+            if per_width > 1.0 and low < place < high and not low < at < high and digits < most:
+                continue
+            text = sign + plain(at)
             if not is_alone:
                 text += f" ± {in_digits(length, digits)}"
             written[place, length, is_alone] = text
@@ -99,7 +103,7 @@ def _written(group, own, low, high, fewest):
         for term, text in written.items():
             if term not in names and (taken[text] == 1 or digits == most):
                 names[term] = text
-        if len(names) == len(written):
+        if len(names) == len(set(terms)):
             break
     if max(abs(low), abs(high - 1.0)) <= _ROUNDING:
         names |= {term: "1" if sign == "> " else "0" for term in terms if term[2]}

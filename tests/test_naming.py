@@ -128,6 +128,14 @@ def test_a_side_has_the_digits_that_matter_over_its_width(cut, half, name):
     assert default_term_names(model(tree((0, cut, half)), box)) == (f"> {name}", f"< {name}")
 
 
+def test_a_cut_near_the_end_of_the_range_has_rows_on_both_sides():
+    box = np.array([[60_011.0], [1.3e9]])
+    cut = tree((0, 4.7e6, 1.3e8))
+    assert default_term_names(model(cut, box)) == ("> 5000000 ± 130000000", "< 5000000 ± 130000000")
+    # What stands beyond the rows stays there.
+    assert default_term_names(model(tree((0, 3.0, 1.3e8)), box))[0] == "> 0 ± 130000000"
+
+
 def test_cuts_that_differ_are_told_apart_and_equal_ones_are_not():
     names = default_term_names(model(tree((0, 1.001, 0.3), (1, 2.0, 0.3), (0, 1.002, 0.3))))
     assert names[:3] == ("> 1.001 ± 0.3", "> 2 ± 0.3", "> 1.002 ± 0.3")

@@ -90,7 +90,7 @@ class Antecedent(ABC):
     # Of a term, in standardised units; what is narrower is crisp, and does not move.
     least_width: ClassVar[float] = 0.0
 
-    def without_implied(self, tolerance) -> "Antecedent":
+    def without_implied(self, tolerance, columns=None) -> "Antecedent":
         """The same without terms that other terms of the same rule imply, but for so little."""
         return self
 

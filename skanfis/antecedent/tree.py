@@ -89,11 +89,12 @@ class TreeAntecedent(RuleTableAntecedent):
         theta = np.column_stack([nodes.theta, [cut, log_width]])
         return self.build(np.append(nodes.inputs, j), theta, paths)
 
-    def without_implied(self, tolerance):
+    def without_implied(self, tolerance, columns=None):
         """A table of the rules without sides that another side on the same path implies.
 
         As "x < 9 ± 1" follows from "x < 7.1 ± 0.7": nowhere is x below the one cut and above the
-        other, the truth of one times that of the other, by more than the tolerance.
+        other, the truth of one times that of the other, by more than the tolerance. Of inputs that
+        are of one column, by its name in ``columns``, only one is above its cut.
         """
         nodes, table = self.groups[0], self.table.copy()
         # Of two cuts k and m of one input, whether what is below k is below m too.
@@ -102,6 +103,10 @@ class TreeAntecedent(RuleTableAntecedent):
         for k, m in np.argwhere(is_less):
             is_less[k, m] = _overlap(nodes.theta[:, [k, m]]) <= tolerance
         implies = linalg.block_diag(is_less.T, is_less)
+        if columns is not None:
+            of = np.array(columns)[nodes.inputs]
+            is_other = (of[:, None] == of) & (nodes.inputs[:, None] != nodes.inputs)
+            implies[: len(of), len(of) :] = is_other
         for row in table:
             own = row[row >= 0]
             row[np.isin(row, own[implies[np.ix_(own, own)].any(axis=0)])] = -1

@@ -28,8 +28,8 @@ BRIGHTEST = 0.85
 _MOST_NAMED = 7
 # Characters of a legend, or of a note below, that a panel has room for.
 _LEGEND_WIDTH = 42
-# Contours that can still be told apart by colour.
-_LEVELS = 15
+# Contours that can still be told apart by colour; of values, what is rounding.
+_LEVELS, _FLAT = 15, 1e-11
 # Below this coverage a prediction counts as extrapolated: it does not set the colours.
 _COVERED = 0.5
 
@@ -64,8 +64,8 @@ class MembershipDisplay:
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import MembershipDisplay
-    >>> X, y = make_jang_sinc()
-    >>> display = MembershipDisplay.from_estimator(ANFISRegressor(n_mfs=3).fit(X, y), X)
+    >>> model = ANFISRegressor(n_mfs=3).fit(*make_jang_sinc())
+    >>> display = MembershipDisplay.from_estimator(model)
     >>> display.inputs[0].term_names
     ('low', 'medium', 'high')
     """
@@ -158,8 +158,8 @@ class ResponseSurfaceDisplay:
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
     >>> from skanfis.inspection import ResponseSurfaceDisplay
-    >>> X, y = make_jang_sinc()
-    >>> display = ResponseSurfaceDisplay.from_estimator(ANFISRegressor(n_mfs=4).fit(X, y), X)
+    >>> model = ANFISRegressor(n_mfs=4).fit(*make_jang_sinc())
+    >>> display = ResponseSurfaceDisplay.from_estimator(model)
     >>> display.response.shape
     (60, 60)
     """
@@ -242,7 +242,9 @@ class ResponseSurfaceDisplay:
         seen = self.response[self.coverage >= _COVERED]
         seen = seen if seen.size > 1 else self.response
         low, high = np.min(seen), np.max(seen)
-        levels = pyplot().MaxNLocator(_LEVELS).tick_values(low, high) if high > low else None
+        # What is flat but for rounding has a scale about its one value.
+        room = 0.0 if high - low > _FLAT * max(-low, high) else 0.1 * max(-low, high) or 1.0
+        levels = pyplot().MaxNLocator(_LEVELS).tick_values(low - room, high + room)
         self.surface_ = ax.contourf(x, y, self.response, levels=levels, extend="both")
         self.figure_.colorbar(self.surface_, ax=ax, label=on_axis(self.output_name))
         # White over the surface, the thicker the less data cover it; under the points.

@@ -72,10 +72,8 @@ class Readability:
     --------
     >>> from skanfis import ANFISRegressor
     >>> from skanfis.datasets import make_jang_sinc
-    >>> from skanfis.inspection import readability
-    >>> X, y = make_jang_sinc()
-    >>> found = readability(ANFISRegressor(n_mfs=[3, 1], order=0, solver="lse").fit(X, y), X, y)
-    >>> found.rules["numbers"].tolist()
+    >>> model = ANFISRegressor(n_mfs=[3, 1], order=0, solver="lse").fit(*make_jang_sinc())
+    >>> model.readability_.rules["numbers"].tolist()
     [2, 2, 2]
     """
 
@@ -149,19 +147,23 @@ class Readability:
                 )
         return sentences
 
+    @property
+    def _is_on_few(self):
+        return has_training_data(self.model) & (self.model.rule_rows < self._said.n_numbers)
+
     def _on_few_rows(self):
-        """Rules that are the strongest on fewer training rows than they have numbers."""
         numbers, rows = self._said.n_numbers, self.model.rule_rows
-        few = np.flatnonzero(rows < numbers)
-        if not few.size or not has_training_data(self.model):
-            return []
+        few = np.flatnonzero(self._is_on_few)
         named = _named([f"{r} (rows: {rows[r]:.3g}, numbers: {numbers[r]})" for r in few])
-        return [f"Strongest on fewer rows than its sentence has numbers: rule {named}."]
+        what = "Strongest on fewer rows than its sentence has numbers: rule"
+        return [f"{what} {named}."] if named else []
 
     def _on_constants(self):
         """Rules that err more on the rows on which they are the strongest than a constant would."""
         found, outputs, named = self.measures, self.model.output_names, []
         is_poor = found.rule_errors > np.maximum(GREATEST_ERROR * found.rule_spreads, _ROUNDING)
+        # Through a few rows a constant may go itself.
+        is_poor &= ~self._is_on_few[:, None]
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
             both = found.rule_errors[r, k], found.rule_spreads[r, k]
@@ -216,11 +218,6 @@ def readability(
     -------
     readability : Readability
         Tables, summary and findings.
-
-    Raises
-    ------
-    ValueError
-        If X, y or the weights do not fit the model, or a step of a pipeline cannot be folded.
 
     Examples
     --------

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_count
 from ..digits import MOST_DIGITS
-from ..export import fold
 from ..export.folding import fold_with_reader, last_step
 from .sentences import Sentences
 
@@ -116,11 +115,6 @@ def rules_table(estimator: Any) -> Any:
         strongest. ``"at"``: its centre, the mean of the rows by its strength, or a place near it.
         ``"then y"``, per output: the "value" that it says there, and the slope by each input.
 
-    Raises
-    ------
-    ValueError
-        If a step of a pipeline cannot be folded.
-
     Examples
     --------
     >>> from skanfis import ANFISRegressor
@@ -132,7 +126,7 @@ def rules_table(estimator: Any) -> Any:
     >>> list(rules["then y"])
     ['value', 'x0', 'x1']
     """
-    model = fold(estimator)
+    model = fold_with_reader(estimator)[0]
     asked, said = conditions(model), Sentences.of(model, MOST_DIGITS)
     # Pairs: an input may be called "value" too.
     columns: list = [
@@ -169,12 +163,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
         there; "contribution", strength times value. **The sum of the contributions is the
         prediction**. Lines without a number are "held" at the limits of training, and "beyond x",
         the way from the nearest point of the range along the tangent. With
-        ``out_of_bounds="nan"`` rows outside have missing values.
-
-    Raises
-    ------
-    ValueError
-        If X does not fit the model, or lies outside the range with ``out_of_bounds="raise"``.
+        ``out_of_bounds="nan"`` rows outside have missing values, and "raise" refuses them.
 
     Examples
     --------

@@ -20,7 +20,7 @@ import numpy as np
 
 from ..antecedent.tree import CRISP
 from ..digits import MOST_DIGITS, rounded
-from ..export.columns import Level
+from ..export.columns import Level, by_column
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..reading_cost import UNSAID
@@ -48,7 +48,6 @@ class Sentences:
     is_own: np.ndarray  # which of them the rule states itself
     common_place: np.ndarray  # (n_inputs,)
     common: np.ndarray  # the common line; zero where nothing is in common, (n_inputs, n_outputs)
-    two_valued: np.ndarray  # inputs that are 0 or 1, (n_inputs,)
     levels: Mapping[str, Level]  # as ``Reader.levels``
 
     @classmethod
@@ -63,49 +62,36 @@ class Sentences:
             np.where(two_valued, np.round(np.clip(at, 0.0, 1.0)), rounded(at, model.spread, digits))
             for at in (centers, model.reference)
         )
-        away = places - model.reference
-        values = model.coefficients[:, 0] + np.einsum("rj,rjo->ro", away, slopes)
-        slopes = rounded(slopes, noise / model.spread[:, None], precision)
-        is_common = model.common_slopes
-        first = is_common.argmax(axis=0), np.arange(model.n_inputs)
-        common = np.where(np.any(is_common, axis=0, keepdims=True).T, slopes[first], 0.0)
-        part = np.where(is_common[:, :, None], common, 0.0)
+        is_common, levels, told = model.common_slopes, levels or {}, slopes.copy()
+        is_fixed = np.zeros(places.shape, dtype=bool)
         if precision < MOST_DIGITS:
             # A case that all rows of a rule are, or none is, changes nothing there.
             is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
-            slopes[is_fixed[:, :, None] & (common == 0.0)] = 0.0
+            _tell_from_levels(model, levels, told, places, is_common, ~is_fixed)
+        values = np.einsum("rj,rjo->ro", places - model.reference, slopes)
+        values += model.coefficients[:, 0]
+        slopes = rounded(told, noise / model.spread[:, None], precision)
+        first = is_common.argmax(axis=0), np.arange(model.n_inputs)
+        common = np.where(np.any(is_common, axis=0, keepdims=True).T, slopes[first], 0.0)
+        part = np.where(is_common[:, :, None], common, 0.0)
+        slopes[is_fixed[:, :, None] & (common == 0.0)] = 0.0
         of_common = np.einsum("rj,rjo->ro", places - common_place, part)
         # Beside a common slope that of nothing is to be said as well.
         is_own = ~is_common[:, :, None] & ((slopes != 0.0) | (common != 0.0))
         # What terms may be off by is a part of the output's deviation, not of the noise.
         more = int(np.floor(np.log10(scale / noise)).max(initial=0.0))
         digits = min(precision + more, MOST_DIGITS)
-        written, says_where = _written_terms(model, digits)
-        return cls(
-            written,
-            says_where,
-            places,
-            rounded(values, noise, precision),
-            rounded(of_common, noise, precision),
-            slopes,
-            is_own,
-            common_place,
-            common,
-            two_valued,
-            levels or {},
-        )
-
-    @property
-    def called(self) -> list[str]:
-        """The column that each input is of; those of one category by its name."""
-        return [self.levels.get(name, (name,))[0] for name in self.model.input_names]
+        written, says_where = _written_terms(model, levels, digits)
+        values, of_common = (rounded(one, noise, precision) for one in (values, of_common))
+        of_rules = places, values, of_common, slopes, is_own
+        return cls(written, says_where, *of_rules, common_place, common, levels)
 
     @property
     def printed(self) -> TSKModel:
         """The model that the written numbers are."""
         model = self.model
         own = np.where(self.is_own, self.slopes, 0.0)
-        part = np.where(model.common_slopes[:, :, None], self.common, 0.0)
+        part = np.where(self.is_own, 0.0, self.common)
         constant = self.values - self.of_common
         constant -= np.einsum("rj,rjo->ro", self.places - model.reference, own)
         constant -= np.einsum("j,rjo->ro", self.common_place - model.reference, part)
@@ -124,6 +110,38 @@ class Sentences:
         return int(self.n_numbers.sum() + np.count_nonzero(self.common))
 
 
+def columns_of(model, levels):
+    """The column that each input is of; those of one category by its name."""
+    return [levels.get(name, (name,))[0] for name in model.input_names]
+
+
+def _tell_from_levels(model, levels, slopes, places, is_common, is_told):
+    """Let rules say their value at the commonest level of a category, and how others differ.
+
+    In place; where all rows have an indicator, which then sum to one, and that is no more to say.
+    """
+    centers, names = model.rule_centers, list(model.input_names)
+    for indicators in by_column(levels)[0].values():
+        own = [names.index(name) for name in indicators if name in names]
+        if np.round(model.reference[own].sum(), _DIGITS_OF_CASE) != 1.0:
+            continue
+        if is_common[:, own].any():
+            # Of two levels one slope says all, in place of the common one.
+            for r in np.flatnonzero(is_common[:, own].sum(axis=1) == 1) if len(own) == 2 else ():
+                j, other = sorted(own, key=is_common[r].__getitem__, reverse=True)
+                if (slopes[r, other] * is_told[r, other]).any():
+                    slopes[r, j], slopes[r, other] = slopes[r, j] - slopes[r, other], 0.0
+                    is_common[r, j], places[r, other] = False, 1.0 - places[r, j]
+            continue
+        base = centers[:, own].argmax(axis=1)[:, None] == np.arange(len(own))
+        now, said = slopes[:, own], is_told[:, own, None]
+        changes = np.where(said, now - now[base][:, None], 0.0)
+        fewest, most = (np.count_nonzero(one, axis=(1, 2)) for one in (changes, now * said))
+        is_short = fewest <= most
+        rules = np.ix_(is_short, own)
+        slopes[rules], places[rules] = changes[is_short], base[is_short]
+
+
 def _resolution(model, slopes):
     """Deviation of every output, and of the noise about it, (n_outputs,) each; positive."""
     if model.target is None:
@@ -136,12 +154,12 @@ def _resolution(model, slopes):
     return scale, np.clip(noise, _FINEST * scale, scale)
 
 
-def _written_terms(model, digits):
+def _written_terms(model, levels, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
     A name that somebody has given stays. Where every training row is on one side of a cut, to so
     many digits but not to all, the width is left out, and the cut is crisp. So are conditions that
-    others of the same rule imply.
+    others of the same rule imply, as that it is no other level of a category.
     """
     antecedent = model.antecedent
     default, of_digits = default_term_names(model), default_term_names(model, digits)
@@ -167,7 +185,7 @@ def _written_terms(model, digits):
         start += group.n_terms
     written = replace(antecedent, groups=tuple(groups))
     if digits < MOST_DIGITS:
-        written = written.without_implied(UNSAID)
+        written = written.without_implied(UNSAID, columns_of(model, levels))
     return replace(model, antecedent=written, term_names=tuple(names)), says_where
 
 

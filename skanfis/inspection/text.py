@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits
+from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, rounded
 from ..export.columns import by_column
 from ..export.folding import fold_with_reader
 from ..policies import SILENT, policy_in_words
@@ -23,7 +23,7 @@ from .rules import (
     rename,
     shown_rules,
 )
-from .sentences import PRECISION, Sentences
+from .sentences import PRECISION, Sentences, columns_of
 
 # Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 4
@@ -89,11 +89,6 @@ def export_text(
         there. Last how many numbers there are, what the text as printed errs over the model (with
         the default precision), and what the fit found against reading the rules one by one.
 
-    Raises
-    ------
-    ValueError, TypeError
-        If a parameter is out of its range, a step cannot be folded, or there are no rules.
-
     Examples
     --------
     >>> import numpy as np
@@ -121,7 +116,7 @@ def export_text(
     said, found = _said(estimator, precision, feature_names, output_names)
     model, chosen = said.model, shown_rules(said.model, max_shown)
     counts = f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."
-    parts = ["\n".join([counts, *_deviations(model, precision)])]
+    parts = ["\n".join([counts, *_deviations(model, found, precision)])]
     common = _common_lines(said)
     parts += [_wrapped(f"Common to the rules, {line}.") for line in common]
     if common:
@@ -134,7 +129,7 @@ def export_text(
             lines.append(f"{' AND' if k else 'THEN'} {name} is {_conclusion(said, r, k)}")
         parts.append("\n".join([f"{heading}:", *(_wrapped(one, "  ", 7 * " ") for one in lines)]))
     if len(chosen) < model.n_rules:
-        parts.append(f"{_left_out(model, chosen)} left out.")
+        parts.append(f"Left out: {_left_out(model, chosen)}.")
     if show_terms:
         parts.append(_legend(said, found, precision))
     parts.append("\n".join(_wrapped(one) for one in _last_lines(said, found, precision)))
@@ -156,11 +151,6 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     html : str
         One ``<div>``, with names escaped, and nothing to run or to load; what speaks against
         reading the rules one by one is folded away below them.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If a number is out of its range, a step cannot be folded, or there are no rules.
 
     Examples
     --------
@@ -185,7 +175,8 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
         table = pd.DataFrame(cells, index=chosen)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{counted(model.n_rules, 'rule')}</b>, {_inputs_and_rows(model)}"
-    parts = [f"<div>{line}</div>" for line in [counts, *map(escape, _deviations(model))]] + [table]
+    first = [counts, *map(escape, _deviations(model, found))]
+    parts = [*(f"<div>{line}</div>" for line in first), table]
     lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
     if len(chosen) < model.n_rules:
         lines.append(f"and {_left_out(model, chosen)}")
@@ -213,14 +204,18 @@ def _inputs_and_rows(model):
     return f"{inputs}, {counted(f'{n_rows:,}', 'row')}" if has_training_data(model) else inputs
 
 
-def _deviations(model, precision=PRECISION):
+def _deviations(model, found, precision=PRECISION):
     """Say "y varies by 27, about the rules by 11 (standard deviation).", as far as it is known."""
     lines, target = [], model.target
+    # The noise is of a free fit: one with constraints, or a robust one, errs by more.
+    is_known = found is not None and not found.is_of_chunk
+    errors = found.measures.deviation * found.measures.errors if is_known else 0.0
     for k, name in enumerate(model.output_names if target else ()):
         spread = target.spread[k] if target.minimum[k] < target.maximum[k] else 0.0
         line = f"{name} varies by {in_digits(spread, precision)}"
         if model.posterior is not None:
-            line += f", about the rules by {in_digits(model.posterior.noise[k], precision)}"
+            noise = np.maximum(model.posterior.noise, errors)[k]
+            line += f", about the rules by {in_digits(noise, precision)}"
         lines.append(f"{line} (standard deviation).")
     return lines
 
@@ -235,7 +230,7 @@ def _common_lines(said):
 def _conclusion(said, r, k):
     """What rule r says of output k: "about 33.6, of it +4.2 from the common line: ..."."""
     own = _slopes(said, said.slopes[r, :, k], said.places[r], said.is_own[r, :, k])
-    has_common = (said.model.common_slopes[r] & (said.common[:, k] != 0.0)).any()
+    has_common = np.any(~said.is_own[r, :, k] & (said.common[:, k] != 0.0))
     text = f"{'about ' if own or has_common else ''}{plain(said.values[r, k])}"
     if said.of_common[r, k]:
         text += f", of it {_signed(said.of_common[r, k])} from the common line"
@@ -247,14 +242,15 @@ def _slopes(said, slopes, places, is_said):
 
     Levels of a category stand together; none in place of a common one is "no change with rooms".
     """
-    parts, does, called = [], np.abs(slopes) * said.model.spread, said.called
+    model, parts, does = said.model, [], np.abs(slopes) * said.model.spread
+    called = columns_of(model, said.levels)
     most: dict[str, float] = {}
     for j in np.flatnonzero(is_said):
         most[called[j]] = max(most.get(called[j], 0.0), does[j])
     order = sorted(np.flatnonzero(is_said), key=lambda j: (-most[called[j]], called[j], -does[j]))
     for j in order:
-        name, slope, place = said.model.input_names[j], slopes[j], places[j]
-        if said.two_valued[j]:
+        name, slope, place = model.input_names[j], slopes[j], places[j]
+        if model.two_valued[j]:
             other = 1.0 - place
             change = _signed(slope * (other - place)) if slope else "no change"
             parts.append(f"{change} if {condition(name, plain(other), said.levels)}")
@@ -277,8 +273,10 @@ def _on_rows(model, found, r):
 
 
 def percent(part):
-    """Write "48 %", "6.5 %"."""
-    share = 100.0 * part
+    """Write "48 %", "6.5 %", and of what is not all "99.5 %"."""
+    share, rest = 100.0 * part, 100.0 * (1.0 - part)
+    if rest > ROUNDING and f"{share:.0f}" == "100":
+        return f"{plain(rounded(share, rest, 1))} %"
     return f"{share:{'.0f' if share >= 10.0 else '.2g'}} %"
 
 
@@ -305,7 +303,7 @@ def _legend(said, found, precision):
     families = [group.family for group in model.antecedent.groups]
     at = {one.name for family in families for one in family.parameters if one.kind == "location"}
     named = list(compress(model.memberships(), ~said.says_where))
-    called = said.called
+    called = columns_of(model, said.levels)
     has_part = said.is_own.any(axis=(0, 2)) | said.common.any(axis=1)
     has_part[model.antecedent.term_inputs] = True
     # Where nothing is predicted outside the range of any input, all of them have.
@@ -316,7 +314,7 @@ def _legend(said, found, precision):
         if called[j] not in with_part:
             continue
         terms = [term for term in named if term["input"] == name]
-        if said.two_valued[j] and name in said.levels and not terms:
+        if model.two_valued[j] and name in said.levels and not terms:
             categories.setdefault(called[j], []).append(j)
             continue
         range_of = range_in_digits(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
@@ -334,8 +332,9 @@ def _legend(said, found, precision):
         if alike := [one for one in unnamed if (one in with_slope) == has_slope]:
             names = ", ".join(alike) if len(alike) <= MOST_NAMED else f"{len(alike)} more inputs"
             lines.append(_wrapped(f"  {names}: {told}", later=6 * " "))
-    words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
-    lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
+    if with_part - categories.keys():
+        words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
+        lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         if np.isfinite([low, high]).any():
             limits = range_in_digits(low, high, precision + 1)
@@ -363,10 +362,8 @@ def _term_text(term, locations):
 
 def _left_out(model, chosen):
     text = counted(model.n_rules - len(chosen), "rule")
-    if not has_training_data(model):
-        return text
-    weight = max(1.0 - model.rule_weights[chosen].sum(), 0.0)
-    return f"{text} with {100.0 * weight:.3g} % of the weight"
+    rest = percent(max(1.0 - parts_led(model)[chosen].sum(), 0.0))
+    return f"{text}, strongest on {rest} of the rows" if has_training_data(model) else text
 
 
 def _wrapped(text, first="", later=""):

@@ -77,11 +77,6 @@ class TreeDisplay:
             Which output, by position or name.
         ax : matplotlib Axes, default=None
             None makes a figure.
-
-        Raises
-        ------
-        ValueError
-            If the rules are no tree, or the plane is asked of one that cuts more or fewer inputs.
         """
         check_choice("kind", kind, ("tree", "plane"))
         model, reader = fold_with_reader(estimator)
@@ -99,7 +94,7 @@ class TreeDisplay:
 
     @property
     def _said(self):
-        return Sentences.of(self.model)
+        return Sentences.of(self.model, levels=self.levels)
 
     @property
     def values(self) -> np.ndarray:

@@ -69,6 +69,17 @@ class TestSurface:
         assert display.xx0.min() == model.minimum[2]
         assert display.xx1.max() == model.maximum[0]
 
+    @pytest.mark.parametrize("value", [-7.0, 0.0, 2249.7])
+    def test_what_is_flat_but_for_rounding_is_drawn_flat(self, value):
+        xx0, xx1 = np.meshgrid(np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 7))
+        response = value * (1.0 + 1e-13 * np.random.default_rng(0).normal(size=xx0.shape))
+        shown = {"xx0": xx0, "xx1": xx1, "response": response, "coverage": np.ones(xx0.shape)}
+        names = {"input_names": ("a", "b"), "output_name": "y", "held": {}}
+        display = drawn(ResponseSurfaceDisplay(**shown, **names).plot())
+        *_, bar = display.figure_.axes
+        assert bar.yaxis.get_major_formatter().get_offset() == ""
+        assert np.ptp(display.surface_.levels) >= 0.1 * abs(value)
+
     def test_of_a_pipeline_over_its_data(self, fitted):
         pipe, X = fitted
         target = TransformedTargetRegressor(pipe, transformer=MinMaxScaler())

@@ -93,6 +93,11 @@ def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
         "Errs more on its own rows than a constant would: rule 1 "
         f"(errs by {in_digits(errs, 2)}, a constant by 1)."
     ]
+    # Through one row a constant may go itself.
+    of_one_row = replace(poor.model, rule_rows=np.array([99.0, 1.0]))
+    assert readability(of_one_row, X, y).findings == [
+        "Strongest on fewer rows than its sentence has numbers: rule 1 (rows: 1, numbers: 2)."
+    ]
 
 
 def test_rows_are_counted_whatever_the_unit_of_the_weights(rng):

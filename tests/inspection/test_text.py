@@ -15,9 +15,10 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
 from skanfis.export import export_json, read_json
-from skanfis.inspection import export_text, readability, rules_html
+from skanfis.inspection import explain, export_text, readability, rules_html
 from skanfis.inspection.rules import parts_led
 from skanfis.inspection.sentences import Sentences
+from skanfis.inspection.text import percent
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, rows_of
 from ..outline import Outline
@@ -45,6 +46,19 @@ def test_noise_is_told_in_the_units_of_the_target(rng):
     assert float(told[1]) == pytest.approx(300.0, rel=4.0 / np.sqrt(2 * 2000))
     # A model that was taken as it was given knows of none.
     assert "about the rules" not in export_text(replace(model.fit(X, y).model_, posterior=None))
+
+
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
+@pytest.mark.parametrize("options", [{"monotonic_cst": [1]}, {"loss": "huber"}])
+def test_the_outputs_vary_about_the_rules_by_no_less_than_these_err(options, rng):
+    X = rng.uniform(-3, 3, size=(300, 1))
+    y = np.sin(X[:, 0]) + 0.1 * rng.standard_normal(300)
+    y[::20] += 5.0 * ("loss" in options)
+    model = ANFISRegressor(n_mfs=3, **options).fit(X, y)
+    error = np.sqrt(np.mean((model.predict(X) - y) ** 2))
+    assert error > 1.2 * model.model_.posterior.noise[0]
+    told = re.search(r"about the rules by (.*) \(", export_text(model))
+    assert float(told[1]) == pytest.approx(error, rel=0.05)
 
 
 def predicted(text, rows, names=NAMES):
@@ -233,6 +247,69 @@ def test_a_rule_says_nothing_of_cases_that_none_of_its_rows_are(rng):
     assert_allclose(predicted(full, both, names), model.predict(both), atol=1e-9)
 
 
+@pytest.mark.parametrize("handle_unknown", ["error", "ignore"])
+def test_a_value_is_that_of_a_level_and_others_are_told_from_it(handle_unknown, rng):
+    X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 300), "on": rng.choice(["y", "n"], 300)})
+    X["rate"] = rng.normal(size=300)
+    y = 5.0 * (X["sort"] == "b") - 3.0 * (X["sort"] == "c") + 2.0 * (X["on"] == "y") + X["rate"]
+    encoder = OneHotEncoder(sparse_output=False, handle_unknown=handle_unknown)
+    encoder = make_column_transformer((encoder, ["sort", "on"]), remainder="passthrough")
+    # Where alpha is given, all levels have slopes.
+    model = ANFISRegressor(partition="tree", max_rules=1, alpha=0.01)
+    pipe = make_pipeline(encoder, model).fit(X, y + 0.1 * rng.normal(size=300))
+    (said,) = re.findall(r"THEN y is about ([\s\S]*?)\n\n", export_text(pipe))
+    value, _, slopes = " ".join(said.split()).partition(": ")
+    told = re.findall(r"([-+][\d.]+) if (sort|on) is (not )?([a-z])(?:, |$)", slopes)
+    # One of three levels is what the value is of, and one of two.
+    assert [column for _, column, _, _ in told] == ["sort", "sort", "on"]
+    assert not any(is_not for *_, is_not, _ in told)
+    slope, place = map(float, re.search(r"([-+][\d.]+) per rate from (\S+)", slopes).groups())
+    by_hand = float(value) + slope * (X["rate"] - place)
+    for change, column, _, level in told:
+        by_hand += float(change) * (X[column] == level)
+    assert np.abs(by_hand - pipe.predict(X)).max() < 0.1
+    assert f"\n{2 + len(told)} numbers;" in export_text(pipe)
+
+
+@pytest.mark.parametrize("handle_unknown", ["error", "ignore"])
+def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(handle_unknown, rng):
+    X = pd.DataFrame({"rate": rng.normal(size=300), "on": rng.choice(["n", "y"], 300)})
+    encoder = OneHotEncoder(sparse_output=False, handle_unknown=handle_unknown)
+    encoder = make_column_transformer((encoder, ["on"]), remainder="passthrough")
+    model = ANFISRegressor(partition="tree", max_rules=3, order=1)
+    y = np.where(X["rate"] > 0.7, 9.0, np.where(X["rate"] < -0.7, -9.0, 0.0))
+    pipe = make_pipeline(encoder, model).fit(X, y + 0.1 * rng.normal(size=300))
+    # By the one indicator two rules have a common slope, by the other the third has its own.
+    coefficients = np.zeros((3, 4, 1))
+    coefficients[:, 0, 0], coefficients[1:, 2, 0], coefficients[0, 1, 0] = [1.0, 5.0, 9.0], 2.0, 4.0
+    coefficients[0, 2, 0] = 2.0
+    pipe[-1].model_ = replace(pipe[-1].model_, coefficients=coefficients)
+    text = export_text(pipe)
+    line = re.search(r"Common to the rules, y: (.*)\.", text)[1]
+    told = re.findall(r"Rule (\d)[\s\S]*?THEN y is about (\S+)(?:, of it (\S+) .*)?(: .*)?\n", text)
+    assert {r for r, *_, slopes in told if slopes} == {"0"}
+    # What a rule says itself is said in place of the line.
+    for level in "ny":
+        row = pd.DataFrame({"rate": [0.0], "on": [level]})
+        values = explain(pipe, row).set_index("rule")["value"]
+        for r, value, part, slopes in told:
+            said = re.search(r"([-+]\S+) if on is (not )?([ny])", slopes or line)
+            holds = (level == said[3]) != bool(said[2])
+            by_hand = float(value) - float(part or 0.0) + float(said[1]) * holds
+            assert by_hand == pytest.approx(values[int(r)], abs=0.05)
+
+
+def test_that_it_is_no_other_level_is_not_said(rng):
+    X = pd.DataFrame({"sort": rng.choice(["a", "b", "c", "d"], 400), "rate": rng.normal(size=400)})
+    y = 9.0 * (X["sort"] == "b") - 9.0 * (X["sort"] == "c")
+    y = y + np.where(X["sort"] == "b", 3.0, 0.5) * X["rate"] + 0.1 * rng.normal(size=400)
+    model = ANFISRegressor(partition="tree", max_rules=3, order=0, simplicity=0.0)
+    pipe = make_pipeline(OneHotEncoder(sparse_output=False), model).fit(X[["sort"]], y)
+    premises = sorted(re.findall(r"IF (.*)", export_text(pipe)))
+    assert premises == ["sort is b", "sort is c", "sort is not b AND sort is not c"]
+    assert "\n7 numbers;" in export_text(pipe)
+
+
 def test_a_category_is_listed_by_its_levels(rng):
     X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 300), "on": rng.choice(["y", "n"], 300)})
     X["rate"] = rng.normal(size=300)
@@ -290,9 +367,16 @@ def test_rules_that_matter_and_a_line_for_the_rest():
     text = export_text(A_GRID, max_shown=3)
     strongest = np.argsort(-weights)[:3]
     assert [label for label, _, _ in read_text(text, NAMES).rules] == list(strongest)
-    left = 100 * (1 - weights[strongest].sum())
-    assert f"\n9 rules with {left:.3g} % of the weight left out.\n" in text
-    assert "left out" not in export_text(A_GRID)
+    left = percent(1.0 - parts_led(A_GRID)[strongest].sum())
+    assert f"\nLeft out: 9 rules, strongest on {left} of the rows.\n" in text
+    assert "Left out" not in export_text(A_GRID)
+
+
+def test_without_a_range_nothing_is_said_of_what_is_outside(rng):
+    X, y = pd.DataFrame({"sort": rng.choice(["a", "b"], 60)}), rng.normal(size=60)
+    pipe = make_pipeline(OneHotEncoder(sparse_output=False), ANFISRegressor(max_rules=1))
+    for target in (y, y + 9.0 * (X["sort"] == "b")):
+        assert "Outside" not in export_text(pipe.fit(X, target))
 
 
 def test_slopes_that_move_no_digit_are_said_to_be_too_small():
@@ -323,7 +407,7 @@ def test_a_model_without_data_has_no_weights_to_tell():
     model = replace(A_GRID, rule_weights=np.full(12, 1 / 12), rule_rows=np.zeros(12))
     text = export_text(model, max_shown=2)
     assert "\nRule 0:\n  IF" in text
-    assert "\n10 rules left out.\n" in text
+    assert "\nLeft out: 10 rules.\n" in text
     assert "errs" not in text
 
 
@@ -368,6 +452,21 @@ def test_of_rows_on_which_a_rule_is_not_the_strongest_no_error_is_told():
     assert re.findall(r"% of the rows(, errs by 0|:)", text) == [", errs by 0", ":"]
     assert text.endswith("\nErrors are of the rows of the latest partial_fit alone.")
     assert ">nan<" not in rules_html(model)
+
+
+@pytest.mark.parametrize(
+    ("part", "told"),
+    [
+        (1.0, "100"),
+        (0.995, "99.5"),
+        (0.99995, "99.995"),
+        (0.994, "99"),
+        (0.48, "48"),
+        (0.065, "6.5"),
+    ],
+)
+def test_what_is_not_all_is_never_100_percent(part, told):
+    assert percent(part) == f"{told} %"
 
 
 @ALL

@@ -78,6 +78,19 @@ def test_cuts_are_called_as_in_the_text(rng):
     assert shown == asked | set(display.leaves)
 
 
+def test_of_a_category_leaves_say_the_value_of_the_text(rng):
+    X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 400), "rate": rng.normal(size=400)})
+    y = np.tanh(9.0 * X["rate"]) * 3.0 + 2.0 * (X["sort"] == "b") - 4.0 * (X["sort"] == "c")
+    encoder = OneHotEncoder(sparse_output=False)
+    encoder = make_column_transformer((encoder, ["sort"]), remainder="passthrough")
+    model = quick(partition="tree", max_rules=2, alpha=0.01)
+    pipe = make_pipeline(encoder, model).fit(X, y + 0.1 * rng.normal(size=400))
+    told = re.findall(r"Rule (\d)[\s\S]*?THEN y is about ([-\d.]+)", export_text(pipe))
+    assert len(told) == 2
+    values = TreeDisplay.from_estimator(pipe).values
+    assert {int(r): float(value) for r, value in told} == dict(enumerate(values))
+
+
 def plane(rng, n_rows=300):
     X = rng.uniform(-1.0, 1.0, (n_rows, 3))
     y = np.where(X[:, 0] > 0.2, np.where(X[:, 2] > -0.3, 2.0, 1.0), -1.0)
