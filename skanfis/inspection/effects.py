@@ -73,6 +73,12 @@ def effects(
         and with X "rows", Cov(component, output) / Var(output) over its rows [1]_, which may be
         negative. Each column sums to one. ``held``: part of the combinations of independent inputs
         where the output would be held within its limits, from 10,000 draws. ``notes``: sentences.
+        Printed, many rows that do nothing, or no more than draws are off by, are one.
+
+    Raises
+    ------
+    ValueError
+        If distributions are not known and X is not given; if a column is not there.
 
     References
     ----------

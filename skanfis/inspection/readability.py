@@ -219,6 +219,11 @@ def readability(
     readability : Readability
         Tables, summary and findings.
 
+    Raises
+    ------
+    ValueError
+        If X, y or the weights do not fit the model, or a step of a pipeline cannot be folded.
+
     Examples
     --------
     >>> from skanfis import ANFISRegressor

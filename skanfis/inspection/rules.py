@@ -115,6 +115,11 @@ def rules_table(estimator: Any) -> Any:
         strongest. ``"at"``: its centre, the mean of the rows by its strength, or a place near it.
         ``"then y"``, per output: the "value" that it says there, and the slope by each input.
 
+    Raises
+    ------
+    ValueError
+        If a step of a pipeline cannot be folded.
+
     Examples
     --------
     >>> from skanfis import ANFISRegressor
@@ -163,7 +168,12 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
         there; "contribution", strength times value. **The sum of the contributions is the
         prediction**. Lines without a number are "held" at the limits of training, and "beyond x",
         the way from the nearest point of the range along the tangent. With
-        ``out_of_bounds="nan"`` rows outside have missing values, and "raise" refuses them.
+        ``out_of_bounds="nan"`` rows outside have missing values.
+
+    Raises
+    ------
+    ValueError
+        If X does not fit the model, or lies outside the range with ``out_of_bounds="raise"``.
 
     Examples
     --------

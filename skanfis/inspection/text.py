@@ -89,6 +89,11 @@ def export_text(
         there. Last how many numbers there are, what the text as printed errs over the model (with
         the default precision), and what the fit found against reading the rules one by one.
 
+    Raises
+    ------
+    ValueError, TypeError
+        If a parameter is out of its range, a step cannot be folded, or there are no rules.
+
     Examples
     --------
     >>> import numpy as np
@@ -151,6 +156,11 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     html : str
         One ``<div>``, with names escaped, and nothing to run or to load; what speaks against
         reading the rules one by one is folded away below them.
+
+    Raises
+    ------
+    ValueError, TypeError
+        If a number is out of its range, a step cannot be folded, or there are no rules.
 
     Examples
     --------

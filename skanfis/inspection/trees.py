@@ -77,6 +77,11 @@ class TreeDisplay:
             Which output, by position or name.
         ax : matplotlib Axes, default=None
             None makes a figure.
+
+        Raises
+        ------
+        ValueError
+            If the rules are no tree, or the plane is asked of one that cuts more or fewer inputs.
         """
         check_choice("kind", kind, ("tree", "plane"))
         model, reader = fold_with_reader(estimator)
