@@ -159,7 +159,9 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         seed = 0 if self.random_state is None else self.random_state
         if self.method == "split":
             fraction = float(self.calibration_fraction)
-            training, held_out = _scores.one_part(regressor, len(targets), numbers, fraction, seed)
+            training, held_out = _scores.one_part(
+                regressor, len(targets), weight, numbers, fraction, seed
+            )
             estimator = data.fitted(regressor, training)
             scores = _scores.held_out_scores(estimator, data, held_out, least)
         elif self.method == "loo":
