@@ -30,6 +30,7 @@ class Premise:
     _unit: np.ndarray  # raw units per unit of displacement of what moves by itself
     _tied: np.ndarray  # the displacement by which each parameter moves
     _ordered: tuple[OrderedTerms, ...]
+    is_unbounded: bool = False  # whether terms in order have no bounds
 
     @classmethod
     def of(cls, antecedent, minimum, maximum, is_unbounded=False):
@@ -51,7 +52,7 @@ class Premise:
                     _bound_cuts(terms, raw, antecedent.least_width, lower, upper)
         tied = antecedent.tied
         size = np.unique(tied).size
-        return cls(antecedent, lower[:size], upper[:size], unit, tied, tuple(ordered))
+        return cls(antecedent, lower[:size], upper[:size], unit, tied, tuple(ordered), is_unbounded)
 
     @property
     def size(self):

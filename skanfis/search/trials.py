@@ -172,7 +172,7 @@ class Trials:
         if candidate not in self._found:
             if candidate.slope_worth is not None:
                 trained = self.tuned(replace(candidate, slope_worth=None))
-                found = with_sparse_slopes(trained, self.plan.free, candidate.slope_worth)
+                found = with_sparse_slopes(trained, candidate.slope_worth)
             elif candidate.n_rules == 1:
                 found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
@@ -182,7 +182,7 @@ class Trials:
                 found = self._train(self._begun[candidate].problem, turns)
                 # To be held in order, all rules need a term on an input.
                 if candidate.n_clusters and self.plan.premises_move and self.plan.held is None:
-                    found = with_fewer_conditions(found, self.plan.free)
+                    found = with_fewer_conditions(found)
             self._found[candidate] = found
         return self._found[candidate]
 
