@@ -24,13 +24,15 @@ from ..policies import TargetRange
 from .candidates import Candidate, TermScores, rule_base
 from .conditions import with_fewer_conditions
 from .grid import Spacing
+from .judging import ENOUGH, FOLDS
 from .lasso import lasso_inputs
 from .sample import effective_weight, to_six_digits, unit_scale
 from .splits import best_splits
 from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
-# Rows that a candidate sees for each of its parameters, and at least.
-_ROWS_PER_PARAMETER, FEWEST_SEEN = 40, 1000
+# Rows that a candidate sees for each of its parameters; and at least: those of which one fold is
+# enough to judge.
+_ROWS_PER_PARAMETER, FEWEST_SEEN = 40, FOLDS * ENOUGH
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
 # Operations of a pass over a training's rows; solving for n parameters takes those of 10 n rows.
