@@ -22,6 +22,8 @@ import numpy as np
 
 from ..membership import Membership
 
+# In standard deviations of an input: what is nearer is one place, to a reader and for the data.
+TOLD_APART = 0.1
 # To either side of a row on a corner of a term, standardised: far beyond rounding.
 _ASIDE = 1e-8
 

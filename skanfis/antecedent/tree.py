@@ -18,12 +18,12 @@ import numpy as np
 from scipy import linalg
 
 from ..membership import SigmoidFalling, SigmoidRising
-from .base import TermGroup
+from .base import TOLD_APART, TermGroup
 from .rule_table import RuleTableAntecedent
 
-# A side is 0.9 true 0.1 standard deviations from its cut, no sooner: the error hardly tells a soft
+# A side is 0.9 true where a place is told from its cut, no sooner: the error hardly tells a soft
 # split from a jump, and a reader does.
-LEAST_WIDTH = 0.1 / np.log(9.0)
+LEAST_WIDTH = TOLD_APART / np.log(9.0)
 # Where a product of two sides is looked at, in widths from either cut.
 _AROUND = np.linspace(-6.0, 6.0, 49)
 # Between two values a cut stands so many widths from either: its sides are one to the last bit.

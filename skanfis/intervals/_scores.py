@@ -85,7 +85,7 @@ def fit_params(router, regressor, sample_weight, groups):
     return given
 
 
-def one_part(regressor, n_rows, groups, fraction, seed):
+def one_part(regressor, n_rows, weight, groups, fraction, seed):
     """Rows to train on and rows held out, or groups; ``fraction`` of 1 trains on none."""
     every = np.arange(n_rows)
     if fraction == 1.0:
@@ -97,7 +97,13 @@ def one_part(regressor, n_rows, groups, fraction, seed):
         return every, every
     kind = ShuffleSplit if groups is None else GroupShuffleSplit
     splitter = kind(1, test_size=fraction, random_state=seed)
-    return tuple(np.sort(part) for part in next(splitter.split(every, groups=groups)))
+    training, held_out = (np.sort(part) for part in next(splitter.split(every, groups=groups)))
+    if weight is not None and not weight[held_out].any():
+        raise ValueError(
+            f"None of the {held_out.size} rows held out has a positive weight: leave out rows "
+            "without weight, or give a larger calibration_fraction or another random_state."
+        )
+    return training, held_out
 
 
 def folds(cv, targets, groups, seed):

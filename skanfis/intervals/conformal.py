@@ -151,29 +151,10 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         targets, weight, numbers = _scores.checked_targets(y, sample_weight, groups)
         if numbers is not None and self.method == "loo":
             raise ValueError("method='loo' leaves out rows, not groups: use 'folds' or 'split'.")
-        regressor = self._regressor()
-        params = _scores.fit_params(self, regressor, sample_weight, numbers)
+        params = _scores.fit_params(self, self._regressor(), sample_weight, numbers)
         data = _scores.TrainingSet(X, y, targets, params)
         least = _scores.least_deviations(targets) if self.scaled else None
-        held_out, estimators = np.arange(len(targets)), []
-        seed = 0 if self.random_state is None else self.random_state
-        if self.method == "split":
-            fraction = float(self.calibration_fraction)
-            training, held_out = _scores.one_part(regressor, len(targets), numbers, fraction, seed)
-            estimator = data.fitted(regressor, training)
-            scores = _scores.held_out_scores(estimator, data, held_out, least)
-        elif self.method == "loo":
-            estimator = data.fitted(regressor)
-            scores = _scores.leave_one_out_scores(estimator, data, weight, least)
-        else:
-            parts = _scores.folds(self.cv, targets, numbers, seed)
-            estimator = data.fitted(regressor)
-            estimators = Parallel(n_jobs=self.n_jobs)(
-                delayed(data.fitted)(regressor, training) for training, _ in parts
-            )
-            scores = np.empty(targets.reshape(len(targets), -1).shape)
-            for one, (_, rows) in zip(estimators, parts, strict=True):
-                scores[rows] = _scores.held_out_scores(one, data, rows, least)
+        estimator, estimators, held_out, scores = self._calibrated(data, weight, numbers, least)
         own_groups = None if numbers is None else numbers[held_out]
         own_weight = None if weight is None else weight[held_out]
         masses, n_units = _scores.row_masses(held_out.size, own_weight, own_groups)
@@ -188,6 +169,32 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         self._single_output = targets.ndim == 1
         self.scores_ = np.sort(scores[:, 0] if self._single_output else scores, axis=0)
         return self
+
+    def _calibrated(self, data, weight, groups, least):
+        """The regressor, those of the folds, the rows held out, and the score of each of these."""
+        regressor, every = self._regressor(), np.arange(len(data.targets))
+        seed = 0 if self.random_state is None else self.random_state
+        if self.method == "loo":
+            estimator = data.fitted(regressor)
+            scores = _scores.leave_one_out_scores(estimator, data, weight, least)
+            return estimator, [], every, scores
+        if self.method == "split":
+            fraction = float(self.calibration_fraction)
+            training, held_out = _scores.one_part(
+                regressor, every.size, weight, groups, fraction, seed
+            )
+            estimator = data.fitted(regressor, training)
+            scores = _scores.held_out_scores(estimator, data, held_out, least)
+            return estimator, [], held_out, scores
+        parts = _scores.folds(self.cv, data.targets, groups, seed)
+        estimator = data.fitted(regressor)
+        estimators = Parallel(n_jobs=self.n_jobs)(
+            delayed(data.fitted)(regressor, training) for training, _ in parts
+        )
+        scores = np.empty(data.targets.reshape(every.size, -1).shape)
+        for one, (_, rows) in zip(estimators, parts, strict=True):
+            scores[rows] = _scores.held_out_scores(one, data, rows, least)
+        return estimator, estimators, every, scores
 
     def predict(self, X: ArrayLike) -> np.ndarray:
         """Predict the target by ``estimator_``, (n_samples,) or (n_samples, n_outputs)."""

@@ -174,7 +174,7 @@ def laplace(
     # Of one constant there is no penalty at all: any size will do.
     size = np.trace(matrix) / matrix.shape[0] or 1.0
     # ``matrix`` takes on the factor's shift.
-    free = line.free(penalty)
+    free = line.own.free(penalty)
     own, _, error = normal.with_penalty(matrix, evaluation.mean_squared_error, free)
     factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.

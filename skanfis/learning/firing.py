@@ -6,15 +6,13 @@ from functools import partial
 import numpy as np
 
 from ..antecedent import Antecedent, strongest_rules
+from ..antecedent.base import TOLD_APART
 from ..blocks import add_each, fitting_rows, row_blocks
 from ..consequent import basis
 from ..support import RuleSupport
 from .data import StandardisedData, fingerprint
 from .gram import pair_index, pairs
 
-# Standard deviation added to every standardised input: rows on a line or a surface (two
-# thermometers on one gyro) keep some thickness, and the distance stays finite off it.
-_THICKNESS = 0.1
 # A rule fires on the rows on which it has at least this part of the strongest rule's strength.
 FIRES = 0.5
 
@@ -63,7 +61,9 @@ def places(second):
     moments = second / np.maximum(second[:, :1, :1], np.finfo(float).tiny)
     center = moments[:, 0, 1:].copy()
     covariance = moments[:, 1:, 1:] - center[:, :, None] * center[:, None, :]
-    covariance += _THICKNESS**2 * np.eye(center.shape[1])
+    # Rows on a line or a surface (two thermometers on one gyro) keep some thickness, and the
+    # distance stays finite off it.
+    covariance += TOLD_APART**2 * np.eye(center.shape[1])
     return center, np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 

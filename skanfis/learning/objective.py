@@ -60,7 +60,7 @@ class NormalEquations:
     penalty: np.ndarray  # P
     factor: NormalFactor  # of Phi' S Phi / W + P
     coefficients: np.ndarray  # local, (n_columns, n_outputs)
-    free: np.ndarray | None  # what these are made of, see ``CommonLine.free``
+    free: np.ndarray | None  # what these are made of, see ``OwnSlopes.free``
 
     def with_penalty(self, penalty, error, free):
         """The same with another penalty, the change of the coefficients, and the new squared error.
@@ -204,7 +204,7 @@ class SeparableProblem:
         masses = rule_masses(gram, antecedent.n_rules)
         disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
         penalty = self.penalty_matrix(disagreement)
-        free = self.common_line.free(self.penalty)
+        free = self.common_line.own.free(self.penalty)
         factor = NormalFactor(gram + penalty, free)
         penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
@@ -228,7 +228,7 @@ class SeparableProblem:
         normal, change, error = before.with_penalty(
             self.penalty_matrix(before.disagreement),
             evaluation.mean_squared_error,
-            self.common_line.free(self.penalty),
+            self.common_line.own.free(self.penalty),
         )
         paid = float(np.vdot(normal.coefficients, normal.penalty @ normal.coefficients))
         return replace(

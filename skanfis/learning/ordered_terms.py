@@ -26,7 +26,7 @@ _MOBILE = 0.01
 # Shapes, and widths of terms that share their place with others, may change by this one.
 LOG_FACTOR = np.log(4.0)
 # A shape that makes the top of an ordered term flat, and so truer next to a neighbour, by this.
-LOG_FLATTER = np.log(1.5)
+_LOG_FLATTER = np.log(1.5)
 # Terms may leave the data by this part of their mean distance: a term as narrow as may be is still
 # more than half true at the edge. Where they are free, by all of it.
 _BEYOND = 0.25
@@ -104,14 +104,17 @@ class OrderedTerms:
             inverse = np.diff(np.eye(n), axis=0) / _LOG_UNIT
         return cls(locations, widths, terms, low, high, np.log(gaps), basis, inverse)
 
-    def width_bounds(self, own, parameters):
-        """Least and most change of the log widths of every term."""
+    def bound(self, own, parameters, lower, upper):
+        """Set the bounds of all displacements of these terms; the arguments as in :meth:`of`."""
+        lower[self.locations], upper[self.locations] = self._bounds_of_gaps()
         reach = np.exp(self._start)
-        found = [_range(term, parameters, r) for term, r in zip(own, reach, strict=True)]
-        return np.array(found).T
+        changes = [_range(term, parameters, r) for term, r in zip(own, reach, strict=True)]
+        least, most = np.array(changes).T
+        lower[self.widths], upper[self.widths] = least[self.terms], most[self.terms]
+        upper[np.concatenate([term.shapes for term in own])] = _LOG_FLATTER
 
-    def bounds(self):
-        """Of the displacements of the gaps: neighbouring gaps stay of one size."""
+    def _bounds_of_gaps(self):
+        """Least and most of the displacements of the gaps: neighbouring gaps stay of one size."""
         ratios = np.diff(self.log_gaps)
         lower, upper = np.full(ratios.size, -_LOG_RATIO), np.full(ratios.size, _LOG_RATIO)
         # Beyond the outermost term there is no other to share a gap with; nor is there need of one.

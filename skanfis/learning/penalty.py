@@ -80,12 +80,62 @@ def disagreement_matrix(gram, n_rules, local: LocalBasis):
     return matrix, gram
 
 
+class OwnSlopes:
+    """Where the slopes of every rule are among the local coefficients u, and u with some held.
+
+    ``slopes`` are the inputs that the consequents are linear in, None for those that are constant;
+    ``per_unit`` (n_rules, n_basis - 1) turns a local slope into one per unit that all rules share.
+    """
+
+    def __init__(self, per_unit: np.ndarray, slopes: list[int | None]):
+        self._per_unit, self._n_basis = per_unit, 1 + len(slopes)
+        self._n_columns = len(per_unit) * self._n_basis
+        self._place = {j: k for k, j in enumerate(slopes) if j is not None}
+        self._free: dict[tuple, np.ndarray] = {}
+
+    def rows(self, j, rules):
+        """Rows that give the slopes by an input of some rules out of u, in the shared unit."""
+        found = np.zeros((rules.size, self._n_columns))
+        found[np.arange(rules.size), self._columns(j, rules)] = self._per_unit[
+            rules, self._place[j]
+        ]
+        return found
+
+    def free(self, penalty: Penalty):
+        """Orthonormal columns that u is made of, (n_columns, n_free); None where it is any."""
+        held = penalty.common, penalty.absent
+        if not any(held):
+            return None
+        if held not in self._free:
+            columns, is_free = np.eye(self._n_columns), np.ones(self._n_columns, dtype=bool)
+            for j, rules in penalty.common:
+                # The slopes are one in the shared unit; the first column stands for all of them.
+                own, local = (
+                    self._columns(j, rules),
+                    1.0 / self._per_unit[list(rules), self._place[j]],
+                )
+                columns[own[0], own] = local / np.linalg.norm(local)
+                is_free[own[1:]] = False
+            for j, rules in penalty.absent:
+                is_free[self._columns(j, rules)] = False
+            self._free[held] = np.ascontiguousarray(columns[is_free].T)
+        return self._free[held]
+
+    def _columns(self, j, rules):
+        """Places in u of the slopes by an input of some rules."""
+        return np.array(rules) * self._n_basis + 1 + self._place[j]
+
+
 class CommonLine:
-    """The line that all rules share, in the coordinates u of their local basis.
+    """The line that all rules share, and what the local coefficients u of all rules pay by it.
 
     ``extent`` (n_rules, n_basis - 1) is how far from its centre each rule stands for rows, along
     every input; ``slopes`` are the inputs that the consequents are linear in, None for those that
     are constant. By the others, which the attribute lists, the line has slopes.
+
+    With S u the values of the rules at their centres and their slopes times the extent, and A b
+    those of a line b that is every rule, the common line is that of least squares: A = Q R,
+    b = R^-1 Q' S u, and the departures are N u = (S - Q Q' S) u.
     """
 
     def __init__(
@@ -95,42 +145,35 @@ class CommonLine:
         antecedent: Antecedent,
         slopes: list[int | None],
     ):
-        n_rules, n_basis = local.center.shape[0], local.n_basis
-        n_columns = n_rules * n_basis
-        # In (value at the centre, slopes) of every rule, the rules of a common line b are A b.
-        line = np.zeros((n_rules, n_basis, n_basis))
-        line[:, np.arange(n_basis), np.arange(n_basis)] = 1.0
+        self.n_rules, n_basis = local.center.shape[0], local.n_basis
+        n_columns, place = self.n_rules * n_basis, np.arange(1, n_basis)
+        line = np.zeros((self.n_rules, n_basis, n_basis))  # A
+        line[:, 0, 0] = 1.0
         line[:, 0, 1:] = local.center
-        line[:, np.arange(1, n_basis), np.arange(1, n_basis)] = extent
+        line[:, place, place] = extent
         orthonormal, triangle = np.linalg.qr(line.reshape(n_columns, n_basis))
-        # Local slopes are per spread of the rule; these are per unit of z.
-        scale = np.ones((n_rules, n_basis))
+        scale = np.ones((self.n_rules, n_basis))  # the diagonal of S
         scale[:, 1:] = extent / local.spread
         scale = scale.ravel()
-        along = orthonormal * scale[:, None]
-        # Of u, what the line leaves.
-        from_line = np.diag(scale) - orthonormal @ along.T
+        along = orthonormal * scale[:, None]  # S Q
+        from_line = np.diag(scale) - orthonormal @ along.T  # N
         by_part, self.components, component = departures(from_line, antecedent, slopes)
-        # D'D, of all components alike; made without D it is rounded less.
+        # N'N, what all components pay alike; made without D it is rounded less.
         self._together = np.diag(scale**2) - along @ along.T
-        # The slopes of b = triangle^-1 along' u.
-        is_varying = np.array([j is not None for j in slopes], dtype=bool)
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
+        is_varying = np.array([j is not None for j in slopes], dtype=bool)
         self.slopes = [j for j in slopes if j is not None]
         self._to_none = to_slopes[~is_varying]
-        # Slopes and departures out of u, (n_slopes + n_columns, n_columns), and the part of each.
+        # Slopes of the line and departures out of u, (n_slopes + n_columns, n_columns), and the
+        # part of the penalty that each row belongs to.
         self._rows = np.concatenate([to_slopes[is_varying], by_part])
         self._part = np.concatenate([np.arange(len(self.slopes)), len(self.slopes) + component])
         parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.components)
         self.kinds = np.array([*WEIGHTS, *parts])
-        self.n_rules, self._n_basis = n_rules, n_basis
-        # Slopes per unit of z out of local ones, in units of a typical extent; where each stands.
-        self._per_unit = extent.mean(axis=0) / local.spread
-        self._function = {j: k for k, j in enumerate(slopes) if j is not None}
-        self._free: dict[tuple, np.ndarray] = {}
+        self.own = OwnSlopes(extent.mean(axis=0) / local.spread, slopes)
         # Along which all rules rise alike: the null space of the whole penalty.
         self.height = np.zeros(n_columns)
-        self.height[::n_basis] = n_rules**-0.5
+        self.height[::n_basis] = self.n_rules**-0.5
 
     def pull(self, penalty: Penalty):
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
@@ -145,35 +188,6 @@ class CommonLine:
             # What is constant has no slope to learn, but one that is held.
             matrix += penalty.slope * self._to_none.T @ self._to_none
         return matrix
-
-    def free(self, penalty: Penalty):
-        """Orthonormal columns that u is made of, (n_columns, n_free); None where it is any."""
-        held = penalty.common, penalty.absent
-        if not any(held):
-            return None
-        if held not in self._free:
-            columns, is_free = np.eye(self.height.size), np.ones(self.height.size, dtype=bool)
-            for j, rules in penalty.common:
-                own = self._places(j, rules)
-                # Slopes per unit of z are one: local ones are as the units.
-                shared = 1.0 / self._per_unit[list(rules), self._function[j]]
-                columns[own[0], own] = shared / np.linalg.norm(shared)
-                is_free[own[1:]] = False
-            for j, rules in penalty.absent:
-                is_free[self._places(j, rules)] = False
-            self._free[held] = np.ascontiguousarray(columns[is_free].T)
-        return self._free[held]
-
-    def _places(self, j, rules):
-        """Of the slopes by an input of some rules, in u."""
-        return np.array(rules) * self._n_basis + 1 + self._function[j]
-
-    def of_slopes(self, j, rules):
-        """Slopes by an input of some rules out of u, per unit of z times a typical extent."""
-        found = np.zeros((rules.size, self.height.size))
-        per_unit = self._per_unit[rules, self._function[j]]
-        found[np.arange(rules.size), self._places(j, rules)] = per_unit
-        return found
 
     def weights(self, penalty: Penalty):
         """All weights in a row, of these ``kinds``: of ``WEIGHTS``, every slope and component."""

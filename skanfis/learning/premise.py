@@ -12,11 +12,12 @@ Shape parameters are logarithms, and move as these.
 """
 
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
 from ..antecedent import Antecedent
-from .ordered_terms import LOG_FACTOR, LOG_FLATTER, NEXT_TO_NOTHING, OrderedTerms, terms_of
+from .ordered_terms import LOG_FACTOR, NEXT_TO_NOTHING, OrderedTerms, terms_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,6 +30,7 @@ class Premise:
     _unit: np.ndarray  # raw units per unit of displacement of what moves by itself
     _tied: np.ndarray  # the displacement by which each parameter moves
     _ordered: tuple[OrderedTerms, ...]
+    is_unbounded: bool = False  # whether terms in order have no bounds
 
     @classmethod
     def of(cls, antecedent, minimum, maximum, is_unbounded=False):
@@ -36,38 +38,21 @@ class Premise:
         raw = antecedent.parameters
         lower, upper = np.full(raw.size, -LOG_FACTOR), np.full(raw.size, LOG_FACTOR)
         unit, ordered = np.ones(raw.size), []
-        terms = terms_of(antecedent)
-        is_ordered = antecedent.is_ordered
-        for j in sorted({term.input for term in terms}):
-            own = sorted((t for t in terms if t.input == j), key=lambda t: raw[t.location])
-            locations = np.array([term.location for term in own])
-            if is_ordered and len(own) > 1 and (np.diff(raw[locations]) > 0.0).all():
-                row = OrderedTerms.of(own, raw, minimum[j], maximum[j], is_unbounded)
+        every = sorted(terms_of(antecedent), key=lambda term: (term.input, raw[term.location]))
+        for j, members in groupby(every, key=lambda term: term.input):
+            terms, low, high = list(members), minimum[j], maximum[j]
+            places = raw[[term.location for term in terms]]
+            if antecedent.is_ordered and len(terms) > 1 and (np.diff(places) > 0.0).all():
+                ordered.append(OrderedTerms.of(terms, raw, low, high, is_unbounded))
                 if not is_unbounded:
-                    lower[locations], upper[locations] = row.bounds()
-                    least, most = row.width_bounds(own, raw)
-                    lower[row.widths], upper[row.widths] = least[row.terms], most[row.terms]
-                    upper[np.concatenate([term.shapes for term in own])] = LOG_FLATTER
-                ordered.append(row)
-                continue
-            first = np.array([term.widths[0] for term in own])
-            widths = np.exp(raw[first])
-            unit[locations] = widths
-            # Up to one width beyond the data, or where the term stands already.
-            lower[locations] = np.minimum((minimum[j] - raw[locations]) / widths - 1.0, 0.0)
-            upper[locations] = np.maximum((maximum[j] - raw[locations]) / widths + 1.0, 0.0)
-            if antecedent.least_width > 0.0:
-                # A cut may become sharper, and no softer: a rule is to be told from the next.
-                least = np.log(antecedent.least_width) - raw[first]
-                lower[first] = np.minimum(np.maximum(lower[first], least), 0.0)
-                upper[first] = 0.0
-                # A crisp cut, at most half as wide as the least, stays; half-way is far from both.
-                is_crisp = widths < 0.75 * antecedent.least_width
-                for still in (locations[is_crisp], first[is_crisp]):
-                    lower[still] = upper[still] = 0.0
+                    ordered[-1].bound(terms, raw, lower, upper)
+            else:
+                _bound_alone(terms, raw, low, high, unit, lower, upper)
+                if antecedent.least_width > 0.0:
+                    _bound_cuts(terms, raw, antecedent.least_width, lower, upper)
         tied = antecedent.tied
         size = np.unique(tied).size
-        return cls(antecedent, lower[:size], upper[:size], unit, tied, tuple(ordered))
+        return cls(antecedent, lower[:size], upper[:size], unit, tied, tuple(ordered), is_unbounded)
 
     @property
     def size(self):
@@ -111,3 +96,27 @@ class Premise:
         """Gradient and Gauss-Newton matrix by the displacements from those by the parameters."""
         jacobian = self.jacobian(displacement)
         return jacobian.T @ gradient, jacobian.T @ gauss_newton @ jacobian
+
+
+def _bound_alone(terms, raw, low, high, unit, lower, upper):
+    """Set units and bounds of locations that move by themselves, in widths of their terms."""
+    locations = [term.location for term in terms]
+    places, widths = raw[locations], np.exp(raw[[term.widths[0] for term in terms]])
+    unit[locations] = widths
+    # Up to one width beyond the data, or where the term stands already.
+    lower[locations] = np.minimum((low - places) / widths - 1.0, 0.0)
+    upper[locations] = np.maximum((high - places) / widths + 1.0, 0.0)
+
+
+def _bound_cuts(terms, raw, least_width, lower, upper):
+    """Set bounds of the widths of cuts, and of crisp cuts altogether."""
+    locations = np.array([term.location for term in terms])
+    widths = np.array([term.widths[0] for term in terms])
+    # A cut may become sharper, and no softer: a rule is to be told from the next.
+    least = np.log(least_width) - raw[widths]
+    lower[widths] = np.minimum(np.maximum(lower[widths], least), 0.0)
+    upper[widths] = 0.0
+    # A crisp cut, at most half as wide as the least, stays; half-way is far from both.
+    is_crisp = np.exp(raw[widths]) < 0.75 * least_width
+    for still in (locations[is_crisp], widths[is_crisp]):
+        lower[still] = upper[still] = 0.0

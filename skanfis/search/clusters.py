@@ -9,12 +9,10 @@ those that have learnt where these leave most.
 import numpy as np
 
 from ..antecedent import GridAntecedent, RuleTableAntecedent
+from ..antecedent.base import TOLD_APART
 from ..learning.data import StandardisedData
 from .grid import terms_by_input
 from .sample import counting_weight, representative_rows
-
-# Widths in standard deviations of the input: a cluster on one spot still gets a term of some width.
-_SMALLEST_WIDTH = 0.1
 
 
 def clustered_antecedent(families, rows: StandardisedData, label, premise_inputs):
@@ -70,7 +68,8 @@ def _terms_at(families, inputs, table, masses):
         centers = masses @ table[:, j] / total
         squares = (table[:, j] - centers[:, None]) ** 2
         spread = np.sqrt(np.sum(masses * squares, axis=1) / total)
-        widths = np.maximum(spread, _SMALLEST_WIDTH) * np.sqrt(len(inputs))
+        # A cluster on one spot still gets terms of some width.
+        widths = np.maximum(spread, TOLD_APART) * np.sqrt(len(inputs))
         found[j] = families[j].from_center_and_width(centers, widths)
     return found
 

@@ -19,7 +19,7 @@ from .tuning import Tuned, turned
 _FARTHEST = 300.0
 
 
-def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
+def with_fewer_conditions(tuned: Tuned) -> Tuned:
     """The same without conditions that are worth less than a number, and trained on.
 
     Half of them go at a time, as what is left is worth more then; every rule keeps one. If the
@@ -40,10 +40,12 @@ def with_fewer_conditions(tuned: Tuned, free) -> Tuned:
         premise = Premise.of(start, *rows.inputs.box)
         evaluation = problem.evaluate(now.parameters)
         at = premise.displacement(now.parameters)
-        found = replace(found, problem=problem, evaluation=evaluation, displacement=at)
+        found = replace(
+            found, problem=problem, premise=premise, evaluation=evaluation, displacement=at
+        )
     if found is tuned:
         return tuned
-    found = turned(found, premise, tuned.penalty, free)
+    found = turned(found, tuned.penalty)
     return min(tuned, found, key=lambda one: one.posterior.minus_twice_log)
 
 

@@ -34,7 +34,9 @@ class Spacing:
 
     def __init__(self, rows: StandardisedData):
         table, weight, _ = representative_rows(rows)
-        self._columns = [_levels(column, weight) for column in table[:, : rows.X.shape[1]].T]
+        ends = np.transpose(rows.inputs.box)
+        columns = zip(table[:, : len(ends)].T, ends, strict=True)
+        self._columns = [_levels(column, weight, own) for column, own in columns]
 
     def n_values(self, j):
         """How many values an input has, between its outer quantiles: no use in more terms."""
@@ -53,11 +55,14 @@ class Spacing:
         return np.append(places[0], places[0] + np.cumsum(gaps))
 
 
-def _levels(column, weight):
-    """Values between the outer quantiles, and G there, from 0 to 1."""
+def _levels(column, weight, ends):
+    """Values between the outer quantiles, and G there, from 0 to 1; ``ends`` are of all rows."""
     column = np.round(column, DIGITS)  # what differs by rounding alone is one value
     low, high = (weighted_quantile(column, weight, _EDGE, side) for side in (1, -1))
     values = np.unique(column)
+    if values.size == 1:
+        # What varies on few rows may not do so on those of a sample.
+        values = np.unique(ends)
     if low == high:
         low, high = values[[0, -1]]
     values = values[(values >= low) & (values <= high)]

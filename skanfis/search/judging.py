@@ -17,7 +17,7 @@ from ..learning.data import StandardisedData
 from .sample import DIGITS, search_sample
 
 # Folds, and rows that are enough to judge on.
-FOLDS, _ENOUGH = 5, 200
+FOLDS, ENOUGH = 5, 200
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
@@ -51,9 +51,9 @@ def judging_folds(rows: StandardisedData):
         return [(every, every)]
     found = folds(rows)
     if n_groups(rows) == 1:
-        if n_rows >= FOLDS * _ENOUGH:
+        if n_rows >= FOLDS * ENOUGH:
             found = [(every[1::2], every[::2])]
-        found = found[: int(np.ceil(len(found) * _ENOUGH / n_rows))]
+        found = found[: int(np.ceil(len(found) * ENOUGH / n_rows))]
     inside = [(grow, _in_range(rows.X, grow, judge)) for grow, judge in found]
     left_out, in_range = (sum(judge.size for _, judge in part) for part in (found, inside))
     return [part for part in inside if part[1].size] if 2 * in_range >= left_out else found

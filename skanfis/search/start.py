@@ -55,17 +55,16 @@ class Start:
     term_names: tuple[str, ...] = ()  # where they are given with the rules
 
 
-def started(tuned: Tuned, plan: Plan, room: float, candidates, is_unbounded=False) -> Start:
+def started(tuned: Tuned, plan: Plan, room: float, candidates) -> Start:
     """A start from a training, with the agreement that the tolerance leaves room for.
 
     ``room`` is the factor by which the squared error may still rise. Its root is used up: on new
     rows agreement costs more than the rows that are trained on let see.
     """
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
-    premise = Premise.of(problem.antecedent, *problem.rows.inputs.box, is_unbounded)
     # Where premises stay, none make room for more.
     room = np.sqrt(room) if plan.premises_move else 1.0
-    agreeing = with_most_agreement(tuned, premise, plan.free, room)
+    agreeing = with_most_agreement(tuned, room)
     is_raised = agreeing is not tuned
     return Start(
         problem.antecedent,
@@ -73,7 +72,7 @@ def started(tuned: Tuned, plan: Plan, room: float, candidates, is_unbounded=Fals
         problem.consequent_inputs,
         # Training goes on from there, without the digits that rounding errors reach.
         np.round(agreeing.displacement, _DIGITS),
-        is_unbounded,
+        tuned.premise.is_unbounded,
         is_raised,
         candidates,
     )
@@ -84,7 +83,7 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     n_sample, (low, high) = effective_weight(sample), sample.inputs.box
-    premise, is_unbounded = Premise.of(antecedent, low, high), False
+    premise = Premise.of(antecedent, low, high)
     turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)
     best = tune(problem, premise, free, n_sample, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
@@ -94,16 +93,16 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
         unbounded = Premise.of(antecedent, low, high, is_unbounded=True)
         freed = tune_unbounded(problem, unbounded, free, n_sample)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
-            best, is_unbounded = freed, True
+            best = freed
     room, worths = 1.0, SLOPE_WORTHS if turns else ()
-    sparse = [with_sparse_slopes(best, free, worth) for worth in worths]
+    sparse = [with_sparse_slopes(best, worth) for worth in worths]
     error = min(one.expected_error for one in (best, *sparse))
     variance = float(np.count_nonzero(~rows.targets.is_constant))
     if turns and 0.0 < error < np.inf:
         most = tolerated(error, variance, simplicity)
         best = next(one for one in (*sparse[::-1], best) if one.expected_error <= most)
         room = most / best.expected_error
-    return started(best, plan, room, [_as_given(best, variance)], is_unbounded)
+    return started(best, plan, room, [_as_given(best, variance)])
 
 
 def _as_given(tuned: Tuned, variance):

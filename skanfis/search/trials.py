@@ -24,13 +24,15 @@ from ..policies import TargetRange
 from .candidates import Candidate, TermScores, rule_base
 from .conditions import with_fewer_conditions
 from .grid import Spacing
+from .judging import ENOUGH, FOLDS
 from .lasso import lasso_inputs
 from .sample import DIGITS, effective_weight, to_six_digits, unit_scale
 from .splits import best_splits
 from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
-# Rows that a candidate sees for each of its parameters, and at least.
-_ROWS_PER_PARAMETER, FEWEST_SEEN = 40, 1000
+# Rows that a candidate sees for each of its parameters; and at least: those of which one fold is
+# enough to judge.
+_ROWS_PER_PARAMETER, FEWEST_SEEN = 40, FOLDS * ENOUGH
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
 # Operations of a pass over a training's rows; solving for n parameters takes those of 10 n rows.
@@ -173,7 +175,7 @@ class Trials:
         if candidate not in self._found:
             if candidate.slope_worth is not None:
                 trained = self.tuned(replace(candidate, slope_worth=None))
-                found = with_sparse_slopes(trained, self.plan.free, candidate.slope_worth)
+                found = with_sparse_slopes(trained, candidate.slope_worth)
             elif candidate.n_rules == 1:
                 found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
@@ -183,7 +185,7 @@ class Trials:
                 found = self._train(self._begun[candidate].problem, turns)
                 # To be held in order, all rules need a term on an input.
                 if candidate.n_clusters and self.plan.premises_move and self.plan.held is None:
-                    found = with_fewer_conditions(found, self.plan.free)
+                    found = with_fewer_conditions(found)
             self._found[candidate] = found
         return self._found[candidate]
 

@@ -9,6 +9,7 @@ The weights come first, at the premises of the start: from weights that are far 
 steps of the premises would go where no evidence leads back from.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -58,9 +59,28 @@ class Tuned:
     """The end of the turns: the posterior, the point and the weights there."""
 
     problem: SeparableProblem
+    premise: Premise
+    free: Sequence[str]  # weights that are found, of ``evidence.FREE``
     evaluation: Evaluation
     displacement: np.ndarray
     posterior: Laplace
+
+    @classmethod
+    def start(cls, problem: SeparableProblem, premise: Premise, free, n_rows: float):
+        """Where premises have not moved, and weights are those of the problem's penalty."""
+        x = np.zeros(premise.size)
+        evaluation, line = problem.evaluate(premise.parameters(x)), problem.common_line
+        n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
+        posterior = laplace(evaluation, line, problem.penalty, n_rows, n_outputs, x)
+        return cls(problem, premise, free, evaluation, x, posterior)
+
+    def with_penalty(self, penalty, curvature=None):
+        """The same point at other weights; ``curvature`` where it is not that of before."""
+        before = self.posterior
+        curvature = before.curvature if curvature is None else curvature
+        of_rows = before.n_rows, before.n_outputs, self.displacement, curvature
+        posterior = laplace(self.evaluation, self.problem.common_line, penalty, *of_rows)
+        return replace(self, problem=self.problem.with_penalty(penalty), posterior=posterior)
 
     @property
     def penalty(self):
@@ -119,17 +139,14 @@ def tune(
         first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
-    x = np.zeros(premise.size)
-    evaluation = problem.evaluate(premise.parameters(x))
-    start = _improved(problem, evaluation, x, problem.penalty, first_steps, free, n_rows)
+    start = _improved(Tuned.start(problem, premise, free, n_rows), first_steps)
     if premise.size == 0 or turns == 0:
         return start
     penalty = start.penalty
     if "stiffness" in free:
         stiffness = start.posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
         penalty = replace(penalty, stiffness=stiffness)
-    first = turned(start, premise, penalty, free, steps)
-    return _risen(first, premise, free, turns - 1, steps)
+    return _risen(turned(start, penalty, steps), turns - 1, steps)
 
 
 def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: float) -> Tuned:
@@ -137,21 +154,18 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: fl
 
     What the premises of the start leave of data without noise would be taken for noise.
     """
-    x = np.zeros(premise.size)
     least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
     penalty = replace(problem.penalty, **least)
-    evaluation = problem.evaluate(premise.parameters(x))
-    start = _improved(problem, evaluation, x, penalty, 0, free, n_rows)
-    steps, far = FIRST_STEPS, _UNBOUNDED_ITERATIONS
-    first = turned(start, premise, penalty, free, steps, far, has_least=False)
-    return _risen(first, premise, free, MOST_TURNS - 1, _STEPS, has_least=False)
+    start = Tuned.start(problem, premise, free, n_rows).with_penalty(penalty)
+    first = turned(start, penalty, FIRST_STEPS, _UNBOUNDED_ITERATIONS)
+    return _risen(first, MOST_TURNS - 1, _STEPS)
 
 
-def _risen(tuned: Tuned, premise, free, turns, steps, has_least=True) -> Tuned:
+def _risen(tuned: Tuned, turns, steps) -> Tuned:
     """The turn of the largest evidence, of so many more."""
     best = last = tuned
     for _ in range(turns):
-        last = turned(last, premise, last.penalty, free, steps, has_least=has_least)
+        last = turned(last, last.penalty, steps)
         gain = best.posterior.minus_twice_log - last.posterior.minus_twice_log
         best = last if gain > 0.0 else best
         if not gain > WORTH:
@@ -159,14 +173,9 @@ def _risen(tuned: Tuned, premise, free, turns, steps, has_least=True) -> Tuned:
     return best
 
 
-def turned(
-    tuned: Tuned, premise, penalty, free, steps=_STEPS, iterations=_ITERATIONS, has_least=True
-) -> Tuned:
-    """One turn from where the last one ended: premises down the cost, then weights up.
-
-    ``has_least``: whether weights stay above those of ``least_weights``.
-    """
-    problem = tuned.problem.with_penalty(penalty)
+def turned(tuned: Tuned, penalty, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
+    """One turn from where the last one ended: premises down the cost, then weights up."""
+    problem, premise = tuned.problem.with_penalty(penalty), tuned.premise
     result = varpro(
         problem,
         premise,
@@ -180,38 +189,31 @@ def turned(
     x = premise.displacement(evaluation.antecedent.parameters)
     # One step before the end as a rule, and as good there: another pass is not worth it.
     curvature = np.maximum(np.linalg.eigvalsh(result.gauss_newton), 0.0)
-    n_rows = tuned.posterior.n_rows
-    return _improved(problem, evaluation, x, penalty, steps, free, n_rows, curvature, has_least)
+    there = replace(tuned, evaluation=evaluation, displacement=x)
+    return _improved(there.with_penalty(penalty, curvature), steps)
 
 
-def _improved(
-    problem, evaluation, x, penalty, steps, free, n_rows, curvature=(), has_least=True
-) -> Tuned:
-    """The point after so many steps of the free weights, or when they stand still.
+def _improved(tuned: Tuned, steps) -> Tuned:
+    """The same point after so many steps of the free weights, or when they stand still.
 
     Steps that are alike are taken on to where they lead, if the evidence rises there; the last is
     always a plain one. ``before`` is the penalty before the last step, if that was a plain one.
     """
-    line = problem.common_line
-    n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
-    n_distinct = problem.rows.n_rows  # a search sample has no row twice
-
-    def posterior_at(weights):
-        return laplace(evaluation, line, weights, n_rows, n_outputs, x, curvature)
-
-    posterior, before = posterior_at(penalty), None
+    line, free, before = tuned.problem.common_line, tuned.free, None
+    n_distinct = tuned.problem.rows.n_rows  # a search sample has no row twice
     for left in reversed(range(steps)):
-        least = least_weights(posterior, n_distinct) if has_least else SMALLEST
+        posterior, now = tuned.posterior, tuned.penalty
+        least = SMALLEST if tuned.premise.is_unbounded else least_weights(posterior, n_distinct)
         plain = reestimated(posterior, free, least, n_distinct)
-        far = extrapolated(line, before, posterior.penalty, plain, free, least)
-        if before is not None and is_settled(line, posterior.penalty, far):
+        far = extrapolated(line, before, now, plain, free, least)
+        if before is not None and is_settled(line, now, far):
             break
-        jumped = posterior_at(far) if left and far != plain else None
-        if jumped is None or jumped.minus_twice_log > posterior.minus_twice_log:
-            posterior, before = posterior_at(plain), posterior.penalty
+        jumped = tuned.with_penalty(far) if left and far != plain else None
+        if jumped is None or jumped.posterior.minus_twice_log > posterior.minus_twice_log:
+            tuned, before = tuned.with_penalty(plain), now
         else:
-            posterior, before = jumped, None
-    return Tuned(problem.with_penalty(posterior.penalty), evaluation, x, posterior)
+            tuned, before = jumped, None
+    return tuned
 
 
 def cost_of(tuned: Tuned) -> int:
@@ -221,23 +223,21 @@ def cost_of(tuned: Tuned) -> int:
     return reading_cost(problem.antecedent, n_slopes, problem.n_outputs)
 
 
-def with_most_agreement(tuned: Tuned, premise: Premise, free, room: float) -> Tuned:
+def with_most_agreement(tuned: Tuned, room: float) -> Tuned:
     """The same with as much agreement as keeps the squared error within ``room`` times itself.
 
     The consequents alone tell how much that is at least; then the premises follow, which makes room
     for more, or for less.
     """
     is_known = np.isfinite(tuned.expected_error)
-    if "agreement" not in free or not tuned.displacement.size or room <= 1.0 or not is_known:
+    if "agreement" not in tuned.free or not tuned.displacement.size or room <= 1.0 or not is_known:
         return tuned
-    others = [key for key in free if key != "agreement"]
     most, best, agreement = room * tuned.expected_error, tuned, 0.0
     for _ in range(_MOST_RAISES):
         agreement = agreement or _most_agreement(best, most)
         if agreement < _LEAST_RAISE * best.penalty.agreement:
             break
-        penalty = replace(best.penalty, agreement=agreement)
-        found = turned(best, premise, penalty, others, steps=0)
+        found = turned(best, replace(best.penalty, agreement=agreement), steps=0)
         if found.expected_error <= most:
             best, agreement = found, 0.0
         else:
@@ -245,15 +245,12 @@ def with_most_agreement(tuned: Tuned, premise: Premise, free, room: float) -> Tu
     return best
 
 
-def with_sparse_slopes(tuned: Tuned, free, worth) -> Tuned:
+def with_sparse_slopes(tuned: Tuned, worth) -> Tuned:
     """The same with slopes that are worth so much alone: else one for several rules, or none."""
-    problem, posterior, x = tuned.problem, tuned.posterior, tuned.displacement
-    if not {"alpha", "slope"} <= set(free) or problem.n_columns > MANY_COLUMNS:
+    if not {"alpha", "slope"} <= set(tuned.free) or tuned.problem.n_columns > MANY_COLUMNS:
         return tuned
-    common, absent = sparse_slopes(posterior, tuned.solved.normal.coefficients, worth)
-    penalty = replace(tuned.penalty, common=common, absent=absent)
-    n_rows, curvature = posterior.n_rows, posterior.curvature
-    return _improved(problem, tuned.evaluation, x, penalty, 0, free, n_rows, curvature)
+    common, absent = sparse_slopes(tuned.posterior, tuned.solved.normal.coefficients, worth)
+    return tuned.with_penalty(replace(tuned.penalty, common=common, absent=absent))
 
 
 def _most_agreement(tuned: Tuned, most: float) -> float:

@@ -206,6 +206,11 @@ class NeverFitted(BayesianRidge):
             {},
             {"groups": np.arange(24) // 12, "sample_weight": np.repeat([0, 1], 12)},
         ),
+        (
+            "None of the 6 rows held out has a positive weight",
+            {"method": "split"},
+            {"sample_weight": np.arange(24) % 12 == 0},
+        ),
         ("groups has 23 entries for 24 rows", {}, {"groups": np.zeros(23)}),
         ("leaves out rows, not groups", {"method": "loo"}, {"groups": np.arange(24)}),
         ("nothing of its noise.* another", {"method": "loo", "estimator": BayesianRidge()}, {}),

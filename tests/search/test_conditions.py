@@ -65,7 +65,7 @@ def test_the_condition_that_a_rule_does_not_have_goes(rng):
     start = rules.change_units(-rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale)
     problem = SeparableProblem(rows, start, tuning.FIRST_PENALTY)
     tuned = tuning.tune(problem, Premise.of(start, *rows.inputs.box), FREE, 500.0)
-    found = conditions.with_fewer_conditions(tuned, FREE)
+    found = conditions.with_fewer_conditions(tuned)
     assert_array_equal(found.evaluation.antecedent.table, [[0, -1], [1, 2], [3, 4]])
     assert found.expected_error < 1.02 * tuned.expected_error
 
@@ -78,7 +78,7 @@ def test_every_rule_keeps_a_condition_and_the_evidence_rises(rng):
     problem = SeparableProblem(rows, tuned.problem.antecedent, tuned.penalty)
     premise = Premise.of(problem.antecedent, *rows.inputs.box)
     tuned = tuning.tune(problem, premise, FREE, 200.0, turns=1)
-    found = conditions.with_fewer_conditions(tuned, FREE)
+    found = conditions.with_fewer_conditions(tuned)
     assert found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
     assert_array_equal((found.evaluation.antecedent.table >= 0).sum(axis=1), 1)
     moved = Premise.of(found.problem.antecedent, *rows.inputs.box).parameters(found.displacement)

@@ -67,3 +67,7 @@ class TestSpacing:
     def test_of_an_input_of_two_a_value_of_a_single_row_is_kept(self, flip):
         x = np.arange(200) == 0
         assert_allclose(places(rows_of(x ^ flip), 2), [0.0, 1.0], atol=1e-9)
+
+    def test_what_varies_on_no_row_of_a_sample_has_terms_at_the_ends_of_its_range(self):
+        rows = rows_of(np.arange(200.0), np.arange(200) == 0)
+        assert_allclose(places(rows.part(slice(1, None)), 2, 1), [0.0, 1.0], atol=1e-9)

@@ -64,9 +64,8 @@ def with_agreement(tuned, agreement):
 class TestAgreement:
     @pytest.mark.parametrize("left", [1.05, 1.2, 2.0])
     def test_it_is_raised_as_far_as_the_error_allows(self, left, rng):
-        problem, premise = two_rules_of_a_sine(rng, 0.3)
-        apart = tuning.tune(problem, premise, FREE, 100.0)
-        found = tuning.with_most_agreement(apart, premise, FREE, left)
+        apart = tuning.tune(*two_rules_of_a_sine(rng, 0.3), FREE, 100.0)
+        found = tuning.with_most_agreement(apart, left)
         assert found is not apart
         assert apart.expected_error < found.expected_error <= left * apart.expected_error
         # As far as consequents alone allow, or further.
@@ -75,8 +74,9 @@ class TestAgreement:
         # The other weights are those that the evidence found.
         assert found.penalty == replace(apart.penalty, agreement=agreement)
         # What is given or leaves nothing is not changed.
-        assert tuning.with_most_agreement(apart, premise, FREE[1:], left) is apart
-        assert tuning.with_most_agreement(apart, premise, FREE, 1.0) is apart
+        given = replace(apart, free=FREE[1:])
+        assert tuning.with_most_agreement(given, left) is given
+        assert tuning.with_most_agreement(apart, 1.0) is apart
 
     def test_consequents_alone_are_followed_to_the_limit(self, two_rules):
         apart = tuning.tune(*two_rules, FREE, 100.0)

@@ -167,3 +167,11 @@ def test_outliers_do_not_say_how_far_the_tangent_is_followed():
         model.fit(X, target)
         with pytest.warns(OutOfBoundsWarning):
             assert_allclose(model.predict([[6.0, -6.0]]), 18.0, atol=0.2)
+
+
+def test_an_input_that_varies_on_an_outlier_alone_may_have_terms(rng):
+    X = np.column_stack([rng.normal(size=60), np.zeros(60)])
+    y = 1e-6 * rng.normal(size=60)
+    X[0, 1], y[0] = 1.0, -1.0
+    model = ANFISRegressor(n_mfs=[1, 2], loss="huber").fit(X, y)
+    assert_allclose(model.predict(X)[1:], 0.0, atol=1e-5)
