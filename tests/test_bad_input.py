@@ -418,7 +418,7 @@ def test_setting_of_a_word(given, setting, advice):
         ("solver", Hybrid(stiffness=-0.1), "stiffness"),
         ("solver", Hybrid(step_size=0.0), "step_size"),
         ("solver", GradientDescent(error_goal=-1.0), "error_goal"),
-        ("loss", Huber(epsilon=0.0), "epsilon"),
+        ("loss", Huber(epsilon=0.09), "epsilon"),
         ("early_stopping", EarlyStopping(validation_fraction=1.0), "validation_fraction"),
         ("early_stopping", EarlyStopping(n_iter_no_change=0), "n_iter_no_change"),
         ("out_of_bounds", LinearExtrapolation(-0.5), "max_extrapolation"),
