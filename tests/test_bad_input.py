@@ -109,6 +109,15 @@ REFUSED = {
     "other groups": ({"groups": [1, 2]}, ["groups has 2 entries for 60 rows", "every row"]),
     "kinds of groups": ({"groups": [1, "a"] * 30}, ["groups holds int and str", "text alone"]),
     "pairs": ({"groups": [(1, 2)] * N_ROWS}, ["groups must have one entry per row", "(60, 2)"]),
+    "name of groups": ({"groups": "run"}, ["groups must have one entry per row", "shape ()"]),
+    "masked groups": (
+        {"groups": np.ma.masked_equal(np.arange(N_ROWS) // 10, 2)},
+        ["groups has no value for 10 of 60 rows, first at row 20"],
+    ),
+    "target beyond floats": (
+        {"y": pd.Series([1] * 59 + [10**400], name="error")},
+        ["y holds a int in column 'error', first at row 59", "too large"],
+    ),
     "missing group": ({"groups": [None] * N_ROWS}, ["groups has no value for 60 of 60 rows"]),
     "workers": ({"n_jobs": 0}, ["n_jobs == 0"]),
     "MATLAB": ({"mf": "gbellmf"}, ["'gbellmf' is MATLAB's name", "mf='bell'"]),
@@ -160,12 +169,14 @@ TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "Drop the colum
         (pd.array(LO_HI, dtype="string"), TEXT),
         (["1.5", "2"] * 20 + LO_HI[:20], ["text in column 'rate', first at row 40", "'lo'"]),
         (pd.Series([[1]] * N_ROWS), ["holds a list in column 'rate', first at row 0"]),
+        (pd.Series(list(X)), ["holds a ndarray in column 'rate', first at row 0"]),
         (TIMES, ["X holds times in column 'rate' (datetime64", "number of seconds"]),
         (TIMES.tz_localize("UTC"), ["X holds times in column 'rate' (datetime64", "UTC"]),
         (TIMES.to_period(), ["X holds times in column 'rate' (period"]),
         (TIMES.date.astype(object), ["a date in column 'rate', first at row 0", "of seconds"]),
         (pd.Categorical(TIMES), ["X holds times in column 'rate' (datetime64", "of seconds"]),
         ([1.5, pd.NA] * 30, ["a missing value in column 'rate', first at row 1", "impute"]),
+        ([1, 10**400] * 30, ["a int in column 'rate', first at row 1", "too large"]),
     ],
 )
 def test_column_that_is_no_number_is_named(rate, said):
