@@ -43,7 +43,7 @@ def named_refusals(*, takes_categories=False, **tables):
         _check_kind(table, what, takes_categories or what != "X")
     try:
         yield
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         for what, table in tables.items():
             _name_what_is_no_number(table, what, error)
         raise
@@ -63,13 +63,13 @@ def refuse_lazy(**tables):
             )
 
 
-def as_numbers(table, what="X", *, takes_categories=True):
+def as_numbers(table, what="X", *, takes_categories=True, floats="d"):
     """A table as floats, NaN where values are missing; what else it holds is refused by name."""
-    if type(table) is np.ndarray and table.dtype == np.float64 and table.ndim < 3:
+    if type(table) is np.ndarray and table.dtype in list(floats) and table.ndim < 3:
         return table
     any_form = {"ensure_all_finite": False, "ensure_2d": False, "ensure_min_samples": 0}
     with named_refusals(takes_categories=takes_categories, **{what: table}):
-        return check_array(table, dtype=np.float64, input_name=what, **any_form)
+        return check_array(table, dtype=list(floats), input_name=what, **any_form)
 
 
 def rows_by_name(X, names):
@@ -77,7 +77,7 @@ def rows_by_name(X, names):
     refuse_lazy(X=X)
     lacking = [name for name in names if name not in getattr(X, "columns", names)]
     if not lacking:
-        X = as_numbers(X[list(names)] if hasattr(X, "columns") else X)
+        X = as_numbers(X[list(names)] if hasattr(X, "columns") else X, floats="df")
     if lacking or X.shape[1:] != (len(names),):
         what = f"lacks the column {lacking[0]!r}" if lacking else f"has the shape {X.shape}"
         raise ValueError(f"X {what}: the model takes {', '.join(map(repr, names))}.")
@@ -134,7 +134,7 @@ def _name_what_is_no_number(table, what, error):
     where = "" if name is None else f" in column {name!r}"
     more = ", ".join(repr(other) for other, *_ in found[1:])
     also = f" So do the columns {more}." if more else ""
-    if is_missing(value):
+    if not hasattr(value, "__len__") and is_missing(value):
         kind, advice = "a missing value", _IMPUTE if what == "X" else "Drop these rows."
     elif isinstance(value, date | time | timedelta):
         advice = _SECONDS
@@ -145,7 +145,7 @@ def _name_what_is_no_number(table, what, error):
             "Drop the column, or encode categories as numbers in a Pipeline before "
             "(OneHotEncoder(drop='if_binary', sparse_output=False) of sklearn.preprocessing)."
         )
-    raise type(refusal)(
+    raise (TypeError if isinstance(refusal, TypeError) else ValueError)(
         f"Input {what} holds {kind}{where}, first at row {row}: {refusal}.{also} {advice}"
     ) from error
 
@@ -158,7 +158,7 @@ def _refused(column):
         try:
             # Complex numbers are scikit-learn's to refuse.
             float(np.nan if value is None or isinstance(value, complex) else value)
-        except (TypeError, ValueError) as refusal:
+        except (TypeError, ValueError, OverflowError) as refusal:
             yield row, value, refusal
             return
 
@@ -178,13 +178,15 @@ def _columns(table):
 
 def group_numbers(groups, n_rows):
     """The groups of rows as numbers; ValueError where one is missing, or they are of two kinds."""
+    if np.ma.is_masked(groups):
+        groups = np.where(np.ma.getmaskarray(groups), None, groups)
     groups = np.asarray(groups, dtype=object) if isinstance(groups, list) else np.asarray(groups)
     if groups.ndim == 2 and groups.shape[1] == 1:
         groups = groups.ravel()
     if groups.ndim != 1:
         raise ValueError(
-            f"groups must have one entry per row; it has {groups.ndim} dimensions, of shape "
-            f"{groups.shape}. Make one label of several, such as 'device 1, run 2'."
+            f"groups must have one entry per row; it has the shape {groups.shape}. Give each row "
+            "one label; make one of several, such as 'device 1, run 2'."
         )
     if len(groups) != n_rows:
         raise ValueError(

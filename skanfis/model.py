@@ -315,9 +315,8 @@ class TSKModel:
                 "standard deviation. Use fewer rules, or ConformalRegressor(..., scaled=False)."
             )
         return (
-            "The model has no posterior, as one that was read from a .fis file, that lost rules or "
-            "that has seen a single row. Fit it to data (solver='lse' fits the consequents and "
-            "leaves the premises alone)."
+            "The model has no posterior, as one read from a .fis file or JSON without it, that "
+            "lost rules or has seen a single row. Fit it to data (solver='lse' keeps its premises)."
         )
 
     def way_out(self, X) -> np.ndarray:

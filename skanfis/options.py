@@ -24,8 +24,8 @@ class Huber(BaseEstimator):
     Parameters
     ----------
     epsilon : float, default=1.35
-        Where the loss turns, in robust standard deviations of the residual; positive. The smaller,
-        the more robust; 1.35 loses 5 % of the efficiency where there are no outliers.
+        Where the loss turns, in robust standard deviations of the residual; 0.1 or more. The
+        smaller, the more robust; 1.35 loses 5 % of the efficiency where there are no outliers.
 
     Examples
     --------
@@ -38,7 +38,7 @@ class Huber(BaseEstimator):
     """
 
     _parameter_constraints: ClassVar[dict] = {
-        "epsilon": [Interval(Real, 0, None, closed="neither")],
+        "epsilon": [Interval(Real, 0.1, None, closed="left")],
     }
 
     def __init__(self, epsilon: float = 1.35) -> None:

@@ -15,6 +15,7 @@ from skanfis.options import LinearExtrapolation
 from skanfis.policies import FARTHEST, MAX_EXTRAPOLATION
 
 from . import oracles
+from .memory import traced
 from .quick import quick
 
 NAMES = ["time", "temperature", "rate"]
@@ -97,3 +98,16 @@ def test_policy_may_be_changed_after_training(trained):
             model.predict(OUTSIDE)
     with pytest.raises(ValueError, match="'extrapolate' must be one of clip, linear, nan, raise"):
         trained.model_.with_out_of_bounds("extrapolate")
+
+
+@pytest.mark.parametrize("policy", ["clip", "linear"])
+def test_array_in_single_precision_is_not_copied_as_a_whole(policy):
+    """A file may be mapped to memory that would not hold its rows as doubles."""
+    single = np.tile(X.astype(np.float32), (1000, 1))
+    model = quick(2, out_of_bounds=policy).fit(single[:240], Y)
+    expected = model.predict(single[:240].astype(float))
+    for act in (model.predict, model.coverage, model.model_.predict):
+        with traced() as peak:
+            found = act(single)
+        assert peak[0] < 2 * single.nbytes
+    assert_array_equal(found[:240, 0], expected)

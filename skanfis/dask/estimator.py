@@ -68,7 +68,7 @@ class DaskANFISRegressor(ANFISRegressor):
         described, error = reduce_partitions(partitions, of_rows, _added)
         if described is None or described[0] < 2:
             return np.nan
-        _, weight, target = described
+        _, weight, _, target = described
         if not np.isfinite(error).all():
             raise ValueError(
                 "y is not finite, or X is out of range where out_of_bounds='nan': drop these rows."
@@ -173,12 +173,12 @@ def _predicted(block, model, names, is_deviation):
 
 
 def _target_and_error(rows, model):
-    """Count, weight and scale of the target in a partition, None of no rows; and squared error."""
+    """As of ``_describe``, of the target alone, without squares of weights; and squared error."""
     if not rows.n_rows:
         return None, 0.0
     predicted = model.predict(rows.X).reshape(rows.y.shape)
     target = column_statistics(rows.y, rows.sample_weight)
-    return (rows.n_rows, rows.total_weight, target), rows.weights @ (rows.y - predicted) ** 2
+    return (rows.n_rows, rows.total_weight, 0.0, target), rows.weights @ (rows.y - predicted) ** 2
 
 
 def _added(one, other):

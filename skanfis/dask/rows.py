@@ -220,6 +220,7 @@ class ClusterRows:
     partitions: Partitions
     n_rows: int
     total_weight: float
+    squared_weight: float  # the sum of their squares
     inputs: Scale
     targets: Scale
     sample: StandardisedData | None = None
@@ -238,7 +239,7 @@ class ClusterRows:
 
 
 def _describe(rows, layout):
-    """Count, weight, and scales of inputs and targets of a partition; None if it has no rows.
+    """Count, weights, their squares, scales of inputs and targets of a partition; None of no rows.
 
     ValueError where a value is not finite.
     """
@@ -252,15 +253,16 @@ def _describe(rows, layout):
         if largest > _LARGEST_WEIGHT or 0.0 < total < 1.0 / _LARGEST_WEIGHT:
             raise ValueError(f"sample_weight is as large as {largest:g}: give weights near to one.")
     inputs, targets = (column_statistics(part, rows.sample_weight) for part in (rows.X, rows.y))
-    return rows.n_rows, rows.total_weight, inputs, targets
+    return rows.n_rows, rows.total_weight, float(np.sum(rows.weights**2)), inputs, targets
 
 
 def joined(one, other):
     """The description, as of ``_describe``, of the rows of two partitions together."""
     if one is None or other is None:
         return other if one is None else one
-    n_rows, weights, *scales = zip(one, other, strict=True)
-    return sum(n_rows), sum(weights), *(joined_scales(*both, *weights) for both in scales)
+    n_rows, weights, squares, *pairs = zip(one, other, strict=True)
+    scales = [joined_scales(*pair, *weights) for pair in pairs]
+    return sum(n_rows), sum(weights), sum(squares), *scales
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,7 +270,7 @@ class ClusterData:
     """Validated data on a cluster; see ``ValidatedData``."""
 
     partitions: Partitions
-    described: tuple[int, float, Scale, Scale]  # as of ``_describe``
+    described: tuple[int, float, float, Scale, Scale]  # as of ``_describe``
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     constraints: Constraints | None = None
@@ -285,5 +287,5 @@ class ClusterData:
 
     def rows(self):
         """The rows on their scales."""
-        check_scales(*self.described[2:], self.input_names, self.output_names)
+        check_scales(*self.described[3:], self.input_names, self.output_names)
         return ClusterRows(self.partitions, *self.described)

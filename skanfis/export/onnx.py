@@ -59,7 +59,7 @@ def _set_shapes(node):
 
     is_double = any(isinstance(given.type, DoubleTensorType) for given in node.inputs)
     kind = DoubleTensorType if is_double else FloatTensorType
-    n_outputs = node.raw_operator.model_.n_outputs
+    n_outputs = node.raw_operator._fitted_model().n_outputs
     node.outputs[0].type = kind([node.inputs[0].get_first_dimension(), n_outputs])
 
 

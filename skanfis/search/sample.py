@@ -18,7 +18,7 @@ DIGITS = 9
 def effective_weight(rows: StandardisedData):
     """Rows by weight: their sum, or as many as their spread leaves, whichever are more."""
     if not isinstance(rows, StandardisedData):
-        return rows.total_weight  # on a cluster, where no squares are summed
+        return max(rows.total_weight, rows.total_weight**2 / rows.squared_weight)
     # By the largest: squares of tiny weights would vanish.
     largest = float(np.max(rows.weights))
     share = rows.weights / largest

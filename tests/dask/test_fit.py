@@ -92,6 +92,17 @@ def test_search_by_groups_with_weights_is_that_of_one_process(few_are_many, monk
     assert_same_model(found, single, 1e-10)
 
 
+def test_weights_that_are_no_copies_count_as_in_one_process(few_are_many):
+    """As many rows as their spread leaves, however small all of them are."""
+    X, y = data()
+    weight = 1e-4 * np.random.default_rng(1).uniform(0.5, 1.5, len(y))
+    single = ANFISRegressor(n_mfs=3).fit(X, y, weight)
+    spread = DaskANFISRegressor(n_mfs=3).fit(*cut(700, X, y, weight))
+    assert spread.alpha_ == single.alpha_
+    assert_allclose(spread.noise_std_, single.noise_std_, rtol=1e-10)
+    assert_same_model(spread, single, 1e-10)
+
+
 def test_few_rows_are_fetched_and_trained_on_as_ever():
     table = frame(500).assign(weight=np.linspace(0.0, 2.0, 500), run=np.arange(500) // 50)
     lazy = dd.from_pandas(table, npartitions=3)

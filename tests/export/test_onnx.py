@@ -10,6 +10,7 @@ import pytest
 from sklearn.base import clone
 from sklearn.cluster import KMeans
 from sklearn.compose import ColumnTransformer
+from sklearn.exceptions import NotFittedError
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import MinMaxScaler, RobustScaler, StandardScaler
 
@@ -140,6 +141,8 @@ def test_a_frame_makes_an_input_of_every_column():
 
 def test_what_a_graph_cannot_be_is_refused():
     estimator = quick(n_mfs=2).fit(X, Y)
+    with pytest.raises(NotFittedError, match="This ANFISRegressor instance is not fitted yet"):
+        skl2onnx.to_onnx(quick(), X[:1])
     with pytest.raises(ValueError, match="target_opset=12 is too old"):
         skl2onnx.to_onnx(estimator, X[:1], target_opset=12)
     expected = estimator.predict(X)

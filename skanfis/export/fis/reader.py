@@ -76,7 +76,7 @@ def read_fis(path: str | PathLike[str]) -> TSKModel:
     """
     data = read_bytes(path, _MOST_BYTES)
     try:
-        return parse_fis(data.decode("utf-8-sig"))
+        return parse_fis(data.decode("utf-8-sig", "surrogateescape"))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
@@ -158,7 +158,7 @@ def _sections(text):
         if not entry.text or entry.text[0] in "%#":
             continue
         if not entry.text.isprintable():
-            raise entry.error(f"{shown(entry.text)} has characters that cannot be printed.")
+            raise entry.error(f"{shown(entry.text)} has characters that UTF-8 does not print.")
         key, separator, value = (part.strip() for part in entry.text.partition("="))
         if entry.text[0] == "[":
             name = entry.match(_HEAD, "[System], [Input1], [Output1] or [Rules]")[1]
