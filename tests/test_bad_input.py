@@ -115,7 +115,7 @@ REFUSED = {
         ["groups has no value for 10 of 60 rows, first at row 20"],
     ),
     "target beyond floats": (
-        {"y": pd.Series([1] * 59 + [10**400], name="error")},
+        {"y": pd.Series([1] * 59 + [10**400], name="error", dtype=object)},
         ["y holds a int in column 'error', first at row 59", "too large"],
     ),
     "missing group": ({"groups": [None] * N_ROWS}, ["groups has no value for 60 of 60 rows"]),
@@ -176,7 +176,10 @@ TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "Drop the colum
         (TIMES.date.astype(object), ["a date in column 'rate', first at row 0", "of seconds"]),
         (pd.Categorical(TIMES), ["X holds times in column 'rate' (datetime64", "of seconds"]),
         ([1.5, pd.NA] * 30, ["a missing value in column 'rate', first at row 1", "impute"]),
-        ([1, 10**400] * 30, ["a int in column 'rate', first at row 1", "too large"]),
+        (
+            np.array([1, 10**400] * 30, dtype=object),
+            ["a int in column 'rate', first at row 1", "too large"],
+        ),
     ],
 )
 def test_column_that_is_no_number_is_named(rate, said):
