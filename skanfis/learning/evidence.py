@@ -51,6 +51,8 @@ _LEAST = 1e-6
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
 _LONGEST_STEP = np.log(100.0)
+# Successive steps of a weight are alike from this ratio on.
+_ALIKE = 0.5
 # Below all weights: a logarithm can be taken of it.
 _NOTHING = np.finfo(float).tiny
 # Of a number of parameters, of what is paid for them, and of steps: less has no sign of its own.
@@ -272,6 +274,29 @@ def _limited(penalty, line, weights, moves, others, least):
     if moves[components].any():
         after["alpha"], after["pulls"] = mean_and_parts(found[components], line.components)
     return replace(penalty, **after)
+
+
+def extrapolated(line, before, now, after, free, least):
+    """Where steps that follow one another lead: ``after``, and beyond it where they are alike.
+
+    Where data hardly decide on a weight, as with more columns than rows, every step is a small part
+    of the way. By Aitken's rule, the logarithms being a geometric sequence, the rest of the way is
+    1 / (1 - r) last steps, r the ratio of one to that before; never more than the largest step,
+    which is taken too where r is one or more. ``before`` is None where there is no such step.
+    """
+    if before is None:
+        return after
+    weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
+    first, second, third = np.log(np.maximum(weights, _NOTHING))
+    step, last = third - second, second - first
+    moves = np.isin(line.kinds, free)
+    moves &= (step * last > _ROUNDING) & (np.abs(step) >= _ALIKE * np.abs(last))
+    if not moves.any():
+        return after
+    left = np.maximum(1.0 - step / np.where(moves, last, 1.0), np.finfo(float).eps)
+    jump = np.clip(step / left, -_LONGEST_STEP, _LONGEST_STEP)
+    far = np.where(moves, np.exp(second + jump), weights[2])
+    return _limited(after, line, far, moves, weights[2], least)
 
 
 def is_settled(line, penalty, after):

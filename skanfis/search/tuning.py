@@ -23,6 +23,7 @@ from ..learning.evidence import (
     SMALLEST,
     WORTH,
     Laplace,
+    extrapolated,
     is_settled,
     laplace,
     least_weights,
@@ -40,8 +41,8 @@ FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Steps of the weights at premises that have not moved yet: each of a hundredfold at the most, they
 # lead from the start to any end.
 FIRST_STEPS = 5
-# Where no premises follow, the weights arrive, most of them soon.
-ARRIVING = 200
+# Where no premises follow, the weights arrive: most of them within ten.
+ARRIVING = 50
 # Steps and turns beyond ``MANY_COLUMNS``; so many turns have grids as well (``trials``).
 _FEW_STEPS, FEW_TURNS = 3, 2
 # A turn: a few iterations of the premises, then steps of the weights. Neither converges while the
@@ -193,15 +194,25 @@ def turned(tuned: Tuned, penalty, steps=_STEPS, iterations=_ITERATIONS) -> Tuned
 
 
 def _improved(tuned: Tuned, steps) -> Tuned:
-    """The same point after so many steps of the free weights, or when they stand still."""
+    """The same point after so many steps of the free weights, or when they stand still.
+
+    Steps that are alike are taken on to where they lead, if the evidence rises there; the last is
+    always a plain one. ``before`` is the penalty before the last step, if that was a plain one.
+    """
+    line, free, before = tuned.problem.common_line, tuned.free, None
     n_distinct = tuned.problem.rows.n_rows  # a search sample has no row twice
-    for _ in range(steps):
+    for left in reversed(range(steps)):
         posterior, now = tuned.posterior, tuned.penalty
         least = SMALLEST if tuned.premise.is_unbounded else least_weights(posterior, n_distinct)
-        after = reestimated(posterior, tuned.free, least, n_distinct)
-        if is_settled(posterior.line, now, after):
+        plain = reestimated(posterior, free, least, n_distinct)
+        far = extrapolated(line, before, now, plain, free, least)
+        if before is not None and is_settled(line, now, far):
             break
-        tuned = tuned.with_penalty(after)
+        jumped = tuned.with_penalty(far) if left and far != plain else None
+        if jumped is None or jumped.posterior.minus_twice_log > posterior.minus_twice_log:
+            tuned, before = tuned.with_penalty(plain), now
+        else:
+            tuned, before = jumped, None
     return tuned
 
 
