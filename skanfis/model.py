@@ -34,6 +34,7 @@ from .policies import (
     TargetRange,
     check_policy,
     describe_out_of_bounds,
+    is_outside,
 )
 from .posterior import MOST_PARAMETERS, Posterior
 from .support import RuleSupport
@@ -197,9 +198,9 @@ class TSKModel:
         return terms
 
     def in_bounds(self, X) -> np.ndarray:
-        """Whether each row lies in the box of the training data, shape (n_rows,)."""
+        """Whether each row is in the box of the training data, but for rounding, shape (n_rows,)."""
         X = rows_by_name(X, self.input_names)
-        return ((self.minimum <= X) & (self.maximum >= X)).all(axis=1)
+        return ~is_outside(X, self.minimum, self.maximum).any(axis=1)
 
     def strengths(self, X) -> np.ndarray:
         """Normalised firing strengths, shape (n_rows, n_rules); those of the nearest in-box row."""

@@ -8,6 +8,8 @@ import numpy as np
 
 from .digits import told_apart
 
+# What varies by less than this part of its size varies by rounding errors only.
+ROUNDING = 16.0 * np.finfo(float).eps
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # Those that answer nothing.
 SILENT = ("nan", "raise")
@@ -87,11 +89,17 @@ def check_policy(policy, max_extrapolation):
         )
 
 
+def is_outside(X, minimum, maximum):
+    """Which entries of X, (n_rows, n_inputs), leave the ranges, by more than rounding errors."""
+    room = ROUNDING * np.maximum(np.abs(minimum), np.abs(maximum))
+    return ~((minimum - room <= X) & (maximum + room >= X))
+
+
 def describe_out_of_bounds(X, minimum, maximum, names) -> str:
     """Say which columns of X leave their range, in how many rows, and how far."""
     parts = []
-    for column, low, high, name in zip(X.T, minimum, maximum, names, strict=True):
-        outside = (column < low) | (column > high)
+    every = is_outside(X, minimum, maximum).T
+    for column, outside, low, high, name in zip(X.T, every, minimum, maximum, names, strict=True):
         if outside.any():
             ends = told_apart([low, high, column.min(), column.max()], 6)
             parts.append(

@@ -84,7 +84,7 @@ def test_model_about_its_reference_keeps_the_digits_that_the_textbook_form_loses
 
 
 @ALL
-def test_in_bounds_is_the_closed_box(frozen):
+def test_in_bounds_is_the_closed_box_but_for_rounding(frozen):
     middle = 0.5 * (frozen.minimum + frozen.maximum)
     rows = [middle, frozen.minimum, frozen.maximum]
     assert frozen.in_bounds(np.array(rows)).all()
@@ -92,6 +92,8 @@ def test_in_bounds_is_the_closed_box(frozen):
         for edge, side in ((frozen.minimum, -np.inf), (frozen.maximum, np.inf)):
             row = middle.copy()
             row[j] = np.nextafter(edge[j], side)
+            assert frozen.in_bounds(row[None])[0]
+            row[j] = edge[j] + np.sign(side) * 1e-13
             assert not frozen.in_bounds(row[None])[0]
     assert not frozen.in_bounds(np.full((1, 3), np.nan))[0]
 

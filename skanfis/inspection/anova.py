@@ -20,7 +20,8 @@ from itertools import accumulate
 import numpy as np
 
 from ..blocks import add_each, fitting_rows, row_blocks
-from ..learning.data import ROUNDING, Scale, StandardisedData
+from ..learning.data import Scale, StandardisedData
+from ..policies import ROUNDING
 from ..search import representative_rows, weighted_quantile
 
 # Values of every input that a fit keeps, from so many rows at most; draws in place of closed forms,

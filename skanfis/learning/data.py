@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..blocks import BLOCK_ROWS, row_blocks
+from ..policies import ROUNDING
 
 # Blocks per unit of parallel work. It depends on nothing, so that sums are taken in the same order
 # whatever the number of workers.
@@ -19,9 +20,6 @@ _BLOCKS_PER_CHUNK = 16
 # The largest number of a column; and one over the least that it varies by. Squares, and slopes of
 # one column by another, neither overflow nor vanish.
 LARGEST_NUMBER = 1e100
-
-# What varies by less than this part of its size varies by rounding errors only.
-ROUNDING = 16.0 * np.finfo(float).eps
 
 # Any fixed number would do.
 _FINGERPRINT_SEED = 20090101
