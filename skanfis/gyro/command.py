@@ -278,8 +278,8 @@ def _apply(options, tell):
             f"the model was calibrated for an output in {due}; this is in {unit} "
             f"(--units output={due})."
         )
-    assumed = [f"units as in the calibration: {text}" for text in reading.assumed.values()]
-    for note in [*reading.notes, *assumed]:
+    reading.notes += [f"units as in the calibration: {text}" for text in reading.assumed.values()]
+    for note in reading.notes:
         tell(f"note: {note}")
     log = reading.log
     if "time" in compensator.inputs:
