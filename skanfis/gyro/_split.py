@@ -200,12 +200,10 @@ def choose_split(log, kind="auto", *, uses_output=True):
     sentence = f"{what} held out ({of_each}, {len(folds)} folds; {reason})"
     few = [n for n in _TOO_FEW if n not in parts and 1 < counts.get(n, 0) < _FEWEST[n]]
     cautions = tuple(_TOO_FEW[name].format(counts[name]) for name in few)
-    most = ""
-    if "temperature" in log and (gap := _gap(log["temperature"].to_numpy())):
-        cautions, most = (*cautions, _NO_ROWS.format(*gap)), "law-line"
     # One thermal cycle cannot show that more repeats.
-    if kind == "piece" and log["rate"].nunique() == 1:
-        most = "constant"
+    most = "constant" if kind == "piece" and log["rate"].nunique() == 1 else ""
+    if "temperature" in log and (gap := _gap(log["temperature"].to_numpy())):
+        cautions, most = (*cautions, _NO_ROWS.format(*gap)), most or "law-line"
     if "level" in few:
         # Four tell more than the two coefficients that bend the law; fewer could be learnt by it.
         most = "law-line" if counts["level"] == _FEWEST["level"] - 1 else "line"
