@@ -328,10 +328,13 @@ def judge(errors, groups, most=""):
     recommended = next(
         name
         for place, name in enumerate(names)
-        if not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
+        # It errs no more than what is simpler: one bad group hides a gain over it in the scatter.
+        if of_all[name] == min(of_all[other] for other in names[: place + 1])
+        and not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
     if most:
-        recommended = min(names[: 1 + names.index(NAMES[most])], key=lambda name: of_all[name])
+        safe = list(NAMES.values())[: 1 + list(NAMES).index(most)]
+        recommended = min([name for name in names if name in safe], key=lambda name: of_all[name])
     gains = {name: _gain(logs[name] - logs[names[-1]]) for name in names[:-1]}
     return Verdict(of_all, gains, counts.size, recommended)
 

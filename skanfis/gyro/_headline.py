@@ -21,7 +21,7 @@ from .targets.error_model import ErrorModel
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
 # What the log cannot tell, what it was all learnt from, and what to log; of one thermal cycle.
-_RATES = "So few rates cannot tell what is left at others", "rates: log five or more"
+_FEW = "So few rates or temperatures cannot tell what is left at others", "few: log five or more"
 _CYCLE = "One cycle cannot tell whether this repeats", "cycle: record two more"
 _DIGITS = 4  # of what the noise makes of numbers: with them the text errs as the rules do
 _MOST_ROWS = 20_000  # evenly chosen, to see whether the rules can be read
@@ -56,7 +56,7 @@ def headline(calibration, unit):
     if name == NOTHING:
         title = "Leave the gyro as it is: no compensation that was tried is better"
     if most:
-        cannot, advice = _CYCLE if most == "constant" else _RATES
+        cannot, advice = _CYCLE if most == "constant" else _FEW
         safe = "leave the gyro as it is" if name == NOTHING else f"{ARTICLES[name]} is safe"
         title, hint = f"{cannot}; until then {safe}", ""
     what = {

@@ -39,6 +39,8 @@ _MOST_LEVELS = 100
 _SHARED = 0.1
 # A level is a dwell of a few rows, not a rate that came up once.
 _ROWS_PER_LEVEL = 3
+# Of the range of the temperature, between neighbours: three soaks leave a half.
+_WIDEST_GAP = 0.4
 # What a temperature must come back by for a turn: of its range, and at least [degC].
 _TURN, _SMALLEST_TURN = 0.2, 3.0
 # A turning point is looked for among so many means of each run.
@@ -54,6 +56,7 @@ _TOO_FEW = {
     "device": "{} devices share one compensator, and are too few to hold one out: what it leaves "
     "of any other is not known, and one from the log of each alone may leave less.",
 }
+_NO_ROWS = "no temperature is between {:.4g} and {:.4g} °C: what is left there is not known."
 _LEGS = "legs between turning points of the temperature"
 # What is held out, and what of it is counted.
 _WORDS = {
@@ -199,10 +202,21 @@ def choose_split(log, kind="auto", *, uses_output=True):
     cautions = tuple(_TOO_FEW[name].format(counts[name]) for name in few)
     # One thermal cycle cannot show that more repeats.
     most = "constant" if kind == "piece" and log["rate"].nunique() == 1 else ""
+    if "temperature" in log and (gap := _gap(log["temperature"].to_numpy())):
+        cautions, most = (*cautions, _NO_ROWS.format(*gap)), most or "law-line"
     if "level" in few:
         # Four tell more than the two coefficients that bend the law; fewer could be learnt by it.
         most = "law-line" if counts["level"] == _FEWEST["level"] - 1 else "line"
     return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, cautions, most)
+
+
+def _gap(temperature):
+    """Ends of the widest gap between temperatures; None where it is small beside their range."""
+    # One or two that are far from all others are no soak.
+    values = np.sort(temperature)[_ROWS_PER_LEVEL - 1 : 1 - _ROWS_PER_LEVEL]
+    place = np.diff(values).argmax()
+    low, high = values[place : place + 2]
+    return (low, high) if high - low > _WIDEST_GAP * np.ptp(values) else None
 
 
 def _choose(groups, counts, has_time):

@@ -153,7 +153,9 @@ def _of_rates(values, units):
     else:
         slope = abs(np.polyfit(rate[known], output[known], 1)[0])
         outputs = [own] if own else units_of("rate") if true else _RATES
-        ways = list(units_of("rate")) if own and not true else rates
+        ways, size = rates, np.abs(rate[known]).max()
+        if own and not true:
+            ways = [each for each in units_of("rate") if convert(size, each) <= _LARGEST_SCALE]
         pairs = [
             (each, other)
             for each in outputs

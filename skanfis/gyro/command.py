@@ -28,7 +28,6 @@ from ._columns import SIGNALS
 from ._headline import errors_and_verdict, of_rates, rules_text
 from ._options import PROGRAM, check_kind, check_once, make_parser, request_of
 from ._results import Results
-from ._source import open_source
 from ._split import choose_split
 from .c_compensator import export_c_compensator
 from .compensator import INPUTS, GyroCompensator
@@ -123,9 +122,6 @@ def _where_from_and_to(options):
     names += [name for target in targets for name in FILES[target]]
     replaced = _EVERY if options.force else names
     _refuse_existing([folder / name for name in replaced], options.force, paths)
-    with contextlib.suppress(OSError):
-        # What is no log at all is refused before libraries load.
-        open_source(paths[0], head_only=True)
     check_installed(options.pdf)
     return folder, paths
 
@@ -278,8 +274,8 @@ def _apply(options, tell):
             f"the model was calibrated for an output in {due}; this is in {unit} "
             f"(--units output={due})."
         )
-    assumed = [f"units as in the calibration: {text}" for text in reading.assumed.values()]
-    for note in [*reading.notes, *assumed]:
+    reading.notes += [f"units as in the calibration: {text}" for text in reading.assumed.values()]
+    for note in reading.notes:
         tell(f"note: {note}")
     log = reading.log
     if "time" in compensator.inputs:

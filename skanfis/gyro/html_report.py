@@ -200,7 +200,8 @@ def _check(results):
     text = (
         'All on the same held-out rows in range. "This model" is the fuzzy rules; the others leave '
         f"so many times its RMS error, in the geometric mean over {held_out_groups(calibration)}. "
-        "Recommended is the simplest that no more elaborate one beats by 2 %, interval included."
+        "Recommended is the simplest that none beats: a simpler one by erring less, a more "
+        "elaborate one by 2 %, interval included."
     )
     blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
     lines = []

@@ -11,7 +11,7 @@ from ._columns import RATE_UNITS, in_rate_unit
 # With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
 _FEWEST_RUNS = 5
 _N_BLOCKS = 30
-# Resamples hold so many rows, evenly thinned: their spread is that of the runs or blocks.
+# Resamples hold so many rows, thinned by chance: their spread is that of the runs or blocks.
 _MOST_ROWS = 2_000
 _FEWEST_DEFINED = 0.9  # part of the resamples that must have the figure
 _PERCENTILES = 2.5, 97.5
@@ -143,8 +143,12 @@ def _units(rows):
 def _cells(answered, side, figures, units, kind, draws):
     """Value, ends of the interval, and a note, of each figure."""
     step = max(1, -(-answered["rate"].size // _MOST_ROWS))
-    thinned = [unit[::step] for unit in units]
-    places = [np.concatenate([thinned[i] for i in draw]) for draw in draws]
+    # By chance: every second row may have the rates of one sign alone.
+    choice = np.random.RandomState(0).choice
+    places = [
+        np.concatenate([choice(unit, -(-unit.size // step), replace=step > 1) for unit in drawn])
+        for drawn in ([units[i] for i in draw] for draw in draws)
+    ]
     rows, cells = _of_side(answered, side), []
     with np.errstate(divide="ignore", invalid="ignore"):
         samples = [_of_side({k: each[at] for k, each in answered.items()}, side) for at in places]

@@ -77,10 +77,11 @@ class ScaleFactorErrorDisplay(GyroDisplay):
                 known = band.dropna(subset=column)
                 rate, ppm = known["true rate [deg/s]"], known[column]
                 # The line is broken at rest.
-                for half, label in ((rate < 0, f"{np.mean(ends):z.0f} °C"), (rate > 0, None)):
+                told = "{:z.0f} to {:z.0f} °C".format(*ends)
+                for half, label in ((rate < 0, told), (rate > 0, None)):
                     panel.plot(rate[half], ppm[half], ".-", color=color, label=label, lw=1.2, ms=4)
             title = f"{side}: largest {three_digits(scale_factor[column].abs().max())} ppm"
-            legend = "around" if panel is axes[0] else None
+            legend = "temperature" if panel is axes[0] else None
             dress(panel, ylabel="scale-factor error [ppm]", title=title, legend=legend)
         axes[-1].set_xlabel(signs("true rate [deg/s]"))
 

@@ -564,6 +564,7 @@ def test_time_counts_from_power_on_and_not_from_the_first_row_that_is_left(
     assert code == 0
     assert ("begins up to 100 s after power-on" in told) == (gap == "rows")
     assert "power-on is taken to be where the clock begins, at 0 s" in told
+    assert "note           units as in the calibration: 'temperature' has no unit" in told
     kept = whole.dropna()
     expected = GyroCompensator.read_json(model).apply(whole.ffill().bfill()).loc[kept.index]
     late = kept["run"].to_numpy() == kept["run"].iloc[-1]

@@ -178,6 +178,10 @@ def test_scale_factor_error_is_that_of_the_law(log):
     # A line through a cubic misses the bias by some 1e-4 deg/s: 20 ppm at the lowest rates.
     np.testing.assert_allclose(table["scale-factor error before [ppm]"], expected, atol=20.0)
     np.testing.assert_allclose(table["scale-factor error after [ppm]"], 0.0, atol=1e-6)
+    # Rows of a band may all lie at one end of it: its middle would say where there are none.
+    told = [text.get_text() for text in display.axes_[0].get_legend().get_texts()]
+    bands = table.iloc[:, :2].drop_duplicates().to_numpy()
+    assert told == [f"{low:z.0f} to {high:z.0f} °C" for low, high in bands]
     with pytest.raises(ValueError, match="rate is 5 in all rows"):
         display_of(ScaleFactorErrorDisplay, log.assign(rate=5.0))
 

@@ -86,6 +86,22 @@ def test_intervals_hold_the_figure_and_come_back_with_the_seed(log):
 
 
 @pytest.mark.theory
+def test_of_many_rows_intervals_are_of_such_as_the_figures_are_of(rng):
+    """A table that turns one way and the other in turn: every second row has one sign alone."""
+    n_runs, n_rows = 8, 600
+    rate = np.tile([0.0, 0.0, 50.0, -50.0, 100.0, -100.0], n_runs * n_rows // 6)
+    run = np.repeat(np.arange(n_runs), n_rows)
+    own = rng.normal(scale=1e-4, size=n_runs)[run]
+    before = rate * (1.0 + 5e-4 + 5e-5 * np.sign(rate) + own) + rng.normal(
+        scale=0.01, size=run.size
+    )
+    report = gyro_report(rate, before, run=run, random_state=0).set_index("figure")
+    names = ["residual_rms", "scale_factor_error", "scale_factor_asymmetry", "bias"]
+    found = report.loc[names, VALUES[:3]]
+    assert (found["before_low"] < found["before"]).all()
+    assert (found["before"] < found["before_high"]).all()
+
+
 def test_interval_is_that_of_the_runs_not_of_the_rows(rng):
     """Each run has a bias of its own: the mean of 10 is known to 1 / sqrt(10) of their spread."""
     n_runs, biases = 10, 5.0 * rng.normal(size=10) / HOUR

@@ -214,6 +214,21 @@ def test_a_row_less_moves_no_other_row_to_another_fold():
 
 
 @pytest.mark.parametrize(
+    ("soaks", "most"),
+    [((-20, 20, 60), "law-line"), ((-20, 0, 20, 40, 60), ""), ((-20, 60), "law-line")],
+)
+def test_temperatures_far_from_all_others_are_told(soaks, most, rng):
+    """A cubic, or rules, may go any way between three soaks, and no row there is held out."""
+    temperature = np.repeat(soaks, 90) + rng.normal(scale=0.1, size=90 * len(soaks))
+    rate = rng.uniform(-100.0, 100.0, temperature.size)
+    run = np.arange(temperature.size) % 3
+    temperature[0] = 85.0  # a glitch is no soak
+    split = choose_split(pd.DataFrame({"temperature": temperature, "rate": rate, "run": run}))
+    assert split.most == most
+    assert [told[:25] for told in split.cautions] == ["no temperature is between"] * bool(most)
+
+
+@pytest.mark.parametrize(
     ("rates", "n_devices", "expected", "most"),
     [
         ([-50, 50], 1, [], ""),

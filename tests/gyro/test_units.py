@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from skanfis.datasets import make_ofog
+from skanfis.gyro import check_log
 from skanfis.gyro._guess import Request
 from skanfis.gyro.errors import LogError, UsageError
 from skanfis.gyro.log import read
@@ -75,6 +76,13 @@ def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, t
     found = reading(tmp_path, truth, ("time", "temp", "gyro", "rate_rad_s"), (1, 1, turn, turn))
     assert (found.units["output"], found.units["rate"]) == ("rad/s", "rad/s")
     assert "rate" not in found.assumed
+
+
+def test_a_wrong_unit_of_the_output_is_not_made_good_by_a_rate_that_no_gyro_has(tmp_path, truth):
+    found = reading(tmp_path, truth, ("time", "temp", "gyro_rad_s", "rate"), (1, 1, 1, 1))
+    assert (found.units["output"], found.units["rate"]) == ("rad/s", "deg/s")
+    with pytest.raises(LogError, match=r"changes by 56.* is the output in deg/s\?"):
+        check_log(found.log, units=found.units, inputs=PARTS[:2])
 
 
 @pytest.mark.parametrize(("slower", "ways"), [(60, "time=s or .*time=min"), (0.03, "s or .*=ms")])

@@ -46,6 +46,8 @@ def test_gain_is_the_geometric_mean_with_students_interval(rng):
         (0.1, 0.02, 0.05, "line"),
         # One bad group that a mean of logarithms hardly sees.
         (0.1, 0.1, np.array([0.01] * 7 + [0.5]), "constant"),
+        # One bad group of what is between, by which its errors scatter.
+        (0.2, np.array([0.01] * 7 + [9.0]), 0.005, "model"),
         # Nothing helps.
         (1.0, 1.0, 1.0, "no compensation"),
         # Equal up to rounding.
@@ -70,6 +72,8 @@ def test_one_group_shows_nothing(rng):
         ("constant", 0.5, "constant"),
         ("constant", 1.2, "no compensation"),
         ("line", 0.5, "straight line"),
+        # No law was fitted.
+        ("law-line", 0.5, "straight line"),
     ],
 )
 def test_no_more_is_recommended_than_the_split_can_tell(rng, most, constant, recommended):
