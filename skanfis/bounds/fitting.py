@@ -26,6 +26,8 @@ from .way_back import WayBack
 # Ratios of squared errors, constrained over free: beyond the first, consequents nearer to the free
 # fit are sought; beyond the other, consequents that were drawn are worth a warning.
 _COSTLY, _WORTH_A_WARNING = 1.02**2, 1.1**2
+# An error that margins alone may cost, in variances of the target.
+_OF_MARGINS = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +59,13 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         if ended_nearer.mean_squared_error < ended.mean_squared_error:
             held, ended, drawn = found.model(nearer), ended_nearer, way
     after = float(ended.mean_squared_error)
-    # Of data without noise the free fit may have no error at all.
-    raised = after / before if before else np.inf
+    raised = after / max(before, _OF_MARGINS)  # of exact data the free fit may have no error
     report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
     if rows is not None:
         unheld, fixed = replace(model, target=None), (constraints.points, constraints.values)
         for message in contradicted(unheld, held, found.inequalities, fixed, rows, raised):
             warn_user(message, ConstraintWarning)
-    if drawn and raised > _WORTH_A_WARNING and after:
+    if drawn and raised > _WORTH_A_WARNING:
         names = ", ".join(one.name for one in found.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"

@@ -322,6 +322,12 @@ def test_a_free_fit_without_any_error_is_held_too(n_mfs, seed):
     assert_array_equal([monotonicity(model, 0)[0] for model in (rising, falling)], [1, -1])
 
 
+def test_a_constant_target_contradicts_no_sign():
+    # The margin between rules costs some millionths of a deviation.
+    held = ANFISRegressor(**QUICK, monotonic_cst=[1, -1]).fit(X, np.full(len(X), 3.0))
+    assert 0.0 < held.constraints_["loss_after"] < 1e-9
+
+
 def test_a_constant_keeps_a_limit_that_the_data_contradict():
     held = ANFISRegressor(n_mfs=1, order=0, constraints=[OutputLimits(lower=5.0)])
     with pytest.warns(ConstraintWarning, match="The data contradict the lower limit 5 of 'y'"):
