@@ -26,8 +26,7 @@ from .way_back import WayBack
 # Ratios of squared errors, constrained over free: beyond the first, consequents nearer to the free
 # fit are sought; beyond the other, consequents that were drawn are worth a warning.
 _COSTLY, _WORTH_A_WARNING = 1.02**2, 1.1**2
-# An error that margins alone may cost, in variances of the target.
-_OF_MARGINS = 1e-8
+_OF_MARGINS = 1e-8  # variances of the target that margins alone may cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +110,8 @@ def _refusal(found, by_equalities):
     if by_equalities:
         names = " and ".join(map(repr, found.output_names))
         return (
-            f"constraints fixes {names} at {n_points} points, which {rules} cannot all meet: "
-            "two points are the same, or there are more points than consequents. Give fewer "
-            "points, or use more rules."
+            f"constraints fixes {names} at {n_points} points, which {rules} cannot all meet: give "
+            "fewer points, none of them next to another, or use more rules."
         )
     names = " and ".join(one.name for one in found.inequalities)
     points = "1 fixed point" if n_points == 1 else f"{n_points} fixed points"
