@@ -98,7 +98,7 @@ class Constraints:
     @classmethod
     def read(cls, monotonic_cst, constraints, input_names, n_outputs):
         """What the parameters say; None where they ask for nothing."""
-        signs = _signs(monotonic_cst, input_names, n_outputs)
+        signs, n_inputs = _signs(monotonic_cst, input_names, n_outputs), len(input_names)
         lower, upper = np.full(n_outputs, -np.inf), np.full(n_outputs, np.inf)
         points, values = [], []
         one_given = constraints is not None and not isinstance(constraints, Sequence)
@@ -114,8 +114,9 @@ class Constraints:
                     f"constraints holds {one!r}: it must be OutputLimits and FixedPoints of "
                     "skanfis.bounds, in a list."
                 )
-        at = np.reshape(points, (-1, len(input_names)))
-        found = cls(signs, lower, upper, at, np.reshape(values, (-1, n_outputs)))
+        at, fixed = np.reshape(points, (-1, n_inputs)), np.reshape(values, (-1, n_outputs))
+        distinct = np.unique(np.hstack([at, fixed]), axis=0)
+        found = cls(signs, lower, upper, *np.hsplit(distinct, [n_inputs]))
         found._check()
         asks = signs.any() or np.isfinite([lower, upper]).any() or points
         return found if asks else None
@@ -153,10 +154,10 @@ class Constraints:
             for k, signs in enumerate(self.signs):
                 way, free = self.points - point, signs == 0
                 is_above = (way[:, free] == 0.0).all(axis=1) & (way * signs >= 0.0).all(axis=1)
-                is_above &= way.any(axis=1) & (self.values[:, k] < value[k])
+                is_above &= self.values[:, k] < value[k]
                 for other in np.flatnonzero(is_above):
                     raise ValueError(
-                        f"monotonic_cst and constraints contradict one another: output {k} is "
+                        f"constraints contradicts itself or monotonic_cst: output {k} is "
                         f"fixed to {value[k]:g} at {point}, and to {self.values[other, k]:g} at "
                         f"{self.points[other]}, where it must not be less."
                     )

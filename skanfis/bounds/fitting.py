@@ -26,6 +26,7 @@ from .way_back import WayBack
 # Ratios of squared errors, constrained over free: beyond the first, consequents nearer to the free
 # fit are sought; beyond the other, consequents that were drawn are worth a warning.
 _COSTLY, _WORTH_A_WARNING = 1.02**2, 1.1**2
+_OF_MARGINS = 1e-8  # variances of the target that margins alone may cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +58,13 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         if ended_nearer.mean_squared_error < ended.mean_squared_error:
             held, ended, drawn = found.model(nearer), ended_nearer, way
     after = float(ended.mean_squared_error)
-    # Of data without noise the free fit may have no error at all.
-    raised = after / before if before else np.inf
+    raised = after / max(before, _OF_MARGINS)  # of exact data the free fit may have no error
     report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
     if rows is not None:
         unheld, fixed = replace(model, target=None), (constraints.points, constraints.values)
         for message in contradicted(unheld, held, found.inequalities, fixed, rows, raised):
             warn_user(message, ConstraintWarning)
-    if drawn and raised > _WORTH_A_WARNING and after:
+    if drawn and raised > _WORTH_A_WARNING:
         names = ", ".join(one.name for one in found.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
@@ -110,9 +110,8 @@ def _refusal(found, by_equalities):
     if by_equalities:
         names = " and ".join(map(repr, found.output_names))
         return (
-            f"constraints fixes {names} at {n_points} points, which {rules} cannot all meet: "
-            "two points are the same, or there are more points than consequents. Give fewer "
-            "points, or use more rules."
+            f"constraints fixes {names} at {n_points} points, which {rules} cannot all meet: give "
+            "fewer points, none of them next to another, or use more rules."
         )
     names = " and ".join(one.name for one in found.inequalities)
     points = "1 fixed point" if n_points == 1 else f"{n_points} fixed points"

@@ -282,7 +282,7 @@ def test_there_is_always_a_line(rng):
         ),
         (
             {"constraints": [FixedPoint([0.0, 0.0], 1.0), FixedPoint([0.0, 0.0], 2.0)]},
-            r"fixes 'y' at 2 points, which 9 rules cannot all meet: two points are the same",
+            r"output 0 is fixed to 2 at \[0. 0.\], and to 1 at \[0. 0.\], where it must",
         ),
         (
             {"constraints": points_on_a_line(*np.linspace(-0.5, 0.5, 40))},
@@ -290,7 +290,7 @@ def test_there_is_always_a_line(rng):
         ),
         (
             {"monotonic_cst": [0, -1], "constraints": points_on_a_line(0.0, 0.2)},
-            "contradict one another: output 0 is",
+            "constraints contradicts itself or monotonic_cst: output 0 is",
         ),
         (
             # A line through two points leaves the limit.
@@ -320,6 +320,18 @@ def test_a_free_fit_without_any_error_is_held_too(n_mfs, seed):
     with pytest.warns(ConstraintWarning, match="contradict monotonic_cst=-1 of 'y' by 'x0'"):
         falling.fit(X, X[:, 0])
     assert_array_equal([monotonicity(model, 0)[0] for model in (rising, falling)], [1, -1])
+
+
+def test_a_point_may_be_given_twice():
+    points = [FixedPoint([0.2, 0.0], 0.1), FixedPoint([0.0, 0.0], 0.0)]
+    once, twice = (ANFISRegressor(**QUICK, constraints=of).fit(X, Y) for of in (points, points * 2))
+    assert_array_equal(once.predict(X), twice.predict(X))
+
+
+def test_a_constant_target_contradicts_no_sign():
+    # The margin between rules costs some millionths of a deviation.
+    held = ANFISRegressor(**QUICK, monotonic_cst=[1, -1]).fit(X, np.full(len(X), 3.0))
+    assert 0.0 < held.constraints_["loss_after"] < 1e-9
 
 
 def test_a_constant_keeps_a_limit_that_the_data_contradict():
