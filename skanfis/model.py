@@ -198,7 +198,7 @@ class TSKModel:
         return terms
 
     def in_bounds(self, X) -> np.ndarray:
-        """Whether each row is in the box of the training data, but for rounding, shape (n_rows,)."""
+        """Whether each row is in the range of the training data, but for rounding, (n_rows,)."""
         X = rows_by_name(X, self.input_names)
         return ~is_outside(X, self.minimum, self.maximum).any(axis=1)
 
