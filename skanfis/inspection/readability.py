@@ -149,6 +149,7 @@ class Readability:
 
     @property
     def _is_on_few(self):
+        """Which rules are the strongest on fewer training rows than they have numbers."""
         return has_training_data(self.model) & (self.model.rule_rows < self._said.n_numbers)
 
     def _on_few_rows(self):

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_count
 from ..digits import MOST_DIGITS
+from ..export import fold
 from ..export.folding import fold_with_reader, last_step
 from .sentences import Sentences
 
@@ -131,7 +132,7 @@ def rules_table(estimator: Any) -> Any:
     >>> list(rules["then y"])
     ['value', 'x0', 'x1']
     """
-    model = fold_with_reader(estimator)[0]
+    model = fold(estimator)
     asked, said = conditions(model), Sentences.of(model, MOST_DIGITS)
     # Pairs: an input may be called "value" too.
     columns: list = [

@@ -13,6 +13,7 @@ from .._validation import check_count
 from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, rounded
 from ..export.columns import by_column
 from ..export.folding import fold_with_reader
+from ..learning.data import never_changes
 from ..policies import SILENT, policy_in_words
 from .rules import (
     condition,
@@ -221,7 +222,7 @@ def _deviations(model, found, precision=PRECISION):
     is_known = found is not None and not found.is_of_chunk
     errors = found.measures.deviation * found.measures.errors if is_known else 0.0
     for k, name in enumerate(model.output_names if target else ()):
-        spread = target.spread[k] if target.minimum[k] < target.maximum[k] else 0.0
+        spread = 0.0 if never_changes(target.minimum[k], target.maximum[k]) else target.spread[k]
         line = f"{name} varies by {in_digits(spread, precision)}"
         if model.posterior is not None:
             noise = np.maximum(model.posterior.noise, errors)[k]

@@ -96,9 +96,8 @@ class OwnSlopes:
     def rows(self, j, rules):
         """Rows that give the slopes by an input of some rules out of u, in the shared unit."""
         found = np.zeros((rules.size, self._n_columns))
-        found[np.arange(rules.size), self._columns(j, rules)] = self._per_unit[
-            rules, self._place[j]
-        ]
+        per_unit = self._per_unit[rules, self._place[j]]
+        found[np.arange(rules.size), self._columns(j, rules)] = per_unit
         return found
 
     def free(self, penalty: Penalty):
@@ -110,10 +109,8 @@ class OwnSlopes:
             columns, is_free = np.eye(self._n_columns), np.ones(self._n_columns, dtype=bool)
             for j, rules in penalty.common:
                 # The slopes are one in the shared unit; the first column stands for all of them.
-                own, local = (
-                    self._columns(j, rules),
-                    1.0 / self._per_unit[list(rules), self._place[j]],
-                )
+                own = self._columns(j, rules)
+                local = 1.0 / self._per_unit[list(rules), self._place[j]]
                 columns[own[0], own] = local / np.linalg.norm(local)
                 is_free[own[1:]] = False
             for j, rules in penalty.absent:

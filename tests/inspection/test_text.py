@@ -48,6 +48,11 @@ def test_noise_is_told_in_the_units_of_the_target(rng):
     assert "about the rules" not in export_text(replace(model.fit(X, y).model_, posterior=None))
 
 
+def test_a_target_that_rounding_alone_changes_does_not_vary(rng):
+    X, y = rng.normal(size=(60, 2)), np.where(np.arange(60) % 2, 0.3, 0.1 + 0.2)
+    assert "\ny varies by 0," in export_text(ANFISRegressor().fit(X, y))
+
+
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstraintWarning")
 @pytest.mark.parametrize("options", [{"monotonic_cst": [1]}, {"loss": "huber"}])
 def test_the_outputs_vary_about_the_rules_by_no_less_than_these_err(options, rng):
