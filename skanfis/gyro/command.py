@@ -6,9 +6,7 @@ It writes files all together or not at all.
 import contextlib
 import os
 import pickle
-import platform
 import shlex
-import shutil
 import signal
 import sys
 import tempfile
@@ -49,7 +47,7 @@ _PDF = "report.pdf"
 _EVERY = (*_FILES, *_C_FILES, _PDF, *chain.from_iterable(FILES.values()))
 _MOST_ROWS = 100_000  # that are held
 _PICKLES = (".joblib", ".pkl", ".pickle")
-_STAGED = f".skanfis-{platform.node()}-"  # of folders that hold files until all are written
+_STAGED = ".skanfis-"  # of folders that hold files until all are written
 
 
 def main(arguments=None):
@@ -360,19 +358,6 @@ def _refuse_existing(paths, force, read=()):
             raise ExistsError(f"{path} exists already: choose another --output, or --force.")
 
 
-def _clean(folder):
-    """Remove what runs on this machine that were killed have left."""
-    for path in folder.glob(f"{_STAGED}*-*"):
-        owner = path.name.removeprefix(_STAGED).partition("-")[0]
-        try:
-            if os.name == "posix":
-                os.kill(int(owner), 0)  # asks, and sends nothing
-        except (ProcessLookupError, ValueError, OverflowError):
-            shutil.rmtree(path, ignore_errors=True)
-        except OSError:
-            pass  # it runs, by another user
-
-
 @contextlib.contextmanager
 def _staged(folder, replaced=()):
     """A folder to write to; at the end its files go to ``folder`` all together.
@@ -383,8 +368,7 @@ def _staged(folder, replaced=()):
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        _clean(folder)
-        with tempfile.TemporaryDirectory(prefix=f"{_STAGED}{os.getpid()}-", dir=folder) as name:
+        with tempfile.TemporaryDirectory(prefix=_STAGED, dir=folder) as name:
             yield Path(name)
             written = sorted(path.name for path in Path(name).iterdir())
             for each in written:

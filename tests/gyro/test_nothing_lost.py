@@ -2,7 +2,6 @@
 
 import io
 import os
-import platform
 import signal
 import subprocess
 import sys
@@ -18,7 +17,6 @@ pytest.importorskip("matplotlib")
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import GyroCompensator, _source
-from skanfis.gyro.command import _staged
 
 from ..quick import quick
 
@@ -90,21 +88,6 @@ def test_apply_tells_errors_of_flagged_rows_apart(files, tmp_path, say):
     assert "1.5 deg/s before, 1 after (rows with status 0)" in out
     assert "2.5 deg/s before, 2 after (the flagged rows)" in out
     assert "3 rows out of range (temperature in 3)" in out
-
-
-@pytest.mark.skipif(os.name != "posix", reason="processes of another kind")
-def test_what_a_killed_run_left_is_removed_by_the_next(tmp_path):
-    process = subprocess.Popen([sys.executable, "-c", ""])
-    process.wait()
-    names = (f"{process.pid}-x", f"{os.getpid()}-y")
-    left, alive = (tmp_path / f".skanfis-{platform.node()}-{name}" for name in names)
-    other = tmp_path / f".skanfis-another-machine-{process.pid}-z"
-    for folder in (left, alive, other):
-        folder.mkdir()
-        (folder / "part.csv").write_text("")
-    with _staged(tmp_path) as folder:
-        (folder / "done.csv").write_text("")
-    assert {path.name for path in tmp_path.iterdir()} == {alive.name, other.name, "done.csv"}
 
 
 class Interrupted(io.StringIO):
