@@ -17,6 +17,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+import pandas as pd
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
@@ -92,6 +93,24 @@ with warnings.catch_warnings():
     }
 models |= {"ANFIS, to be read": readable, "ANFIS": anfis}
 
+# %%
+# Rules that a process teaches
+# ----------------------------
+#
+# A Gaussian process knows what is smooth, but keeps every row that it has learnt from: too much for
+# a sensor. Rules can learn from it as from a table, with as many rows as one likes and no noise.
+# They go to the sensor's processor as any others do: :doc:`plot_c_export`. (What such rules say of
+# their own noise is of the process, and not of the gyro.)
+
+process, rng = models["Gaussian process"], np.random.default_rng(0)
+drawn = pd.DataFrame(rng.uniform(X[~new].min(), X[~new].max(), (2000, 3)), columns=X.columns)
+rows = pd.concat([X[~new], drawn])
+taught = ANFISRegressor(simplicity=0).fit(rows, process.predict(rows))
+models["ANFIS, taught by the process"] = taught
+
+# %%
+# Now all of them, in the runs held out.
+
 known = new & anfis.in_bounds(X)
 print(f"{known.sum()} rows held out, less {(new & ~known).sum()} beyond the calibrated range")
 left = {"uncompensated": error[known]}
@@ -99,7 +118,7 @@ left |= {name: error[known] - model.predict(X[known]) for name, model in models.
 
 rms = {name: np.sqrt(np.mean(values**2)) for name, values in left.items()}
 for name, value in rms.items():
-    print(f"{name:22} {3600 * value:7.1f} °/h RMS   {np.abs(left[name]).max():7.4f} °/s at most")
+    print(f"{name:28} {3600 * value:7.1f} °/h RMS   {np.abs(left[name]).max():7.4f} °/s at most")
 
 # %%
 # In pictures

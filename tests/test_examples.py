@@ -38,4 +38,6 @@ def test_the_rules_do_better_on_runs_held_out_than_what_is_simpler(tmp_path, mon
     assert known.sum() > 0.9 * new.sum()
     left = names["error"][known] - names["anfis"].predict(names["X"][known])
     assert rms["ANFIS"] == pytest.approx(np.sqrt(np.mean(left**2)))
+    taught = rms["ANFIS, taught by the process"]
+    assert taught == pytest.approx(rms["Gaussian process"], rel=0.01)
     assert rms["ANFIS"] < rms["cubic polynomial"] < rms["straight line"] < rms["uncompensated"]
