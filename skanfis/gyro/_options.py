@@ -47,8 +47,8 @@ Calibrate a gyro from its logs: learn the error of its indicated rate (indicated
 what is known on board, its output, its temperature and how fast that changes, and the time since
 power-on. The result is checked on whole runs, devices or rate levels that the model has not seen.
 
-Written to a folder: the model (compensator.json and .joblib), a report with tables and pictures for
-any browser (report.html), and the rules as text (rules.txt).
+Written to a folder: the model (compensator.json), a report with tables and pictures for any browser
+(report.html), and the rules as text (rules.txt).
 """
 _EPILOG = """\
 examples:
@@ -109,7 +109,6 @@ def make_parser():
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
-    add("--trust", "load a MODEL that is a .joblib: runs its maker's code", action="store_true")
     told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
     told = "the recommended compensation (default), the rules, or one of the simpler ones"
@@ -125,13 +124,12 @@ def make_parser():
 
 
 def check_kind(parser, options):
-    """UsageError for options that have no say with --apply, or without it."""
-    of_both = {"logs", "columns", "units", "output", "force", "quiet", "apply", "trust"}
-    idle = vars(options).keys() - of_both if options.apply else {"trust"}
+    """UsageError for options that have no say with --apply."""
+    idle = vars(options).keys() - {"logs", "columns", "units", "output", "force", "quiet", "apply"}
     given = [name for name in sorted(idle) if getattr(options, name) != parser.get_default(name)]
-    if given:
+    if options.apply and given:
         named = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-        raise UsageError(f"{named}: of no use with{'' if options.apply else 'out'} --apply.")
+        raise UsageError(f"{named}: of no use with --apply.")
 
 
 def request_of(options, require, assumed=None, optional=()):

@@ -5,7 +5,6 @@ It writes files all together or not at all.
 
 import contextlib
 import os
-import pickle
 import shlex
 import signal
 import sys
@@ -15,7 +14,6 @@ from datetime import datetime
 from itertools import chain
 from pathlib import Path
 
-import joblib
 import pandas as pd
 
 from ..inspection.labels import printable
@@ -41,12 +39,11 @@ NOT_KEPT = 6  # all is written; a limit is not kept, or not measured
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 # What a calibration may write.
-_FILES = ("compensator.json", "compensator.joblib", "report.html", "rules.txt")
+_FILES = ("compensator.json", "report.html", "rules.txt")
 _C_FILES = ("compensator.h", "compensator.c")
 _PDF = "report.pdf"
 _EVERY = (*_FILES, *_C_FILES, _PDF, *chain.from_iterable(FILES.values()))
 _MOST_ROWS = 100_000  # that are held
-_PICKLES = (".joblib", ".pkl", ".pickle")
 _STAGED = ".skanfis-"  # of folders that hold files until all are written
 
 
@@ -243,7 +240,6 @@ def _write(calibration, options, files, folder):
 
         weasyprint.HTML(string=page).write_pdf(folder / _PDF)
     compensator.write_json(folder / "compensator.json")
-    joblib.dump(compensator, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
         std, _, dtype = options.c.partition(":")
@@ -257,7 +253,10 @@ def _apply(options, tell):
         raise UsageError("--apply to several logs needs --output.")
     target = options.output or Path(f"{Path(paths[0]).stem}-compensated.csv")
     _refuse_existing([target], options.force, [*paths, options.apply])
-    compensator = _compensator_of(options)
+    try:
+        compensator = GyroCompensator.read_json(options.apply)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
     needed = {"output", *columns_of(compensator.inputs)}
     units = dict(compensator.units)
     if units.get("output") in SIGNALS and "output" not in compensator.assumed:
@@ -293,28 +292,6 @@ def _apply(options, tell):
     _say(f"note           {note}" for note in reading.notes)
     tell("done")
     return DONE
-
-
-def _compensator_of(options):
-    """The compensator that the options name; of a .joblib it is said what reading it means."""
-    path = options.apply
-    if not path.endswith(_PICKLES):
-        if options.trust:
-            raise UsageError(f"--trust is for a model of {', '.join(_PICKLES)}; JSON needs none.")
-        try:
-            return GyroCompensator.read_json(path)
-        except ValueError as error:
-            raise UsageError(str(error)) from error
-    sys.stderr.write(f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
-    if not options.trust:
-        raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
-    try:
-        found = joblib.load(path)
-    except (LookupError, EOFError, AttributeError, TypeError, pickle.UnpicklingError) as error:
-        raise UsageError(f"{path} is no file of joblib, or a damaged one.") from error
-    if not isinstance(found, GyroCompensator):
-        raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
-    return found
 
 
 def _progress(quiet):
