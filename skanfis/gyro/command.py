@@ -39,10 +39,10 @@ NOT_KEPT = 6  # all is written; a limit is not kept, or not measured
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 # What a calibration may write.
-_FILES = ("compensator.json", "report.html", "rules.txt")
-_C_FILES = ("compensator.h", "compensator.c")
-_PDF = "report.pdf"
-_EVERY = (*_FILES, *_C_FILES, _PDF, *chain.from_iterable(FILES.values()))
+_FILES = (
+    *("compensator.json", "compensator.h", "compensator.c", "report.html", "report.pdf"),
+    *("rules.txt", *chain.from_iterable(FILES.values())),
+)
 _MOST_ROWS = 100_000  # that are held
 _STAGED = ".skanfis-"  # of folders that hold files until all are written
 
@@ -73,7 +73,7 @@ def main(arguments=None):
 
 def _calibrate(options, tell):
     folder, paths = _where_from_and_to(options)
-    with _staged(folder, _EVERY if options.force else ()) as written:
+    with _staged(folder, _FILES if options.force else ()) as written:
         tell(f"reading {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
         reading, recipe = _read(options, paths, tell)
         split = choose_split(reading.log, options.groups, uses_output="output" in recipe.inputs)
@@ -107,16 +107,12 @@ def _calibrate(options, tell):
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     check_once("--inputs", options.inputs or ())
-    targets = [text.partition(":")[0] for text in options.target]
-    check_once("--target", targets)
+    check_once("--target", [text.partition(":")[0] for text in options.target])
     paths = options.logs = find_logs(options.logs)
     folder = options.output or Path(f"{Path(paths[0]).stem or 'log'}-compensator")
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    names = [*_FILES, *(_C_FILES if options.c else ()), *([_PDF] if options.pdf else [])]
-    names += [name for target in targets for name in FILES[target]]
-    replaced = _EVERY if options.force else names
-    _refuse_existing([folder / name for name in replaced], options.force, paths)
+    _refuse_existing([folder / name for name in _FILES], options.force, paths)
     check_installed(options.pdf)
     return folder, paths
 
@@ -238,7 +234,7 @@ def _write(calibration, options, files, folder):
     if options.pdf:
         import weasyprint
 
-        weasyprint.HTML(string=page).write_pdf(folder / _PDF)
+        weasyprint.HTML(string=page).write_pdf(folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:

@@ -111,10 +111,6 @@ def check_installed(pdf=False):
             reason = printable(str(error)).partition("\n")[0]
             told = f"the report needs {name}: pip install {name} ({reason})"
             raise ImportError(told + pdf * "; or print report.html from a browser") from error
-        except ValueError as error:
-            # Of matplotlib's settings; MPLBACKEND is one.
-            reason = printable(str(error).partition(";")[0])
-            raise ImportError(f"{name} cannot be imported: {reason}.") from error
 
 
 def _template():
