@@ -43,19 +43,14 @@ _EPOCH = pd.Timestamp(0, tz="UTC")
 _DAY, _HOUR = 86_400.0, 3_600.0  # s
 
 
-def open_source(path, *, head_only=False):
-    """The table in a file; LogError where there is none, as far as its head tells if asked so."""
+def open_source(path):
+    """The table in a file; LogError where there is none."""
     name = str(path).lower()
     if name.endswith(PARQUET):
         return ParquetSource(path)
-    if name.endswith((*MATLAB, *EXCEL)):
-        if head_only:
-            return None
-        return excel_source(path, header_place) if name.endswith(EXCEL) else matlab_source(path)
-    source = _TextSource(path)
-    if not head_only:
-        source.check_lengths()
-    return source
+    if name.endswith(MATLAB):
+        return matlab_source(path)
+    return excel_source(path, header_place) if name.endswith(EXCEL) else _TextSource(path)
 
 
 class _TextSource:
@@ -76,6 +71,7 @@ class _TextSource:
             raise LogError(f"{path}: is empty.")
         self._place_header(head)
         self.decimal = self._find_decimal(head)
+        self._check_lengths()
 
     def _find_separator(self):
         """The first sign that is on all lines, those of a preamble aside; else a comma."""
@@ -109,7 +105,7 @@ class _TextSource:
                 f"the header is line {head[place][0]}; {place} lines above it are passed over"
             )
 
-    def check_lengths(self):
+    def _check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut without a word."""
         n_columns = len(self.header)
         with contextlib.suppress(UnicodeError), open(self.path, encoding=self._encoding) as file:

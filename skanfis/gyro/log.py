@@ -113,13 +113,17 @@ class Reading:
     files: list
     notes: list
     n_rows: int
-    digests: tuple
     assumed: dict
 
     @property
     def units(self):
         """Units of the parts in the (first) file."""
         return self.files[0].layout.units
+
+    @property
+    def digests(self):
+        """Name, bytes and SHA-256 of each file."""
+        return [(Path(file.path).name, file.size, file.digest) for file in self.files]
 
     def name_row(self, row):
         """In words, where a row of the log is found."""
@@ -140,12 +144,16 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     """
     if not paths:
         raise ValueError("paths: at least one file is needed.")
-    digests = digests_of(paths)
     files: list[LogFile] = []
     tables: list[pd.DataFrame] = []
     n_runs = 0
     for number, path in enumerate(paths):
         files.append(LogFile(path, request, files[0] if files else None))
+        for same in [file for file in files[:-1] if file.digest == files[-1].digest]:
+            raise LogError(
+                f"{path}: holds the same bytes as {same.path}; a run that is there twice would be "
+                "tested by itself. Leave one of them out."
+            )
         tables.append(files[-1].read().assign(file=np.int32(number)))
         tables[-1]["run"] += np.int32(n_runs)
         n_runs += len(files[-1].runs)
@@ -187,7 +195,7 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if "device" in layout.places:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
     notes = list(dict.fromkeys(notes))
-    return Reading(log, file, row, files, notes, n_rows, digests, assumed)
+    return Reading(log, file, row, files, notes, n_rows, assumed)
 
 
 class LogFile:
@@ -199,6 +207,9 @@ class LogFile:
     def __init__(self, path, request, first=None):
         self.path, self._is_command, self._optional = path, request.guess, request.optional
         self.source = open_source(path)
+        with open(path, "rb") as opened:
+            self.digest = hashlib.file_digest(opened, "sha256").hexdigest()
+            self.size = opened.tell()
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
         self.n_rows = 0
@@ -444,23 +455,3 @@ def find_logs(arguments):
     """The files that are named, with patterns filled in for a shell that does not."""
     found = [[] if os.path.lexists(name) else sorted(glob(name)) for name in arguments]
     return [path for name, paths in zip(arguments, found, strict=True) for path in paths or [name]]
-
-
-def digests_of(paths):
-    """Name, bytes and SHA-256 of each file.
-
-    LogError where one log is there twice: as two runs, each would be tested by the other.
-    """
-    found: dict = {}
-    for path in paths:
-        open_source(path, head_only=True)  # what is no log is refused before all of it is read
-        with open(path, "rb") as opened:
-            digest = hashlib.file_digest(opened, "sha256").hexdigest()
-            size = opened.tell()
-        if digest in found:
-            raise LogError(
-                f"{path}: holds the same bytes as {found[digest][0]}; a run that is there twice "
-                "would be tested by itself. Leave one of them out."
-            )
-        found[digest] = path, size
-    return tuple((Path(path).name, size, digest) for digest, (path, size) in found.items())
