@@ -40,7 +40,7 @@ _FORMATS = [
 ]
 _CLOCK_ROWS = 200  # by which the form of a clock is told
 _EPOCH = pd.Timestamp(0, tz="UTC")
-_DAY, _HOUR = 86_400.0, 3_600.0  # s
+_DAY = 86_400.0  # s
 
 
 def open_source(path):
@@ -282,27 +282,22 @@ def clock_form(column):
 
 
 def going_on(time, form, counter):
-    """Times [s], some NaN, that go on where the clock went back; and such rows, save midnights.
+    """Times [s], some NaN, that go on at midnight, or where a counter begins again; rows of that.
 
-    A clock with a ``form`` goes back at midnight and at the end of daylight saving; a ``counter``
-    by its range [s], unless it was set anew instead.
+    A ``counter`` goes back by its range [s], unless it was set anew instead.
     """
     known = np.flatnonzero(np.isfinite(time))
     steps = np.diff(time[known], prepend=time[known[:1]])
-    if (steps >= 0.0).all():
+    time, back = time.copy(), steps < 0.0
+    if form:
+        time[known] += _DAY * np.cumsum((steps < -0.5 * _DAY) & (form == CLOCK))
         return time, known[:0]
     usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else 0.0
-    days = _DAY * np.cumsum((steps < -0.5 * _DAY) & (form == CLOCK))
-    by = _HOUR if form else counter
-    back = (steps < 0.0) & (np.abs(steps + by - usual) <= 3.0 * usual)
-    if form:
-        # An hour back to where all began is a clock that was set anew.
-        back &= time[known] + days > time[known[0]] + usual
-    rounds, is_new = np.cumsum(back), (steps < 0.0) & ~back & (form == "")
-    rounds -= np.maximum.accumulate(np.where(is_new, rounds, 0))
-    time = time.copy()
-    time[known] += days + by * rounds
-    return time, known[back]
+    is_over = back & (np.abs(steps + counter - usual) <= 3.0 * usual)
+    rounds = np.cumsum(is_over)
+    rounds -= np.maximum.accumulate(np.where(back & ~is_over, rounds, 0))
+    time[known] += counter * rounds
+    return time, known[is_over]
 
 
 def dated(dates, times):

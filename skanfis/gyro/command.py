@@ -272,7 +272,7 @@ def _apply(options, tell):
         tell(f"note: {note}")
     log = reading.log
     if "time" in compensator.inputs:
-        start = log.get("power_on", log["time"]).iloc[0]
+        start = log["power_on"].iloc[0]
         reading.notes.append(f"power-on is taken to be where the clock begins, at {start:.10g} s")
     n_rows = counted(f"{len(log):,}", "row")
     tell(n_rows)

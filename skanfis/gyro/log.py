@@ -67,8 +67,7 @@ def read_log(
     -------
     log : DataFrame of shape (n_rows, n_parts)
         Columns by their parts, in the order above: numbers in s, degC and deg/s (a raw signal in
-        its own unit), run and device as categories of strings. Where runs were logged from later
-        than power-on, "power_on" is where the clock was then [s].
+        its own unit), run and device as categories of strings.
 
     Raises
     ------
@@ -95,7 +94,8 @@ def read_log(
     1   1.0         20.1  -380.0  20.0
     """
     request = Request(columns or {}, units or {}, tuple(require))
-    return read([paths] if isinstance(paths, str | os.PathLike) else list(paths), request).log
+    paths = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+    return read(paths, request).log.drop(columns="power_on", errors="ignore")
 
 
 @dataclass
@@ -103,8 +103,9 @@ class Reading:
     """A log that has been read, with what was found out on the way, in sentences (``notes``).
 
     Of the ``n_rows`` rows that there were ``log`` holds every k-th of each run where they are too
-    many. Row k of ``log`` is row ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences on
-    units, by part, that neither names nor options tell.
+    many; its column "power_on" is where the clock was when the run began [s]. Row k of ``log`` is
+    row ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences on units, by part, that neither
+    names nor options tell.
     """
 
     log: pd.DataFrame
@@ -177,9 +178,6 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
         held = [rows[::every] for rows in rows_by_run(table["run"], n_rows)]
         table = table.iloc[np.sort(np.concatenate(held))]
         notes.append(f"of {n_rows:,} rows {len(table):,} are used, one in {every} of each run")
-    if "power_on" in table:
-        table, told = _since_power_on(table)
-        notes += told
     file, code, row = table["file"].to_numpy(), table["run"].to_numpy(), table.index.to_numpy()
     log = table.drop(columns=["file", "run"]).set_axis(pd.RangeIndex(len(table)))
     del table
@@ -291,11 +289,10 @@ class LogFile:
             counter = convert(2.0**32, self.layout.units["time"])
             time, back = going_on(parts["time"].to_numpy(), self._form, counter)
             parts["time"] = pd.Series(time, parts["time"].index)
-            by = "one hour (daylight saving)" if self._form else "by the range of its 32 bits"
             for first in map(self.source.place_of, back[:1]):
-                places = f"{counted(back.size, 'place')}, first at {first}"
                 self.notes.append(
-                    f"{self.path}: the clock goes back {by} in {places}; the time goes on"
+                    f"{self.path}: the clock goes back by the range of its 32 bits in "
+                    f"{counted(back.size, 'place')}, first at {first}; the time goes on"
                 )
         return pd.DataFrame(parts, copy=False)
 
@@ -400,28 +397,6 @@ def _joined_by_clock(table, runs, paths):
         files = f"{counted(len(places), 'file')}, first {paths[places[0]]}"
         told.append(f"the run goes on in {files}, as the clock does")
     return table, runs[is_new], told
-
-
-def _since_power_on(log):
-    """The log with the time of each run's power-on, where that is not its first row; notes.
-
-    Clocks of several runs that overlap, one of them from zero on, all begin at power-on: of a run
-    that was logged from later on too.
-    """
-    runs = log.groupby("run")
-    times, start = runs["time"], runs["power_on"].first()
-    notes, earliest = [], start.min()
-    step = log["time"].diff().abs().median() if len(start) > 1 else 0.0
-    if 0.0 <= earliest <= step and earliest + step < start.max() < times.last().min():
-        late = np.count_nonzero(start > earliest + step)
-        notes.append(
-            f"in {counted(late, 'run')} the clock begins up to {start.max():.4g} s after power-on, "
-            f"which is at {earliest:.4g} s as in the others"
-        )
-        log = log.assign(power_on=earliest)
-    if (log["power_on"] == times.transform("first")).all():
-        log = log.drop(columns="power_on")
-    return log, notes
 
 
 def _longest_step(time):

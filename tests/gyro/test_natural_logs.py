@@ -56,7 +56,8 @@ def test_files_of_a_logger_that_begins_a_new_one_now_and_then(tmp_path, truth):
         reading = found(paths, columns={"time": clock})
         same(reading, truth)
         assert (pd.factorize(reading.log["run"])[0] == pd.factorize(truth["run"])[0]).all()
-        assert "power_on" not in reading.log
+        start = reading.log.groupby("run", observed=True)["time"].transform("first")
+        assert (reading.log["power_on"] == start).all()
         assert any("the run goes on in 10 files, first" in note for note in reading.notes)
         # Out of their order none goes on.
         assert found(paths[::-1], columns={"time": clock}).log["run"].nunique() == 15
@@ -370,18 +371,6 @@ def test_a_gap_in_one_column_is_no_power_on(tmp_path, truth):
     assert "50 of 120 rows lack a value" in "; ".join(reading.notes)
     # Where the clock stops as well, one was.
     assert found_in(tmp_path, table.drop(index=range(40, 90))).log["run"].nunique() == 2
-
-
-@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S", "%H:%M:%S"])
-def test_a_clock_that_is_put_one_hour_back_goes_on(tmp_path, truth, form):
-    clock = pd.Timestamp("2026-10-25 01:00") + pd.to_timedelta(20.0 * np.arange(300), unit="s")
-    local = clock - pd.to_timedelta(3600.0 * (np.arange(300) >= 250), unit="s")
-    table = truth[PARTS].assign(time=local.strftime(form))
-    reading = found_in(tmp_path, table)
-    np.testing.assert_allclose(np.diff(reading.log["time"]), 20.0)
-    assert "run" not in reading.log
-    told = "; ".join(reading.notes)
-    assert "the clock goes back one hour (daylight saving) in 1 place, first at line 252" in told
 
 
 @pytest.mark.parametrize(("unit", "steps", "times"), [(1e-6, 2e7, 2), (1e-3, 6e5, 1)])
