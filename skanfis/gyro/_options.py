@@ -30,13 +30,12 @@ _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIG
 _AT_LEAST = ("reduction_factor",)  # of this more is better
 
 _TARGET = re.compile(
-    r"(rate-)?table(:(float|double|q31|q15))?|cubic(:(float|double))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
+    r"(rate-)?table(:(float|double|q31|q15))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
 )
 _TARGETS = (
     "in C table[:TYPE] over temperature, rate-table[:TYPE] over output too (TYPE float, double, "
-    "q31, q15), cubic[:TYPE] piecewise over temperature (float, double); parameters of one AXIS "
-    "(x, y, z) of a gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] (INSTANCE 0 to 3) or "
-    "ardupilot:AXIS[:INSTANCE] (1 to 3)"
+    "q31, q15); parameters of one AXIS (x, y, z) of a gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] "
+    "(INSTANCE 0 to 3) or ardupilot:AXIS[:INSTANCE] (1 to 3)"
 )
 _OF_OUTSIDE = (
     "beyond the range of the calibration, where rows are flagged: hold the value at the edge "
