@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..inspection import MembershipDisplay
-from ._columns import RATE_UNITS, evenly_chosen, label_texts
+from ._columns import RATE_UNITS, evenly_chosen
 from ._options import check_limit
 from .c_compensator import input_units
 from .compensator import features
@@ -112,7 +112,7 @@ class Results:
         self.after = np.where(self.in_range, calibration.after, np.nan)
         self.temperature = self.log["temperature"].to_numpy()
         self.time = self.log["time"].to_numpy() if "time" in self.log else None
-        self.run = label_texts(self.log["run"]) if "run" in self.log else None
+        self.run = self.log["run"].astype(str) if "run" in self.log else None
         self.temperature_rate = None
         if self.time is not None:
             # Whether or not it is an input: what temperature alone leaves is seen by it.

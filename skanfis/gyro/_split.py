@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.signal import find_peaks
 
 from ..inspection.text import counted
-from ._columns import check_column, label_texts
+from ._columns import check_column
 from .errors import LogError
 
 # Relative to the largest rate: rates closer than that are one to any table.
@@ -172,7 +172,7 @@ def choose_split(log, kind="auto", *, uses_output=True):
     """
     # Groups are numbered in the order of their names, whatever the order of the files.
     groups = {
-        name: np.unique(label_texts(log[name]).astype(str), return_inverse=True)[1]
+        name: np.unique(log[name].astype(str), return_inverse=True)[1]
         for name in ("device", "run")
         if name in log
     }
@@ -271,7 +271,7 @@ def fold_numbers(part, groups, n_parts):
 def _labels(log, part, groups):
     """A label for each row's group, such as "|25| °/s", or "2: 25 to 71 °C" for a leg."""
     if part in ("device", "run"):
-        return label_texts(log[part])
+        return log[part].astype(str).to_numpy(dtype=object)
     if part == "level":
         levels = log["rate"].abs().groupby(groups).median()
         names = [f"|{level:.4g}| °/s" for level in levels]

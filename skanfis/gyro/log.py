@@ -147,7 +147,6 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
         raise ValueError("paths: at least one file is needed.")
     files: list[LogFile] = []
     tables: list[pd.DataFrame] = []
-    n_runs = 0
     for number, path in enumerate(paths):
         files.append(LogFile(path, request, files[0] if files else None))
         for same in [file for file in files[:-1] if file.digest == files[-1].digest]:
@@ -156,8 +155,6 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
                 "tested by itself. Leave one of them out."
             )
         tables.append(files[-1].read().assign(file=np.int32(number)))
-        tables[-1]["run"] += np.int32(n_runs)
-        n_runs += len(files[-1].runs)
         if len(paths) > 1:
             tell(f"read {number + 1:,} of {len(paths):,}: {path}, {files[-1].n_rows:,} rows")
     table = pd.concat(tables) if len(tables) > 1 else tables[0]
@@ -165,11 +162,20 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
-    runs = pd.concat([each.runs.assign(file=k) for k, each in enumerate(files)], ignore_index=True)
+    by_run = table.groupby(["file", *LABELS], sort=False, observed=True)
+    runs = by_run.size().index.to_frame(index=False)
+    table = table.drop(columns="device").assign(run=by_run.ngroup().to_numpy(np.int32))
     by_clock = request.guess and "time" in table and "run" not in layout.places
     if by_clock and len(runs) > 1 == runs["device"].nunique():
         table, runs, told = _joined_by_clock(table, runs, paths)
         notes += told
+    if request.guess:
+        try:
+            check_rows(table, layout.units, table["run"].to_numpy(), request.optional)
+        except LogError as error:
+            file = files[table["file"].iloc[error.row or 0]]
+            where = None if len(files) == 1 else "the log"
+            raise file.located(error, table.index, where) from error
     assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}
     n_rows, every = len(table), 1
     while len(table) > most_rows * every:
@@ -211,7 +217,6 @@ class LogFile:
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
         self.n_rows = 0
-        self.runs = pd.DataFrame()  # labels of device and run, of each run that was read
         self._form = ""  # of a clock of texts
         if first is None:
             return
@@ -226,10 +231,10 @@ class LogFile:
             )
 
     def read(self):
-        """The parts as a table in the units of a log, with the number of each row's run.
+        """The parts as a table in the units of a log, with labels of run and device.
 
         The index is the row's position in the file. The command leaves out rows that lack a value,
-        tells runs by the clock, and checks every row.
+        and tells runs by the clock.
         """
         log = self._converted()
         if self._is_command:
@@ -252,14 +257,6 @@ class LogFile:
         if not is_whole.all():
             self._note_gaps(missing)
             log = log[is_whole[log.index]]
-        by_run = log.groupby(list(LABELS), sort=False, observed=True)
-        self.runs = by_run.size().index.to_frame(index=False)
-        log = log.drop(columns="device").assign(run=by_run.ngroup().to_numpy(np.int32))
-        if self._is_command:
-            try:
-                check_rows(log, self.layout.units, log["run"].to_numpy(), self._optional)
-            except LogError as error:
-                raise self.located(error, log.index) from error
         return log
 
     def _converted(self):
