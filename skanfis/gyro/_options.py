@@ -19,13 +19,13 @@ from ._guess import Request
 from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
+from .displays import signs
 from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
 _FORM = re.compile(r"\s*(?P<value>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*")
-_SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
 _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
 _AT_LEAST = ("reduction_factor",)  # of this more is better
 
@@ -220,17 +220,16 @@ def parse_limit(text):
             f"{text!r}: {typed!r} must be a number, not negative, and a unit, as in "
             f"{figure}=5{usual}."
         )
-    unit = found["unit"]
-    for sign, name in _SPELLINGS:
-        unit = unit.replace(sign, name)
-    known = {name: name for name in (in_rate_unit(usual, rate)[0] for rate in RATE_UNITS)}
+    wanted = dict.fromkeys(in_rate_unit(usual, rate)[0] for rate in RATE_UNITS)
+    known = {signs(name): name for name in wanted}
     if rate_unit_of(usual) is None:
         # Without its unit, and "ppm" alone, it is clear as well.
         known |= {"": usual, usual.partition(" ")[0]: usual}
-    if unit not in known:
-        wanted = " or ".join(filter(None, known)) or "no unit"
-        raise ArgumentTypeError(f"{text!r}: {figure} takes {wanted}; found {unit!r}.")
-    return Limit(figure, float(found["value"]), known[unit], typed.strip())
+    unit = known.get(signs(found["unit"]))
+    if unit is None:
+        takes = " or ".join(filter(None, wanted)) or "no unit"
+        raise ArgumentTypeError(f"{text!r}: {figure} takes {takes}; found {found['unit']!r}.")
+    return Limit(figure, float(found["value"]), unit, typed.strip())
 
 
 class Check(NamedTuple):

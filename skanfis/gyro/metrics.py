@@ -55,14 +55,13 @@ class _Figure(NamedTuple):
     needs: tuple[str, ...]
     also: str = ""
     combine: Callable | None = None
-    fewest_runs: int = 1
 
     def of(self, rows):
         also = {self.also: rows[self.also]} if self.also in rows else {}
         return self.function(*(rows[name] for name in self.needs), **also)
 
     def by_run(self, rows):
-        runs = rows_by_run(rows.get("run"), rows["rate"].size, self.fewest_runs)
+        runs = rows_by_run(rows.get("run"), rows["rate"].size)
         parts = [{name: column[run] for name, column in rows.items()} for run in runs]
         return np.array([self.of(part) for part in parts])
 
@@ -86,13 +85,12 @@ def figures_of_merit(full_scale=1.0):
     def spread(values):
         known = values[np.isfinite(values)]
         if known.size < 2:
-            raise ValueError("No repeatability: fewer than two runs have rows at rest.")
+            raise ValueError("No repeatability: fewer than two runs tell it.")
         return np.std(known, ddof=1)
 
     def relative_spread(slopes):
         return _PPM * spread(slopes) / abs(np.mean(slopes))
 
-    from_run_to_run = partial(_Figure, fewest_runs=2)
     return [
         _Figure("residual_rms", "deg/s", rms, residual),
         _Figure("residual_peak", "deg/s", _peak, residual),
@@ -104,12 +102,10 @@ def figures_of_merit(full_scale=1.0):
         _Figure("scale_factor_nonlinearity", full, largest, rates),
         _Figure("scale_factor_nonlinearity_rms", full, root, rates),
         _Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
-        from_run_to_run(
-            "scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread
-        ),
+        _Figure("scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread),
         _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
         _Figure("bias", "deg/h", bias, of_bias),
-        from_run_to_run("bias_repeatability", "deg/h", bias, of_bias, combine=spread),
+        _Figure("bias_repeatability", "deg/h", bias, of_bias, combine=spread),
         _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, (*of_bias, heat), also=ramp),
         _Figure(
             "bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, (*of_bias, ramp), also=heat
@@ -138,13 +134,11 @@ def table_of(columns, labels=(), gaps=()):
     return pd.DataFrame(found)
 
 
-def rows_by_run(run, n_rows, at_least=1):
+def rows_by_run(run, n_rows):
     """Positions of the rows of each run, in order of appearance."""
     if run is None:
         return [np.arange(n_rows)]
-    place, labels = pd.factorize(check_labels(run, "run", n_rows), use_na_sentinel=False)
-    if len(labels) < at_least:
-        raise ValueError(f"There is {len(labels)} run; at least {at_least} are needed.")
+    place = pd.factorize(check_labels(run, "run", n_rows), use_na_sentinel=False)[0]
     return np.split(np.argsort(place, kind="stable"), np.cumsum(np.bincount(place))[:-1])
 
 

@@ -93,11 +93,8 @@ def gyro_report(
             f"rate_unit={rate_unit!r} must be one of {', '.join(RATE_UNITS)}, or None."
         )
     given = {*table, "output", "residual", "error", "of_bias"}
-    figures = [
-        figure
-        for figure in metrics.figures_of_merit(full_scale)
-        if given.issuperset(figure.needs) and (figure.fewest_runs < 2 or run is not None)
-    ]
+    every = metrics.figures_of_merit(full_scale)
+    figures = [figure for figure in every if given.issuperset(figure.needs)]
     answered = {name: table[name].to_numpy()[is_answered] for name in table}
     answered["of_bias"] = metrics.rows_of_bias(answered["rate"])
     units, kind = _units(answered)

@@ -82,7 +82,7 @@ def test_repeatability_is_the_spread_over_runs(table):
     columns = {"rate": error, "error": error, "run": run}
     found = figure("bias_repeatability", **columns, of_bias=of_bias)
     assert found == pytest.approx(means.std(ddof=1))
-    with pytest.raises(ValueError, match="fewer than two runs have rows at rest"):
+    with pytest.raises(ValueError, match="fewer than two runs"):
         figure("bias_repeatability", **columns, of_bias=~of_bias)
 
 
@@ -248,7 +248,7 @@ WARMER = {"error": [1, 2], "temperature": [1, 2], **AT_REST}
         (
             "bias_repeatability",
             {"error": [1, 2], "run": [0, 0], "of_bias": [True, True], **AT_REST},
-            "There is 1 run",
+            "fewer than two runs",
         ),
         ("bias_stability_10s", {"error": [1, 2], "time": [1, 1], **AT_REST}, "time must increase"),
         ("bias_stability_10s", {"error": [1, 2], "time": [0, 60], **AT_REST}, "are 60 s apart"),
