@@ -69,21 +69,17 @@ law   |    /* Temperature of the coil from the reference, and the coefficients t
 law   |    t = $temperature;
 law   |    amplitude = $name_polynomial($name_amplitude, $n_amplitude, t);
 law   |    sagnac = $name_polynomial($name_sagnac, $n_sagnac, t);
-law   |    sine = x[$output];
 law   |    if (sagnac == 0.0R) {
 law   |        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
 law   |    }
 law   |
 law   |    /* The size of the sine, and its sign apart; no amplitude, no phase. */
+law   |    sine = x[$output];
+law   |    sine = amplitude != 0.0R ? sine / amplitude : (sine < 0.0R ? -$MAX : $MAX);
 law   |    if (sine < 0.0R) {
 law   |        sine = -sine;
-law   |        sign = -sign;
+law   |        sign = -1;
 law   |    }
-law   |    if (amplitude < 0.0R) {
-law   |        amplitude = -amplitude;
-law   |        sign = -sign;
-law   |    }
-law   |    sine = amplitude > 0.0R ? sine / amplitude : $MAX;
 law   |    if (sine > $limit) {
 law   |        status = $NAME_OUT_OF_RANGE;
 silent|        return $NAME_REJECT(y, status);
