@@ -137,8 +137,7 @@ class Results:
             self.after,
             temperature=self.temperature,
             temperature_rate=self.temperature_rate,
-            # Of some rows, means over a time are not those of all.
-            time=None if self.calibration.is_thinned else self.time,
+            time=self.time,
             run=self.run,
             # At rest there is no scale factor; any full scale will do.
             full_scale=np.abs(self.rate).max() or 1.0,
@@ -154,8 +153,6 @@ class Results:
             return "allantools is not installed (pip install allantools)"
         if self.time is None:
             return "the log has no time"
-        if self.calibration.is_thinned:
-            return "only some of the rows are used"
         try:
             rows, interval, run = rows_for_allan(self.time, self.run, self.in_range)
         except ValueError as reason:

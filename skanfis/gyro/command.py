@@ -43,7 +43,6 @@ _FILES = (
     *("compensator.json", "compensator.h", "compensator.c", "report.html", "report.pdf"),
     *("rules.txt", *chain.from_iterable(FILES.values())),
 )
-_MOST_ROWS = 100_000  # that are held
 _STAGED = ".skanfis-"  # of folders that hold files until all are written
 
 
@@ -79,9 +78,7 @@ def _calibrate(options, tell):
         split = choose_split(reading.log, options.groups, uses_output="output" in recipe.inputs)
         tell(f"inputs: {', '.join(recipe.inputs)}")
         tell(f"check: {split.sentence}")
-        calibration = calibrate(
-            reading.log, split, recipe, tell, reading.name_row, n_rows=reading.n_rows
-        )
+        calibration = calibrate(reading.log, split, recipe, tell, reading.name_row)
         tell("drawing the report")
         checks = _write(calibration, options, reading.digests, written)
         targets = list(write_targets(calibration, options.target, written))
@@ -121,7 +118,7 @@ def _read(options, paths, tell):
     """The reading of a checked log, and what the options ask of it. What was found out is told."""
     required = dict.fromkeys(["temperature", "output", *columns_of(options.inputs or ())])
     request = request_of(options, required)
-    reading = read(paths, request, tell=tell, most_rows=_MOST_ROWS)
+    reading = read(paths, request, tell=tell)
     if reading.assumed:
         reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
     for note in reading.notes:
@@ -134,7 +131,7 @@ def _read(options, paths, tell):
                 f"--target {text}: the output was taken from {layout.name('output')!r}. Say which "
                 f"column is that of the axis {wanted} (--columns output=NAME), this one or another."
             )
-    numbers = {"row": reading.n_rows}
+    numbers = {"row": len(reading.log)}
     numbers |= {name: reading.log[name].nunique() for name in LABELS if name in reading.log}
     tell(", ".join(counted(f"{n:,}", name) for name, n in numbers.items()))
     try:

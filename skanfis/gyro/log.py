@@ -24,7 +24,6 @@ from ._guess import Request, settle
 from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_source
 from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
-from .metrics import rows_by_run
 
 _ROWS = 100_000  # rows of a piece: no more texts of a file are held at once
 # A gap between two runs is so long, and so many steps: longer than what a logger drops.
@@ -102,9 +101,8 @@ def read_log(
 class Reading:
     """A log that has been read, with what was found out on the way, in sentences (``notes``).
 
-    Of the ``n_rows`` rows that there were ``log`` holds every k-th of each run where they are too
-    many; its column "power_on" is where the clock was when the run began [s]. Row k of ``log`` is
-    row ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences on units, by part, that neither
+    The column "power_on" of ``log`` is where the clock was when the run began [s]. Row k is row
+    ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences on units, by part, that neither
     names nor options tell.
     """
 
@@ -113,7 +111,6 @@ class Reading:
     row: np.ndarray
     files: list
     notes: list
-    n_rows: int
     assumed: dict
 
     @property
@@ -137,11 +134,10 @@ class Reading:
         return file.located(error, self.row, None if len(self.files) == 1 else "the log")
 
 
-def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
+def read(paths, request, *, tell=lambda text: None):
     """Read files as :func:`read_log` does; returns a :class:`Reading`.
 
-    ``tell`` is called with a line of text for every file. Of more than ``most_rows`` rows every
-    k-th of each run is held, with k a power of two.
+    ``tell`` is called with a line of text for every file.
     """
     if not paths:
         raise ValueError("paths: at least one file is needed.")
@@ -177,13 +173,6 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
             where = None if len(files) == 1 else "the log"
             raise file.located(error, table.index, where) from error
     assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}
-    n_rows, every = len(table), 1
-    while len(table) > most_rows * every:
-        every *= 2
-    if every > 1:
-        held = [rows[::every] for rows in rows_by_run(table["run"], n_rows)]
-        table = table.iloc[np.sort(np.concatenate(held))]
-        notes.append(f"of {n_rows:,} rows {len(table):,} are used, one in {every} of each run")
     file, code, row = table["file"].to_numpy(), table["run"].to_numpy(), table.index.to_numpy()
     log = table.drop(columns=["file", "run"]).set_axis(pd.RangeIndex(len(table)))
     del table
@@ -192,14 +181,14 @@ def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
         if not found.items() <= layout.units.items():
             # All rows tell otherwise than the first ones.
             retold = replace(request, assumed=layout.units | found)
-            return read(paths, retold, tell=tell, most_rows=most_rows)
+            return read(paths, retold, tell=tell)
     names = _names_of_runs(runs, paths)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
     if "device" in layout.places:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
     notes = list(dict.fromkeys(notes))
-    return Reading(log, file, row, files, notes, n_rows, assumed)
+    return Reading(log, file, row, files, notes, assumed)
 
 
 class LogFile:

@@ -189,8 +189,8 @@ def biases_of_branches(edges, rate, error, temperature, temperature_rate):
     places = bins + np.where(temperature_rate[moving] > 0, 0, edges.size - 1)
     by_place = pd.DataFrame(columns).groupby(places)
     means = by_place.mean()
-    error, *of_rate = (columns - means.loc[places].to_numpy()).T
-    coefficients = np.linalg.lstsq(np.transpose(of_rate), error, rcond=None)[0]
+    columns -= means.loc[places].to_numpy()
+    coefficients = np.linalg.lstsq(columns[:, 1:], columns[:, 0], rcond=None)[0]
     at_rest = (means[0] - means.iloc[:, 1:] @ coefficients).where(by_place.size() >= ROWS_PER_MEAN)
     return at_rest.reindex(range(2 * (edges.size - 1))).to_numpy().reshape(2, -1)
 

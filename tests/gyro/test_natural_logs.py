@@ -165,26 +165,6 @@ def test_many_files_a_pattern_and_headers_that_nearly_agree(tmp_path, truth):
         found([*paths, str(folder / "r4.csv")])
 
 
-def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, truth):
-    monkeypatch.setattr("skanfis.gyro.log._ROWS", 37)
-    table = truth[[*PARTS, "run"]].sort_values("time", kind="stable").reset_index(drop=True)
-    table.to_csv(tmp_path / "log.csv", index=False)
-    request = Request(**ASKED)
-    some = read([tmp_path / "log.csv"], request, most_rows=100)
-    place = table.groupby("run").cumcount()
-    expected = table[place % 4 == 0]
-    assert (some.n_rows, len(some.log)) == (300, 75)
-    same(some, expected, PARTS)
-    assert some.log["run"].astype(int).tolist() == expected["run"].astype(int).tolist()
-    assert some.notes[1:] == ["of 300 rows 75 are used, one in 4 of each run"]
-    assert some.name_row(7).endswith(f"line {expected.index[7] + 2}")
-    # A row that would not be held is checked all the same.
-    table.loc[290, "time"] = 0.0
-    table.to_csv(tmp_path / "log.csv", index=False)
-    with pytest.raises(LogError, match=r"line 292, column 'time': time does not increase"):
-        read([tmp_path / "log.csv"], request, most_rows=100)
-
-
 @pytest.mark.parametrize(
     ("times", "runs"),
     [
