@@ -1,4 +1,4 @@
-"""The table in a file: its header, its rows in pieces, and columns as numbers."""
+"""The table in a file: its header, its rows, and columns as numbers."""
 
 import codecs
 import contextlib
@@ -165,8 +165,8 @@ class _TextSource:
         lines = (line for line, _ in self._records())
         return f"line {next(islice(lines, row + self._n_above, None), row + self._n_above + 1)}"
 
-    def pieces(self, places, n_rows, labels=()):
-        """Tables of so many rows, columns by their places, those of ``labels`` as texts.
+    def table(self, places, labels=(), n_rows=None):
+        """The first rows, or all; columns by their places, those of ``labels`` as texts.
 
         The index is the position in the file. LogError where the file is no such table.
         """
@@ -174,7 +174,7 @@ class _TextSource:
             with open(self.path, encoding=self._encoding, newline="") as file:
                 for _ in islice(file, self._n_lines):
                     pass
-                yield from pd.read_csv(
+                return pd.read_csv(
                     file,
                     sep=r"\s+" if self._separator == " " else self._separator,
                     decimal=self.decimal,
@@ -186,10 +186,10 @@ class _TextSource:
                     dtype=dict.fromkeys(labels, str),
                     na_values=dict.fromkeys(set(places) - set(labels), NO_VALUE),
                     low_memory=False,
-                    chunksize=n_rows,
+                    nrows=n_rows,
                 )
         except pd.errors.EmptyDataError:
-            return
+            return pd.DataFrame(columns=list(places), dtype="string")
         except pd.errors.ParserError as error:
             # Of an interrupt pandas says no more.
             if "Calling read(nbytes) on source failed" in str(error):

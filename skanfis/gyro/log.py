@@ -25,7 +25,6 @@ from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_sou
 from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
 
-_ROWS = 100_000  # rows of a piece: no more texts of a file are held at once
 # A gap between two runs is so long, and so many steps: longer than what a logger drops.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
@@ -252,29 +251,21 @@ class LogFile:
         """All rows, in the units of a log."""
         places, dates = self.layout.places, self.layout.dates
         labels = [places[part] for part in LABELS if part in places]
-        columns: dict = {part: [] for part in places}
-        for table in self.source.pieces([*places.values(), *dates], _ROWS, labels):
-            self.n_rows += len(table)
-            try:
-                for part, place in places.items():
-                    values = table[place]
-                    if part == "time" and dates:
-                        values = dated(table[dates[0]], values)
-                    if part in LABELS:
-                        values = values.str.strip()
-                    else:
-                        values = pd.Series(self._numbers(values, part), table.index)
-                    check_values(values, part, self._is_command)
-                    columns[part].append(values)
-            except LogError as error:
-                raise self.located(error, table.index) from error
-        nothing = [pd.Series(dtype=float)]
-        # One by one, and not copied again: a long log is held once.
-        parts = {part: pd.concat(columns.pop(part) or nothing) for part in places}
+        table = self.source.table([*places.values(), *dates], labels)
+        self.n_rows, parts = len(table), {}
+        try:
+            for part, place in places.items():
+                values = table[place]
+                if part == "time" and dates:
+                    values = dated(table[dates[0]], values)
+                values = values.str.strip() if part in LABELS else self._numbers(values, part)
+                check_values(values, part, self._is_command)
+                parts[part] = values
+        except LogError as error:
+            raise self.located(error, table.index) from error
         if "time" in parts:
             counter = convert(2.0**32, self.layout.units["time"])
-            time, back = going_on(parts["time"].to_numpy(), self._form, counter)
-            parts["time"] = pd.Series(time, parts["time"].index)
+            parts["time"], back = going_on(parts["time"], self._form, counter)
             for first in map(self.source.place_of, back[:1]):
                 self.notes.append(
                     f"{self.path}: the clock goes back by the range of its 32 bits in "
@@ -340,7 +331,7 @@ class LogFile:
 
     def _numbers(self, column, part):
         numbers = as_numbers(column, self.source.decimal)
-        if part == "time" and not self._form and not np.isfinite(numbers).any():
+        if part == "time" and not np.isfinite(numbers).any():
             self._form = clock_form(column)
             if self._form:
                 self.notes.append(f"the time is read in s, its form is {self._form}")

@@ -504,39 +504,16 @@ def of_one_device(log):
     return log[log["device"] == log["device"].iloc[0]].reset_index(drop=True)
 
 
-def told_by_the_clock(log):
-    """No labels: the clock begins anew, and once it jumps."""
-    table = of_one_device(log)[PARTS]
-    table.loc[500:, "time"] += 5000.0
-    return table
-
-
-@pytest.mark.parametrize("kind", [interleaved, told_by_the_clock])
-def test_pieces_give_what_the_whole_gives(two_devices, model, kind, tmp_path, monkeypatch, say):
-    path = tmp_path / "log.csv"
-    kind(two_devices).to_csv(path, index=False)
-    tables, said = [], []
-    for rows in (100_000, 197):
-        monkeypatch.setattr("skanfis.gyro.log._ROWS", rows)
-        target = tmp_path / f"rates{rows}.csv"
-        code, out, err = say("--apply", model, path, "--output", target)
-        assert code == 0
-        tables.append(pd.read_csv(target))
-        notes = [line.partition("note:")[2] for line in err.splitlines() if "note:" in line]
-        said.append(out.splitlines()[1:] + notes)
-    whole, pieces = tables
-    assert said[0] == said[1]
-    assert list(whole.columns) == list(pieces.columns)
-    for name in whole:
-        if whole[name].dtype.kind == "f":
-            np.testing.assert_allclose(pieces[name], whole[name], rtol=1e-9, atol=1e-11)
-        else:
-            assert whole[name].tolist() == pieces[name].tolist()
-    if "run" in kind(two_devices):
-        # By the compensator itself, which knows nothing of files and pieces.
-        direct = GyroCompensator.read_json(model).apply(read_log(path))
-        found, expected = (each["rate_compensated"] for each in (pieces, direct))
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
+def test_runs_of_devices_side_by_side_are_compensated_each_by_itself(
+    two_devices, model, tmp_path, say
+):
+    path, target = tmp_path / "log.csv", tmp_path / "rates.csv"
+    interleaved(two_devices).to_csv(path, index=False)
+    assert say("--apply", model, path, "--output", target)[0] == 0
+    # By the compensator itself, which knows nothing of files.
+    direct = GyroCompensator.read_json(model).apply(read_log(path))
+    found, expected = (each["rate_compensated"] for each in (pd.read_csv(target), direct))
+    np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-11)
 
 
 def test_time_counts_from_power_on_and_not_from_the_first_row_that_is_left(

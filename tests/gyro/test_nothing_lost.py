@@ -95,7 +95,7 @@ def test_an_interrupt_while_pandas_reads_is_one(tmp_path, monkeypatch):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            list(source.pieces([0, 1], 10))
+            source.table([0, 1])
     finally:
         signal.signal(signal.SIGINT, before)
 
