@@ -14,8 +14,6 @@ from datetime import datetime
 from itertools import chain
 from pathlib import Path
 
-import pandas as pd
-
 from ..inspection.labels import printable
 from ..inspection.text import counted
 from ._calibration import Recipe, calibrate
@@ -273,9 +271,7 @@ def _apply(options, tell):
         reading.notes.append(f"power-on is taken to be where the clock begins, at {start:.10g} s")
     n_rows = counted(f"{len(log):,}", "row")
     tell(n_rows)
-    # Run by run, for the memory that this takes.
-    runs = log.groupby("run", sort=False, observed=True) if "run" in log else [("", log)]
-    rates = pd.concat([compensator.apply(part) for _, part in runs]).sort_index()
+    rates = compensator.apply(log)
     labels = [name for name in ("device", "run", "time") if name in log]
     tell(f"writing {target}")
     with _staged(target.parent) as folder:

@@ -152,8 +152,7 @@ def read(paths, request, *, tell=lambda text: None):
         tables.append(files[-1].read().assign(file=np.int32(number)))
         if len(paths) > 1:
             tell(f"read {number + 1:,} of {len(paths):,}: {path}, {files[-1].n_rows:,} rows")
-    table = pd.concat(tables) if len(tables) > 1 else tables[0]
-    tables.clear()
+    table = pd.concat(tables)
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
@@ -164,17 +163,9 @@ def read(paths, request, *, tell=lambda text: None):
     if by_clock and len(runs) > 1 == runs["device"].nunique():
         table, runs, told = _joined_by_clock(table, runs, paths)
         notes += told
-    if request.guess:
-        try:
-            check_rows(table, layout.units, table["run"].to_numpy(), request.optional)
-        except LogError as error:
-            file = files[table["file"].iloc[error.row or 0]]
-            where = None if len(files) == 1 else "the log"
-            raise file.located(error, table.index, where) from error
     assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}
     file, code, row = table["file"].to_numpy(), table["run"].to_numpy(), table.index.to_numpy()
     log = table.drop(columns=["file", "run"]).set_axis(pd.RangeIndex(len(table)))
-    del table
     if layout.assumed and request.assumed is None:
         found = settle_by_all(log, layout)
         if not found.items() <= layout.units.items():
@@ -186,8 +177,13 @@ def read(paths, request, *, tell=lambda text: None):
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
     if "device" in layout.places:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
-    notes = list(dict.fromkeys(notes))
-    return Reading(log, file, row, files, notes, assumed)
+    reading = Reading(log, file, row, files, list(dict.fromkeys(notes)), assumed)
+    if request.guess:
+        try:
+            check_rows(log, layout.units, code, request.optional)
+        except LogError as error:
+            raise reading.located(error) from error
+    return reading
 
 
 class LogFile:
@@ -231,10 +227,7 @@ class LogFile:
         missing[[part for part in self._optional if part in log]] = False
         # A gap in one column is none in the clock.
         log = log[~missing[[part for part in ("time", *LABELS) if part in log]].any(axis=1)]
-        # In little memory.
-        unlabelled = pd.Categorical.from_codes(np.zeros(len(log), dtype=np.int8), [""])
-        for part in LABELS:
-            log[part] = log[part].astype("category") if part in log else unlabelled
+        log = log.assign(**{part: "" for part in LABELS if part not in log})
         if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
             runs = self._told_by_clock(log["time"].to_numpy())
             log = log[: len(runs)].assign(run=runs)
