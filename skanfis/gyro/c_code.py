@@ -162,8 +162,7 @@ def export_c_physics(
     ------
     ValueError
         If a parameter is none of the above, if the residual model has a step that cannot be folded
-        in, if one part asks for "nan" out of bounds and the other for "raise", or if the numbers
-        go beyond what "float" holds.
+        in, or if the numbers go beyond what "float" holds.
     TypeError
         If ``estimator`` is no such composition.
 
@@ -183,16 +182,11 @@ def export_c_physics(
     longest = LONGEST_NAME - len(_SUFFIX)
     stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
     law, rules = law_and_rules(estimator)
-    policies = {law.out_of_bounds, rules.model.out_of_bounds}
-    if policies >= set(SILENT):
-        raise ValueError(
-            "One of base and residual has out_of_bounds='nan', the other 'raise': one C function "
-            "leaves y as it is or writes NaN. Set both to one of the two."
-        )
     dialect = Dialect(name, dtype, std)
     part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage)
     whole = _Composition(law, rules, part, dialect.dtype)
-    silent = next(iter(policies & set(SILENT)), None)
+    policies = rules.model.out_of_bounds, law.out_of_bounds
+    silent = next((policy for policy in policies if policy in SILENT), None)
     code = f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n{part.text()}\n'
     code += _source_of(dialect, whole, silent) + self_test(_known_answers(whole), dialect)
     price = _cost(whole)
