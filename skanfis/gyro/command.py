@@ -71,7 +71,6 @@ def main(arguments=None):
 def _calibrate(options, tell):
     folder, paths = _where_from_and_to(options)
     with _staged(folder, _FILES if options.force else ()) as written:
-        tell(f"reading {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
         reading, recipe = _read(options, paths, tell)
         split = choose_split(reading.log, options.groups, uses_output="output" in recipe.inputs)
         tell(f"inputs: {', '.join(recipe.inputs)}")
@@ -252,7 +251,6 @@ def _apply(options, tell):
     units = dict(compensator.units)
     if units.get("output") in SIGNALS and "output" not in compensator.assumed:
         del units["output"]  # which is asked for again
-    tell(f"compensating {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
     # The true rate is no input: where it is known, the errors are told.
     optional = tuple({"temperature", "rate"} - needed)
     reading = read(paths, request_of(options, sorted(needed), units, optional), tell=tell)

@@ -143,6 +143,7 @@ def read(paths, request, *, tell=lambda text: None):
     files: list[LogFile] = []
     tables: list[pd.DataFrame] = []
     for number, path in enumerate(paths):
+        tell(f"reading {path}" + (f", {number + 1} of {len(paths)}" if len(paths) > 1 else ""))
         files.append(LogFile(path, request, files[0] if files else None))
         for same in [file for file in files[:-1] if file.digest == files[-1].digest]:
             raise LogError(
@@ -150,8 +151,6 @@ def read(paths, request, *, tell=lambda text: None):
                 "tested by itself. Leave one of them out."
             )
         tables.append(files[-1].read().assign(file=np.int32(number)))
-        if len(paths) > 1:
-            tell(f"read {number + 1:,} of {len(paths):,}: {path}, {files[-1].n_rows:,} rows")
     table = pd.concat(tables)
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
