@@ -239,8 +239,8 @@ def _merit(results):
 def _pictures(results):
     others = [each for name, each in results.pictures.items() if name != _ON_FIRST_PAGE]
     blocks = [Block("pictures", others)]
-    if isinstance(results.of_allan, str):
-        blocks.append(Block("soft", f"Allan deviation: {results.of_allan}."))
+    if results.no_allan:
+        blocks.append(Block("soft", f"Allan deviation: {results.no_allan}."))
     return "Pictures", blocks
 
 

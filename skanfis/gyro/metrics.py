@@ -195,30 +195,35 @@ def biases_of_branches(edges, rate, error, temperature, temperature_rate):
     return at_rest.reindex(range(2 * (edges.size - 1))).to_numpy().reshape(2, -1)
 
 
-def allan_deviation(error, sampling_interval, run=None):
-    """Overlapping Allan deviation, by allantools, in octaves up to a tenth of the run.
+def allan_deviation(error, time, run=None):
+    """Overlapping Allan deviation, by allantools, in octaves up to a tenth of a stretch.
 
-    Of an error that is evenly sampled within each run [deg/s]; the variances of runs are averaged.
-    A table: averaging_time [s], deviation and its standard error [deg/h], by IEEE 952: that of the
-    differences of means that do not overlap.
+    Of an error [deg/s] over all stretches of the runs in which it is known and the time goes on
+    evenly; their variances are averaged. A table: averaging_time [s], deviation and its standard
+    error [deg/h], by IEEE 952: that of the differences of means that do not overlap.
     """
     told = "The Allan deviation needs allantools: pip install allantools."
     oadev = needed("allantools", told).oadev
-    error = check_column(error, "error")
-    if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
-        raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
-    runs = [rows for rows in rows_by_run(run, error.size) if rows.size >= _ROWS_PER_TIME]
-    if not runs:
-        raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
-    parts = []
+    runs = [rows for rows in rows_by_run(run, time.size) if rows.size >= _ROWS_PER_TIME]
+    usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs])) if runs else np.nan
+    stretches, parts = [], []
     for rows in runs:
+        known, steps = np.isfinite(error[rows]), np.diff(time[rows])
+        is_next = (steps > 0.0) & (np.abs(steps - usual) <= _UNEVEN * usual)
+        is_next &= known[1:] & known[:-1]
+        stretches += np.split(rows, np.flatnonzero(~is_next) + 1)
+    for rows in stretches:
+        if rows.size < _ROWS_PER_TIME:
+            continue
         # In units of the time between rows.
         steps, deviations, _, counts = oadev(error[rows], data_type="freq", taus="octave")
         part = pd.DataFrame({"steps": steps, "sum": counts * deviations**2, "n": counts})
         part["apart"] = rows.size / steps - 1.0
         parts.append(part[steps * _ROWS_PER_TIME <= rows.size])
+    if not parts:
+        raise ValueError(f"nowhere do {_ROWS_PER_TIME} rows in range follow evenly in time")
     sums = pd.concat(parts).groupby("steps", as_index=False).sum()
-    curve = pd.DataFrame({"averaging_time": sums["steps"] * sampling_interval})
+    curve = pd.DataFrame({"averaging_time": sums["steps"] * usual})
     curve["deviation"] = PER_HOUR * np.sqrt(sums["sum"] / sums["n"])
     return curve.assign(error=curve["deviation"] / np.sqrt(2.0 * sums["apart"]))
 
@@ -253,25 +258,6 @@ def allan_figures(tau, deviation):
         # sigma = K sqrt(tau / 3) with tau in h; 60 is the root of the seconds in an hour.
         "rate_random_walk": (drift * np.sqrt(3.0) * 60.0, no_drift),
     }
-
-
-def rows_for_allan(time, run, answered):
-    """Rows of stretches without a gap in time or answers; the time between them [s]; their labels.
-
-    ValueError says why there is no Allan deviation.
-    """
-    runs = [rows for rows in rows_by_run(run, time.size) if rows.size >= _ROWS_PER_TIME]
-    usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs])) if runs else np.nan
-    stretches = []
-    for rows in runs:
-        is_next = np.abs(np.diff(time[rows]) - usual) <= _UNEVEN * usual
-        is_next &= answered[rows[1:]] & answered[rows[:-1]]
-        stretches += np.split(rows, np.flatnonzero(~is_next) + 1)
-    stretches = [rows for rows in stretches if rows.size >= _ROWS_PER_TIME]
-    if not stretches:
-        raise ValueError(f"nowhere do {_ROWS_PER_TIME} rows in range follow evenly in time")
-    labels = np.repeat(np.arange(len(stretches)), [rows.size for rows in stretches])
-    return np.concatenate(stretches), float(usual), labels
 
 
 def _line(rate, output):
