@@ -199,7 +199,6 @@ class LogFile:
             self.size = opened.tell()
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
-        self.n_rows = 0
         self._form = ""  # of a clock of texts
         if first is None:
             return
@@ -244,7 +243,7 @@ class LogFile:
         places, dates = self.layout.places, self.layout.dates
         labels = [places[part] for part in LABELS if part in places]
         table = self.source.table([*places.values(), *dates], labels)
-        self.n_rows, parts = len(table), {}
+        parts = {}
         try:
             for part, place in places.items():
                 values = table[place]
@@ -315,8 +314,8 @@ class LogFile:
         lacking, bad = missing.sum(), missing.any(axis=1)
         names = {self.layout.name(part): n for part, n in lacking[lacking > 0].items()}
         counts = ", ".join(f"{name!r} in {n:,}" for name, n in names.items())
-        said = f"{self.path}: {bad.sum():,} of {self.n_rows:,} rows lack a value ({counts})"
-        if 2 * bad.sum() > self.n_rows:
+        said = f"{self.path}: {bad.sum():,} of {bad.size:,} rows lack a value ({counts})"
+        if 2 * bad.sum() > bad.size:
             raise LogError(f"{said}: too many to go on without them.")
         place = self.source.place_of(int(bad.idxmax()))
         self.notes.append(f"{said}; they are left out, the first of them {place}")
