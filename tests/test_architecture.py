@@ -48,7 +48,7 @@ LAYERS = {
     "intervals": SKLEARN,
     "dask": [*SKLEARN, "pandas", "dask"],
     "datasets": [*SKLEARN, "pandas"],
-    "gyro": [*PLOTTING, "joblib", *FOR_REPORTS_AND_FILES],
+    "gyro": [*PLOTTING, *FOR_REPORTS_AND_FILES],
 }
 # The version, which what is exported carries.
 ALSO = {"export": [PUBLIC]}

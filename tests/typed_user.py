@@ -96,7 +96,7 @@ applied: pd.DataFrame = GyroCompensator.read_json("compensator.json").apply(read
 report: pd.DataFrame = gyro_report(log["rate"], log["output"], composed.predict(log))
 dwells: np.ndarray = log["rate"].to_numpy()
 picture: ErrorDisplay = ErrorDisplay.from_predictions(dwells, dwells, dwells, position=dwells)
-AllanDisplay.from_predictions(dwells, dwells, dwells, sampling_interval=1.0).plot().tables()
+AllanDisplay.from_predictions(dwells, dwells, dwells, time=dwells).plot().tables()
 wrong_rate: str = law.fit(log, log["rate"]).predict(log)  # type: ignore[assignment]
 
 # What the parameters take: arrays, lists, frames and files; and what they do not.

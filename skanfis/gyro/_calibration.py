@@ -101,7 +101,6 @@ class Calibration:
     of the model that had not seen it.
     ``simpler`` are compensations without rules, judged with the model by ``verdict`` on the rows in
     range. ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
-    ``n_rows`` is how many rows there were, of which ``log`` has some.
     """
 
     recipe: Recipe
@@ -119,7 +118,6 @@ class Calibration:
     n_fit_rows: int
     warnings: list
     glitches: list
-    n_rows: int
     fold_models: list  # of what is written, those that had not seen the test rows of each fold
 
     @property
@@ -130,10 +128,6 @@ class Calibration:
     @property
     def writes_model(self):
         return self.written == self.verdict.model
-
-    @property
-    def is_thinned(self):
-        return self.n_rows > len(self.log)
 
     @property
     def rate(self):
@@ -166,11 +160,10 @@ class Calibration:
         return found + self.glitches
 
 
-def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None):
+def calibrate(log, split, recipe, tell, name_row="row {}".format):
     """Compensate every row by a model that is new to it, fit to all rows, and judge.
 
     ``tell`` is called with a line of text for every step; ``name_row`` says where a row is found.
-    ``n_rows`` is of how many rows these are some.
     """
     factor = recipe.scale_factor
     if recipe.output_unit in SIGNALS and np.ptp(log["rate"]) > 0.0:
@@ -226,7 +219,6 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format, *, n_rows=None
         n_fit_rows=rows.size,
         warnings=messages,
         glitches=glitches,
-        n_rows=len(log) if n_rows is None else n_rows,
         fold_models=chosen.fold_models,
     )
 

@@ -148,12 +148,6 @@ def evenly_chosen(n_rows, most) -> np.ndarray:
     return np.unique(np.linspace(0, n_rows - 1, min(n_rows, most)).astype(int))
 
 
-def label_texts(labels) -> np.ndarray:
-    """A Series of labels as texts: one for all rows of a label, not one for each."""
-    own = labels.astype("category").cat
-    return own.categories.astype(str).to_numpy(dtype=object)[own.codes.to_numpy()]
-
-
 def ask(estimator, method, X):
     """``estimator.method(X)``, or for a Pipeline that of its last step for what it is given."""
     final, X = final_step(estimator, X)

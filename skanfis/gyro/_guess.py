@@ -154,7 +154,7 @@ def _guess(source, request, layout, first):
     is_told = "rate" in request.columns or first is not None
     called_rate = None if is_told else layout.places.pop("rate", None)
     places = range(len(source.header))
-    sample = next(source.pieces(places, _SAMPLE_ROWS), pd.DataFrame(columns=places, dtype=float))
+    sample = source.table(places, n_rows=_SAMPLE_ROWS)
     columns = [
         _Column(place, name, sample[place], source.decimal)
         for place, name in enumerate(source.header)

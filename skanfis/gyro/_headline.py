@@ -142,18 +142,15 @@ def errors_and_verdict(calibration, name_row="row {}".format):
 
 def of_rates(compensator, log, rates):
     """Lines on the rates of a log: status, inputs out of range, errors where they are known."""
-    status, blame = rates["status"], {}
-    rules = rules_of(compensator.estimator)
-    if isinstance(rules, FrozenRules):  # as in all that the command writes
-        is_out = (status & STATUS["OUT_OF_RANGE"]) != 0
-        X = features(log, compensator.inputs, compensator.time_constant)[is_out]
-        parts = [(X.iloc[:, rules.positions], rules.model.minimum, rules.model.maximum)]
-        blame["OUT_OF_RANGE"] = beyond(parts)
+    status, rules = rates["status"], rules_of(compensator.estimator)
+    is_out = (status & STATUS["OUT_OF_RANGE"]) != 0
+    X = features(log, compensator.inputs, compensator.time_constant)[is_out]
+    blame = beyond([(X.iloc[:, rules.positions], rules.model.minimum, rules.model.maximum)])
     yield f"flagged        {counted(f'{(status != 0).sum():,}', 'row')}"
     for name, bit in STATUS.items():
         if count := ((status & bit) != 0).sum():
             told = f"{counted(f'{count:,}', 'row')} {name.lower().replace('_', ' ')}"
-            yield f"status {bit}       {told}{blame.get(name, '')}"
+            yield f"status {bit}       {told}{blame if name == 'OUT_OF_RANGE' else ''}"
     errors = rates[["rate_indicated", "rate_compensated"]].sub(log.get("rate", np.nan), axis=0)
     kinds = np.where(status == 0, "rows with status 0", "the flagged rows")
     for where, part in errors.dropna().groupby(pd.Series(kinds, errors.index)):

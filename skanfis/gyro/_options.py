@@ -19,24 +19,23 @@ from ._guess import Request
 from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
+from .displays import signs
 from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
 
 PROGRAM = "python -m skanfis.gyro"
 _MOST_RULES = 500  # a grid that could neither be told nor learnt
 _FORM = re.compile(r"\s*(?P<value>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*")
-_SPELLINGS = (("°C", "degC"), ("°", "deg"), ("√h", "sqrt(h)"))
 _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
 _AT_LEAST = ("reduction_factor",)  # of this more is better
 
 _TARGET = re.compile(
-    r"(rate-)?table(:(float|double|q31|q15))?|cubic(:(float|double))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
+    r"(rate-)?table(:(float|double|q31|q15))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
 )
 _TARGETS = (
     "in C table[:TYPE] over temperature, rate-table[:TYPE] over output too (TYPE float, double, "
-    "q31, q15), cubic[:TYPE] piecewise over temperature (float, double); parameters of one AXIS "
-    "(x, y, z) of a gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] (INSTANCE 0 to 3) or "
-    "ardupilot:AXIS[:INSTANCE] (1 to 3)"
+    "q31, q15); parameters of one AXIS (x, y, z) of a gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] "
+    "(INSTANCE 0 to 3) or ardupilot:AXIS[:INSTANCE] (1 to 3)"
 )
 _OF_OUTSIDE = (
     "beyond the range of the calibration, where rows are flagged: hold the value at the edge "
@@ -47,8 +46,8 @@ Calibrate a gyro from its logs: learn the error of its indicated rate (indicated
 what is known on board, its output, its temperature and how fast that changes, and the time since
 power-on. The result is checked on whole runs, devices or rate levels that the model has not seen.
 
-Written to a folder: the model (compensator.json and .joblib), a report with tables and pictures for
-any browser (report.html), and the rules as text (rules.txt).
+Written to a folder: the model (compensator.json), a report with tables and pictures for any browser
+(report.html), and the rules as text (rules.txt).
 """
 _EPILOG = """\
 examples:
@@ -109,7 +108,6 @@ def make_parser():
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
-    add("--trust", "load a MODEL that is a .joblib: runs its maker's code", action="store_true")
     told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
     told = "the recommended compensation (default), the rules, or one of the simpler ones"
@@ -125,13 +123,12 @@ def make_parser():
 
 
 def check_kind(parser, options):
-    """UsageError for options that have no say with --apply, or without it."""
-    of_both = {"logs", "columns", "units", "output", "force", "quiet", "apply", "trust"}
-    idle = vars(options).keys() - of_both if options.apply else {"trust"}
+    """UsageError for options that have no say with --apply."""
+    idle = vars(options).keys() - {"logs", "columns", "units", "output", "force", "quiet", "apply"}
     given = [name for name in sorted(idle) if getattr(options, name) != parser.get_default(name)]
-    if given:
+    if options.apply and given:
         named = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-        raise UsageError(f"{named}: of no use with{'' if options.apply else 'out'} --apply.")
+        raise UsageError(f"{named}: of no use with --apply.")
 
 
 def request_of(options, require, assumed=None, optional=()):
@@ -223,17 +220,16 @@ def parse_limit(text):
             f"{text!r}: {typed!r} must be a number, not negative, and a unit, as in "
             f"{figure}=5{usual}."
         )
-    unit = found["unit"]
-    for sign, name in _SPELLINGS:
-        unit = unit.replace(sign, name)
-    known = {name: name for name in (in_rate_unit(usual, rate)[0] for rate in RATE_UNITS)}
+    wanted = dict.fromkeys(in_rate_unit(usual, rate)[0] for rate in RATE_UNITS)
+    known = {signs(name): name for name in wanted}
     if rate_unit_of(usual) is None:
         # Without its unit, and "ppm" alone, it is clear as well.
         known |= {"": usual, usual.partition(" ")[0]: usual}
-    if unit not in known:
-        wanted = " or ".join(filter(None, known)) or "no unit"
-        raise ArgumentTypeError(f"{text!r}: {figure} takes {wanted}; found {unit!r}.")
-    return Limit(figure, float(found["value"]), known[unit], typed.strip())
+    unit = known.get(signs(found["unit"]))
+    if unit is None:
+        takes = " or ".join(filter(None, wanted)) or "no unit"
+        raise ArgumentTypeError(f"{text!r}: {figure} takes {takes}; found {found['unit']!r}.")
+    return Limit(figure, float(found["value"]), unit, typed.strip())
 
 
 class Check(NamedTuple):

@@ -11,12 +11,12 @@ import numpy as np
 import pandas as pd
 
 from ..inspection import MembershipDisplay
-from ._columns import RATE_UNITS, evenly_chosen, label_texts
+from ._columns import RATE_UNITS, evenly_chosen
 from ._options import check_limit
 from .c_compensator import input_units
 from .compensator import features
 from .displays import AllanDisplay, ErrorDisplay, GroupResidualDisplay, signs, three_digits
-from .metrics import SLOWEST, rms, rows_for_allan
+from .metrics import SLOWEST, allan_deviation, rms
 from .report import gyro_report
 from .thermal_displays import (
     CoverageDisplay,
@@ -112,7 +112,7 @@ class Results:
         self.after = np.where(self.in_range, calibration.after, np.nan)
         self.temperature = self.log["temperature"].to_numpy()
         self.time = self.log["time"].to_numpy() if "time" in self.log else None
-        self.run = label_texts(self.log["run"]) if "run" in self.log else None
+        self.run = self.log["run"].astype(str) if "run" in self.log else None
         self.temperature_rate = None
         if self.time is not None:
             # Whether or not it is an input: what temperature alone leaves is seen by it.
@@ -137,30 +137,27 @@ class Results:
             self.after,
             temperature=self.temperature,
             temperature_rate=self.temperature_rate,
-            # Of some rows, means over a time are not those of all.
-            time=None if self.calibration.is_thinned else self.time,
+            time=self.time,
             run=self.run,
             # At rest there is no scale factor; any full scale will do.
             full_scale=np.abs(self.rate).max() or 1.0,
             rate_unit=self.unit,
-            allan=isinstance(self.of_allan, dict),
+            allan=not self.no_allan,
             random_state=0,
         )
 
     @cached_property
-    def of_allan(self):
-        """Arguments of an AllanDisplay, a dict; or a text, why there can be none."""
+    def no_allan(self):
+        """Why there is no Allan deviation; empty where there is one."""
         if find_spec("allantools") is None:
             return "allantools is not installed (pip install allantools)"
         if self.time is None:
             return "the log has no time"
-        if self.calibration.is_thinned:
-            return "only some of the rows are used"
         try:
-            rows, interval, run = rows_for_allan(self.time, self.run, self.in_range)
+            allan_deviation(self.after - self.rate, self.time, self.run)
         except ValueError as reason:
             return str(reason)
-        return {"rows": rows, "sampling_interval": interval, "run": run}
+        return ""
 
     @cached_property
     def checks(self):
@@ -184,18 +181,16 @@ class Results:
             found["scale-factor-error"] = found["residual-surface"] = heat
         if change is not None and change.min() < -SLOWEST < SLOWEST < change.max():
             found["hysteresis"] = heat | {"temperature_rate": change}
-        if isinstance(self.of_allan, dict):
-            found["allan-deviation"] = self.of_allan
+        if not self.no_allan:
+            found["allan-deviation"] = {"time": self.time, "run": self.run}
         pictures = {}
         for subject, (kind, caption) in _PICTURES.items():
             if subject not in found:
                 continue
-            options = dict(found[subject])
-            rows = options.pop("rows", slice(None))
-            rates = (each[rows] for each in (self.rate, self.before, self.after))
+            rates = self.rate, self.before, self.after
             unit = None if kind is ScaleFactorErrorDisplay else self.unit
             figure = _figure()
-            display = kind.from_predictions(*rates, unit=unit, ax=figure, **options)
+            display = kind.from_predictions(*rates, unit=unit, ax=figure, **found[subject])
             pictures[subject] = Picture.of(subject, figure, display.tables(), caption)
         return pictures
 

@@ -1,4 +1,4 @@
-"""The table in a file: its header, its rows in pieces, and columns as numbers."""
+"""The table in a file: its header, its rows, and columns as numbers."""
 
 import codecs
 import contextlib
@@ -40,22 +40,17 @@ _FORMATS = [
 ]
 _CLOCK_ROWS = 200  # by which the form of a clock is told
 _EPOCH = pd.Timestamp(0, tz="UTC")
-_DAY, _HOUR = 86_400.0, 3_600.0  # s
+_DAY = 86_400.0  # s
 
 
-def open_source(path, *, head_only=False):
-    """The table in a file; LogError where there is none, as far as its head tells if asked so."""
+def open_source(path):
+    """The table in a file; LogError where there is none."""
     name = str(path).lower()
     if name.endswith(PARQUET):
         return ParquetSource(path)
-    if name.endswith((*MATLAB, *EXCEL)):
-        if head_only:
-            return None
-        return excel_source(path, header_place) if name.endswith(EXCEL) else matlab_source(path)
-    source = _TextSource(path)
-    if not head_only:
-        source.check_lengths()
-    return source
+    if name.endswith(MATLAB):
+        return matlab_source(path)
+    return excel_source(path, header_place) if name.endswith(EXCEL) else _TextSource(path)
 
 
 class _TextSource:
@@ -76,6 +71,7 @@ class _TextSource:
             raise LogError(f"{path}: is empty.")
         self._place_header(head)
         self.decimal = self._find_decimal(head)
+        self._check_lengths()
 
     def _find_separator(self):
         """The first sign that is on all lines, those of a preamble aside; else a comma."""
@@ -109,7 +105,7 @@ class _TextSource:
                 f"the header is line {head[place][0]}; {place} lines above it are passed over"
             )
 
-    def check_lengths(self):
+    def _check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut without a word."""
         n_columns = len(self.header)
         with contextlib.suppress(UnicodeError), open(self.path, encoding=self._encoding) as file:
@@ -169,8 +165,8 @@ class _TextSource:
         lines = (line for line, _ in self._records())
         return f"line {next(islice(lines, row + self._n_above, None), row + self._n_above + 1)}"
 
-    def pieces(self, places, n_rows, labels=()):
-        """Tables of so many rows, columns by their places, those of ``labels`` as texts.
+    def table(self, places, labels=(), n_rows=None):
+        """The first rows, or all; columns by their places, those of ``labels`` as texts.
 
         The index is the position in the file. LogError where the file is no such table.
         """
@@ -178,7 +174,7 @@ class _TextSource:
             with open(self.path, encoding=self._encoding, newline="") as file:
                 for _ in islice(file, self._n_lines):
                     pass
-                yield from pd.read_csv(
+                return pd.read_csv(
                     file,
                     sep=r"\s+" if self._separator == " " else self._separator,
                     decimal=self.decimal,
@@ -190,10 +186,10 @@ class _TextSource:
                     dtype=dict.fromkeys(labels, str),
                     na_values=dict.fromkeys(set(places) - set(labels), NO_VALUE),
                     low_memory=False,
-                    chunksize=n_rows,
+                    nrows=n_rows,
                 )
         except pd.errors.EmptyDataError:
-            return
+            return pd.DataFrame(columns=list(places), dtype="string")
         except pd.errors.ParserError as error:
             # Of an interrupt pandas says no more.
             if "Calling read(nbytes) on source failed" in str(error):
@@ -286,27 +282,22 @@ def clock_form(column):
 
 
 def going_on(time, form, counter):
-    """Times [s], some NaN, that go on where the clock went back; and such rows, save midnights.
+    """Times [s], some NaN, that go on at midnight, or where a counter begins again; rows of that.
 
-    A clock with a ``form`` goes back at midnight and at the end of daylight saving; a ``counter``
-    by its range [s], unless it was set anew instead.
+    A ``counter`` goes back by its range [s], unless it was set anew instead.
     """
     known = np.flatnonzero(np.isfinite(time))
     steps = np.diff(time[known], prepend=time[known[:1]])
-    if (steps >= 0.0).all():
+    time, back = time.copy(), steps < 0.0
+    if form:
+        time[known] += _DAY * np.cumsum((steps < -0.5 * _DAY) & (form == CLOCK))
         return time, known[:0]
     usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else 0.0
-    days = _DAY * np.cumsum((steps < -0.5 * _DAY) & (form == CLOCK))
-    by = _HOUR if form else counter
-    back = (steps < 0.0) & (np.abs(steps + by - usual) <= 3.0 * usual)
-    if form:
-        # An hour back to where all began is a clock that was set anew.
-        back &= time[known] + days > time[known[0]] + usual
-    rounds, is_new = np.cumsum(back), (steps < 0.0) & ~back & (form == "")
-    rounds -= np.maximum.accumulate(np.where(is_new, rounds, 0))
-    time = time.copy()
-    time[known] += days + by * rounds
-    return time, known[back]
+    is_over = back & (np.abs(steps + counter - usual) <= 3.0 * usual)
+    rounds = np.cumsum(is_over)
+    rounds -= np.maximum.accumulate(np.where(back & ~is_over, rounds, 0))
+    time[known] += counter * rounds
+    return time, known[is_over]
 
 
 def dated(dates, times):

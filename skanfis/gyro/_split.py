@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
+from scipy.signal import find_peaks
 
 from ..inspection.text import counted
-from ._columns import check_column, label_texts
+from ._columns import check_column
 from .errors import LogError
 
 # Relative to the largest rate: rates closer than that are one to any table.
@@ -43,8 +44,6 @@ _ROWS_PER_LEVEL = 3
 _WIDEST_GAP = 0.4
 # What a temperature must come back by for a turn: of its range, and at least [degC].
 _TURN, _SMALLEST_TURN = 0.2, 3.0
-# A turning point is looked for among so many means of each run.
-_MOST_POINTS = 5_000
 _NO_CLOCK = (
     " No column of the time was found, whose gaps would tell runs apart: name it with --columns "
     "time=NAME."
@@ -173,7 +172,7 @@ def choose_split(log, kind="auto", *, uses_output=True):
     """
     # Groups are numbered in the order of their names, whatever the order of the files.
     groups = {
-        name: np.unique(label_texts(log[name]).astype(str), return_inverse=True)[1]
+        name: np.unique(log[name].astype(str), return_inverse=True)[1]
         for name in ("device", "run")
         if name in log
     }
@@ -272,7 +271,7 @@ def fold_numbers(part, groups, n_parts):
 def _labels(log, part, groups):
     """A label for each row's group, such as "|25| °/s", or "2: 25 to 71 °C" for a leg."""
     if part in ("device", "run"):
-        return label_texts(log[part])
+        return log[part].astype(str).to_numpy(dtype=object)
     if part == "level":
         levels = log["rate"].abs().groupby(groups).median()
         names = [f"|{level:.4g}| °/s" for level in levels]
@@ -299,21 +298,10 @@ def find_legs(temperature, run=None):
 
 def _turns(temperature, least):
     """Rows at which the temperature turns, and comes back by ``least`` or more before the next."""
-    width = -(-temperature.size // _MOST_POINTS)
-    starts = np.arange(0, temperature.size, width)
-    means = np.add.reduceat(temperature, starts) / np.diff(starts, append=temperature.size)
-    turns, rising = [], 0  # the sign of the way, 0 while it is not known
-    low = high = 0  # places of the extremes since the last turn
-    for place, value in enumerate(means.tolist()):
-        low = place if value < means[low] else low
-        high = place if value > means[high] else high
-        if rising >= 0 and means[high] - value > least:
-            turns += [high] if rising else []
-            rising, low = -1, place
-        elif rising <= 0 and value - means[low] > least:
-            turns += [low] if rising else []
-            rising, high = 1, place
-    return starts[np.array(turns, dtype=int)]
+    highs, lows = (find_peaks(side, prominence=least)[0] for side in (temperature, -temperature))
+    turns = pd.concat([pd.Series("high", highs), pd.Series("low", lows)]).sort_index()
+    # Of several that are equally high, as rounding leaves at a soak, the first.
+    return turns.index[turns != turns.shift()]
 
 
 def _pieces(legs):

@@ -26,14 +26,12 @@ class TableSource:
     def place_of(self, row):
         return f"row {row + self._first}"
 
-    def pieces(self, places, n_rows, labels=()):
-        for begin in range(0, len(self._table), n_rows):
-            piece = self._table.iloc[begin : begin + n_rows][list(places)]
-            yield piece.astype(dict.fromkeys(labels, "string"))
+    def table(self, places, labels=(), n_rows=None):
+        return self._table[list(places)][:n_rows].astype(dict.fromkeys(labels, "string"))
 
 
 class ParquetSource(TableSource):
-    """A table of which a piece is held at a time, and no columns but those asked for."""
+    """A table of which no columns are held but those asked for."""
 
     def __init__(self, path):
         told = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
@@ -47,13 +45,15 @@ class ParquetSource(TableSource):
         if len(set(self.header)) < len(self.header):
             raise LogError(f"{path}: two columns have one name; rename one of them.")
 
-    def pieces(self, places, n_rows, labels=()):
-        names, begin = [self.header[place] for place in places], 0
+    def table(self, places, labels=(), n_rows=None):
+        names = [self.header[place] for place in places]
         with _read_as("Parquet", self.path):
-            for batch in self._file.iter_batches(n_rows, columns=names):
-                columns = {k: batch.column(self.header[k]).to_pandas() for k in places}
-                table = pd.DataFrame(columns).astype(dict.fromkeys(labels, "string"))
-                yield table.set_axis(pd.RangeIndex(begin, begin := begin + len(table)))
+            if n_rows and self._file.metadata.num_rows > n_rows:
+                found = next(self._file.iter_batches(n_rows, columns=names))
+            else:
+                found = self._file.read(columns=names)
+            columns = {place: found.column(self.header[place]).to_pandas() for place in places}
+        return pd.DataFrame(columns).astype(dict.fromkeys(labels, "string"))
 
 
 def matlab_source(path):

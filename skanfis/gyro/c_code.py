@@ -69,21 +69,17 @@ law   |    /* Temperature of the coil from the reference, and the coefficients t
 law   |    t = $temperature;
 law   |    amplitude = $name_polynomial($name_amplitude, $n_amplitude, t);
 law   |    sagnac = $name_polynomial($name_sagnac, $n_sagnac, t);
-law   |    sine = x[$output];
 law   |    if (sagnac == 0.0R) {
 law   |        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
 law   |    }
 law   |
 law   |    /* The size of the sine, and its sign apart; no amplitude, no phase. */
+law   |    sine = x[$output];
+law   |    sine = amplitude != 0.0R ? sine / amplitude : (sine < 0.0R ? -$MAX : $MAX);
 law   |    if (sine < 0.0R) {
 law   |        sine = -sine;
-law   |        sign = -sign;
+law   |        sign = -1;
 law   |    }
-law   |    if (amplitude < 0.0R) {
-law   |        amplitude = -amplitude;
-law   |        sign = -sign;
-law   |    }
-law   |    sine = amplitude > 0.0R ? sine / amplitude : $MAX;
 law   |    if (sine > $limit) {
 law   |        status = $NAME_OUT_OF_RANGE;
 silent|        return $NAME_REJECT(y, status);
@@ -166,8 +162,7 @@ def export_c_physics(
     ------
     ValueError
         If a parameter is none of the above, if the residual model has a step that cannot be folded
-        in, if one part asks for "nan" out of bounds and the other for "raise", or if the numbers
-        go beyond what "float" holds.
+        in, or if the numbers go beyond what "float" holds.
     TypeError
         If ``estimator`` is no such composition.
 
@@ -187,16 +182,11 @@ def export_c_physics(
     longest = LONGEST_NAME - len(_SUFFIX)
     stem, name = check_arguments(path, name, dtype, std, min_coverage, longest)
     law, rules = law_and_rules(estimator)
-    policies = {law.out_of_bounds, rules.model.out_of_bounds}
-    if policies >= set(SILENT):
-        raise ValueError(
-            "One of base and residual has out_of_bounds='nan', the other 'raise': one C function "
-            "leaves y as it is or writes NaN. Set both to one of the two."
-        )
     dialect = Dialect(name, dtype, std)
     part = RulesPart(rules.model, dialect, _SUFFIX, min_coverage)
     whole = _Composition(law, rules, part, dialect.dtype)
-    silent = next(iter(policies & set(SILENT)), None)
+    policies = rules.model.out_of_bounds, law.out_of_bounds
+    silent = next((policy for policy in policies if policy in SILENT), None)
     code = f'#include "{stem}.h"\n\n#include <float.h>\n#include <math.h>\n{part.text()}\n'
     code += _source_of(dialect, whole, silent) + self_test(_known_answers(whole), dialect)
     price = _cost(whole)

@@ -5,7 +5,6 @@ It writes files all together or not at all.
 
 import contextlib
 import os
-import pickle
 import shlex
 import signal
 import sys
@@ -14,9 +13,6 @@ import time
 from datetime import datetime
 from itertools import chain
 from pathlib import Path
-
-import joblib
-import pandas as pd
 
 from ..inspection.labels import printable
 from ..inspection.text import counted
@@ -41,12 +37,10 @@ NOT_KEPT = 6  # all is written; a limit is not kept, or not measured
 INTERRUPTED = 130  # as a shell says of Ctrl-C
 
 # What a calibration may write.
-_FILES = ("compensator.json", "compensator.joblib", "report.html", "rules.txt")
-_C_FILES = ("compensator.h", "compensator.c")
-_PDF = "report.pdf"
-_EVERY = (*_FILES, *_C_FILES, _PDF, *chain.from_iterable(FILES.values()))
-_MOST_ROWS = 100_000  # that are held
-_PICKLES = (".joblib", ".pkl", ".pickle")
+_FILES = (
+    *("compensator.json", "compensator.h", "compensator.c", "report.html", "report.pdf"),
+    *("rules.txt", *chain.from_iterable(FILES.values())),
+)
 _STAGED = ".skanfis-"  # of folders that hold files until all are written
 
 
@@ -76,15 +70,12 @@ def main(arguments=None):
 
 def _calibrate(options, tell):
     folder, paths = _where_from_and_to(options)
-    with _staged(folder, _EVERY if options.force else ()) as written:
-        tell(f"reading {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
+    with _staged(folder, _FILES if options.force else ()) as written:
         reading, recipe = _read(options, paths, tell)
         split = choose_split(reading.log, options.groups, uses_output="output" in recipe.inputs)
         tell(f"inputs: {', '.join(recipe.inputs)}")
         tell(f"check: {split.sentence}")
-        calibration = calibrate(
-            reading.log, split, recipe, tell, reading.name_row, n_rows=reading.n_rows
-        )
+        calibration = calibrate(reading.log, split, recipe, tell, reading.name_row)
         tell("drawing the report")
         checks = _write(calibration, options, reading.digests, written)
         targets = list(write_targets(calibration, options.target, written))
@@ -110,16 +101,12 @@ def _calibrate(options, tell):
 def _where_from_and_to(options):
     """The folder to write to and the logs, once the options are found to make sense."""
     check_once("--inputs", options.inputs or ())
-    targets = [text.partition(":")[0] for text in options.target]
-    check_once("--target", targets)
+    check_once("--target", [text.partition(":")[0] for text in options.target])
     paths = options.logs = find_logs(options.logs)
     folder = options.output or Path(f"{Path(paths[0]).stem or 'log'}-compensator")
     if folder.exists() and not folder.is_dir():
         raise ExistsError(f"{folder} is a file; --output is the folder to write to.")
-    names = [*_FILES, *(_C_FILES if options.c else ()), *([_PDF] if options.pdf else [])]
-    names += [name for target in targets for name in FILES[target]]
-    replaced = _EVERY if options.force else names
-    _refuse_existing([folder / name for name in replaced], options.force, paths)
+    _refuse_existing([folder / name for name in _FILES], options.force, paths)
     check_installed(options.pdf)
     return folder, paths
 
@@ -128,7 +115,7 @@ def _read(options, paths, tell):
     """The reading of a checked log, and what the options ask of it. What was found out is told."""
     required = dict.fromkeys(["temperature", "output", *columns_of(options.inputs or ())])
     request = request_of(options, required)
-    reading = read(paths, request, tell=tell, most_rows=_MOST_ROWS)
+    reading = read(paths, request, tell=tell)
     if reading.assumed:
         reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
     for note in reading.notes:
@@ -141,7 +128,7 @@ def _read(options, paths, tell):
                 f"--target {text}: the output was taken from {layout.name('output')!r}. Say which "
                 f"column is that of the axis {wanted} (--columns output=NAME), this one or another."
             )
-    numbers = {"row": reading.n_rows}
+    numbers = {"row": len(reading.log)}
     numbers |= {name: reading.log[name].nunique() for name in LABELS if name in reading.log}
     tell(", ".join(counted(f"{n:,}", name) for name, n in numbers.items()))
     try:
@@ -241,9 +228,8 @@ def _write(calibration, options, files, folder):
     if options.pdf:
         import weasyprint
 
-        weasyprint.HTML(string=page).write_pdf(folder / _PDF)
+        weasyprint.HTML(string=page).write_pdf(folder / "report.pdf")
     compensator.write_json(folder / "compensator.json")
-    joblib.dump(compensator, folder / "compensator.joblib")
     (folder / "rules.txt").write_text(rules_text(calibration), encoding="utf-8")
     if options.c:
         std, _, dtype = options.c.partition(":")
@@ -257,12 +243,14 @@ def _apply(options, tell):
         raise UsageError("--apply to several logs needs --output.")
     target = options.output or Path(f"{Path(paths[0]).stem}-compensated.csv")
     _refuse_existing([target], options.force, [*paths, options.apply])
-    compensator = _compensator_of(options)
+    try:
+        compensator = GyroCompensator.read_json(options.apply)
+    except ValueError as error:
+        raise UsageError(str(error)) from error
     needed = {"output", *columns_of(compensator.inputs)}
     units = dict(compensator.units)
     if units.get("output") in SIGNALS and "output" not in compensator.assumed:
         del units["output"]  # which is asked for again
-    tell(f"compensating {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))
     # The true rate is no input: where it is known, the errors are told.
     optional = tuple({"temperature", "rate"} - needed)
     reading = read(paths, request_of(options, sorted(needed), units, optional), tell=tell)
@@ -277,13 +265,11 @@ def _apply(options, tell):
         tell(f"note: {note}")
     log = reading.log
     if "time" in compensator.inputs:
-        start = log.get("power_on", log["time"]).iloc[0]
+        start = log["power_on"].iloc[0]
         reading.notes.append(f"power-on is taken to be where the clock begins, at {start:.10g} s")
     n_rows = counted(f"{len(log):,}", "row")
     tell(n_rows)
-    # Run by run, for the memory that this takes.
-    runs = log.groupby("run", sort=False, observed=True) if "run" in log else [("", log)]
-    rates = pd.concat([compensator.apply(part) for _, part in runs]).sort_index()
+    rates = compensator.apply(log)
     labels = [name for name in ("device", "run", "time") if name in log]
     tell(f"writing {target}")
     with _staged(target.parent) as folder:
@@ -293,28 +279,6 @@ def _apply(options, tell):
     _say(f"note           {note}" for note in reading.notes)
     tell("done")
     return DONE
-
-
-def _compensator_of(options):
-    """The compensator that the options name; of a .joblib it is said what reading it means."""
-    path = options.apply
-    if not path.endswith(_PICKLES):
-        if options.trust:
-            raise UsageError(f"--trust is for a model of {', '.join(_PICKLES)}; JSON needs none.")
-        try:
-            return GyroCompensator.read_json(path)
-        except ValueError as error:
-            raise UsageError(str(error)) from error
-    sys.stderr.write(f"{PROGRAM}: loading {printable(path)} runs the code that is in it.\n")
-    if not options.trust:
-        raise UsageError("--trust says that its maker is trusted; a compensator.json needs none.")
-    try:
-        found = joblib.load(path)
-    except (LookupError, EOFError, AttributeError, TypeError, pickle.UnpicklingError) as error:
-        raise UsageError(f"{path} is no file of joblib, or a damaged one.") from error
-    if not isinstance(found, GyroCompensator):
-        raise UsageError(f"{path} holds a {type(found).__name__}, no GyroCompensator.")
-    return found
 
 
 def _progress(quiet):

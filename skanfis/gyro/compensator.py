@@ -131,7 +131,9 @@ class GyroCompensator:
         OSError
             If the file cannot be written.
         """
-        Path(path).write_text(_text_of(self), encoding="utf-8", newline="\n")
+        text = _text_of(self)
+        _settings(json.loads(text))  # what could not be read again is not written
+        Path(path).write_text(text, encoding="utf-8", newline="\n")
 
     @classmethod
     def read_json(cls, path: str | PathLike[str]) -> Self:
@@ -194,10 +196,7 @@ def _text_of(compensator):
         "columns": columns,
         "model": json.loads(export_json(rules.model)),
     }
-    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
-    # What could not be read again is not written.
-    _settings(json.loads(text))
-    return text
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
 
 
 def features(log, inputs, time_constant):

@@ -210,25 +210,25 @@ class AllanDisplay(GyroDisplay):
     """Allan deviation of the error against averaging time, before and after compensation.
 
     The legend has N and B where the curve has them, the title a caution against smoothing.
-    ``from_predictions`` takes ``sampling_interval`` [s] and ``run``, labels of the runs or None.
-    No row may be NaN: a run with a gap is left out whole.
+    ``from_predictions`` takes ``time`` [s] and ``run``, labels of the runs or None. The curves are
+    of all stretches of ten rows or more that follow one another evenly, none of them NaN.
 
     Examples
     --------
     >>> from skanfis.gyro import AllanDisplay
-    >>> rates, options = ([0] * 20, [1, 2] * 10, [1, 1.1] * 10), {"sampling_interval": 1.0}
+    >>> rates, options = ([0] * 20, [1, 2] * 10, [1, 1.1] * 10), {"time": range(20)}
     >>> display = AllanDisplay.from_predictions(*rates, **options)  # doctest: +SKIP
     """
 
+    _PER_ROW = ("time",)
     _OPTIONAL = ("run",)
     _UNITS = ("deg/h", "deg/s")
 
-    def _computed(self, rows, sampling_interval):
-        for side in SIDES:
-            if rows[side].isna().any():
-                raise ValueError(f"{side} is NaN in some rows; leave out these runs.")
-        run, unit = rows.get("run"), self._unit
-        curves = {side: allan_deviation(rows[side], sampling_interval, run) for side in SIDES}
+    def _computed(self, rows):
+        time, run, unit = rows["time"].to_numpy(), rows.get("run"), self._unit
+        both = rows[[*SIDES]].notna().all(axis=1)
+        errors = {side: rows[side].where(both).to_numpy() for side in SIDES}
+        curves = {side: allan_deviation(error, time, run) for side, error in errors.items()}
         table = pd.concat(curves, names=["curve"]).reset_index("curve")
         # It takes deg/s and gives deg/h: 3600 times the unit of what it is given.
         table[["deviation", "error"]] /= PER_HOUR

@@ -24,9 +24,7 @@ from ._guess import Request, settle
 from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_source
 from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
-from .metrics import rows_by_run
 
-_ROWS = 100_000  # rows of a piece: no more texts of a file are held at once
 # A gap between two runs is so long, and so many steps: longer than what a logger drops.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
@@ -67,8 +65,7 @@ def read_log(
     -------
     log : DataFrame of shape (n_rows, n_parts)
         Columns by their parts, in the order above: numbers in s, degC and deg/s (a raw signal in
-        its own unit), run and device as categories of strings. Where runs were logged from later
-        than power-on, "power_on" is where the clock was then [s].
+        its own unit), run and device as categories of strings.
 
     Raises
     ------
@@ -95,16 +92,17 @@ def read_log(
     1   1.0         20.1  -380.0  20.0
     """
     request = Request(columns or {}, units or {}, tuple(require))
-    return read([paths] if isinstance(paths, str | os.PathLike) else list(paths), request).log
+    paths = [paths] if isinstance(paths, str | os.PathLike) else list(paths)
+    return read(paths, request).log.drop(columns="power_on", errors="ignore")
 
 
 @dataclass
 class Reading:
     """A log that has been read, with what was found out on the way, in sentences (``notes``).
 
-    Of the ``n_rows`` rows that there were ``log`` holds every k-th of each run where they are too
-    many. Row k of ``log`` is row ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences on
-    units, by part, that neither names nor options tell.
+    The column "power_on" of ``log`` is where the clock was when the run began [s]. Row k is row
+    ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences on units, by part, that neither
+    names nor options tell.
     """
 
     log: pd.DataFrame
@@ -112,14 +110,17 @@ class Reading:
     row: np.ndarray
     files: list
     notes: list
-    n_rows: int
-    digests: tuple
     assumed: dict
 
     @property
     def units(self):
         """Units of the parts in the (first) file."""
         return self.files[0].layout.units
+
+    @property
+    def digests(self):
+        """Name, bytes and SHA-256 of each file."""
+        return [(Path(file.path).name, file.size, file.digest) for file in self.files]
 
     def name_row(self, row):
         """In words, where a row of the log is found."""
@@ -132,62 +133,56 @@ class Reading:
         return file.located(error, self.row, None if len(self.files) == 1 else "the log")
 
 
-def read(paths, request, *, tell=lambda text: None, most_rows=np.inf):
+def read(paths, request, *, tell=lambda text: None):
     """Read files as :func:`read_log` does; returns a :class:`Reading`.
 
-    ``tell`` is called with a line of text for every file. Of more than ``most_rows`` rows every
-    k-th of each run is held, with k a power of two.
+    ``tell`` is called with a line of text for every file.
     """
     if not paths:
         raise ValueError("paths: at least one file is needed.")
-    digests = digests_of(paths)
     files: list[LogFile] = []
     tables: list[pd.DataFrame] = []
-    n_runs = 0
     for number, path in enumerate(paths):
+        tell(f"reading {path}" + (f", {number + 1} of {len(paths)}" if len(paths) > 1 else ""))
         files.append(LogFile(path, request, files[0] if files else None))
+        for same in [file for file in files[:-1] if file.digest == files[-1].digest]:
+            raise LogError(
+                f"{path}: holds the same bytes as {same.path}; a run that is there twice would be "
+                "tested by itself. Leave one of them out."
+            )
         tables.append(files[-1].read().assign(file=np.int32(number)))
-        tables[-1]["run"] += np.int32(n_runs)
-        n_runs += len(files[-1].runs)
-        if len(paths) > 1:
-            tell(f"read {number + 1:,} of {len(paths):,}: {path}, {files[-1].n_rows:,} rows")
-    table = pd.concat(tables) if len(tables) > 1 else tables[0]
-    tables.clear()
+    table = pd.concat(tables)
     if table.empty:
         raise LogError(f"{paths[0]}: has no rows with values.")
     layout, notes = files[0].layout, [note for file in files for note in file.notes]
-    runs = pd.concat([each.runs.assign(file=k) for k, each in enumerate(files)], ignore_index=True)
+    by_run = table.groupby(["file", *LABELS], sort=False, observed=True)
+    runs = by_run.size().index.to_frame(index=False)
+    table = table.drop(columns="device").assign(run=by_run.ngroup().to_numpy(np.int32))
     by_clock = request.guess and "time" in table and "run" not in layout.places
     if by_clock and len(runs) > 1 == runs["device"].nunique():
         table, runs, told = _joined_by_clock(table, runs, paths)
         notes += told
     assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}
-    n_rows, every = len(table), 1
-    while len(table) > most_rows * every:
-        every *= 2
-    if every > 1:
-        held = [rows[::every] for rows in rows_by_run(table["run"], n_rows)]
-        table = table.iloc[np.sort(np.concatenate(held))]
-        notes.append(f"of {n_rows:,} rows {len(table):,} are used, one in {every} of each run")
-    if "power_on" in table:
-        table, told = _since_power_on(table)
-        notes += told
     file, code, row = table["file"].to_numpy(), table["run"].to_numpy(), table.index.to_numpy()
     log = table.drop(columns=["file", "run"]).set_axis(pd.RangeIndex(len(table)))
-    del table
     if layout.assumed and request.assumed is None:
         found = settle_by_all(log, layout)
         if not found.items() <= layout.units.items():
             # All rows tell otherwise than the first ones.
             retold = replace(request, assumed=layout.units | found)
-            return read(paths, retold, tell=tell, most_rows=most_rows)
+            return read(paths, retold, tell=tell)
     names = _names_of_runs(runs, paths)
     if names is not None:
         log["run"] = pd.Categorical.from_codes(code, categories=pd.Index(names, dtype=object))
     if "device" in layout.places:
         log["device"] = pd.Categorical(runs["device"].to_numpy()[code])
-    notes = list(dict.fromkeys(notes))
-    return Reading(log, file, row, files, notes, n_rows, digests, assumed)
+    reading = Reading(log, file, row, files, list(dict.fromkeys(notes)), assumed)
+    if request.guess:
+        try:
+            check_rows(log, layout.units, code, request.optional)
+        except LogError as error:
+            raise reading.located(error) from error
+    return reading
 
 
 class LogFile:
@@ -199,10 +194,11 @@ class LogFile:
     def __init__(self, path, request, first=None):
         self.path, self._is_command, self._optional = path, request.guess, request.optional
         self.source = open_source(path)
+        with open(path, "rb") as opened:
+            self.digest = hashlib.file_digest(opened, "sha256").hexdigest()
+            self.size = opened.tell()
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
-        self.n_rows = 0
-        self.runs = pd.DataFrame()  # labels of device and run, of each run that was read
         self._form = ""  # of a clock of texts
         if first is None:
             return
@@ -217,10 +213,10 @@ class LogFile:
             )
 
     def read(self):
-        """The parts as a table in the units of a log, with the number of each row's run.
+        """The parts as a table in the units of a log, with labels of run and device.
 
         The index is the row's position in the file. The command leaves out rows that lack a value,
-        tells runs by the clock, and checks every row.
+        and tells runs by the clock.
         """
         log = self._converted()
         if self._is_command:
@@ -229,10 +225,7 @@ class LogFile:
         missing[[part for part in self._optional if part in log]] = False
         # A gap in one column is none in the clock.
         log = log[~missing[[part for part in ("time", *LABELS) if part in log]].any(axis=1)]
-        # In little memory.
-        unlabelled = pd.Categorical.from_codes(np.zeros(len(log), dtype=np.int8), [""])
-        for part in LABELS:
-            log[part] = log[part].astype("category") if part in log else unlabelled
+        log = log.assign(**{part: "" for part in LABELS if part not in log})
         if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
             runs = self._told_by_clock(log["time"].to_numpy())
             log = log[: len(runs)].assign(run=runs)
@@ -243,48 +236,31 @@ class LogFile:
         if not is_whole.all():
             self._note_gaps(missing)
             log = log[is_whole[log.index]]
-        by_run = log.groupby(list(LABELS), sort=False, observed=True)
-        self.runs = by_run.size().index.to_frame(index=False)
-        log = log.drop(columns="device").assign(run=by_run.ngroup().to_numpy(np.int32))
-        if self._is_command:
-            try:
-                check_rows(log, self.layout.units, log["run"].to_numpy(), self._optional)
-            except LogError as error:
-                raise self.located(error, log.index) from error
         return log
 
     def _converted(self):
         """All rows, in the units of a log."""
         places, dates = self.layout.places, self.layout.dates
         labels = [places[part] for part in LABELS if part in places]
-        columns: dict = {part: [] for part in places}
-        for table in self.source.pieces([*places.values(), *dates], _ROWS, labels):
-            self.n_rows += len(table)
-            try:
-                for part, place in places.items():
-                    values = table[place]
-                    if part == "time" and dates:
-                        values = dated(table[dates[0]], values)
-                    if part in LABELS:
-                        values = values.str.strip()
-                    else:
-                        values = pd.Series(self._numbers(values, part), table.index)
-                    check_values(values, part, self._is_command)
-                    columns[part].append(values)
-            except LogError as error:
-                raise self.located(error, table.index) from error
-        nothing = [pd.Series(dtype=float)]
-        # One by one, and not copied again: a long log is held once.
-        parts = {part: pd.concat(columns.pop(part) or nothing) for part in places}
+        table = self.source.table([*places.values(), *dates], labels)
+        parts = {}
+        try:
+            for part, place in places.items():
+                values = table[place]
+                if part == "time" and dates:
+                    values = dated(table[dates[0]], values)
+                values = values.str.strip() if part in LABELS else self._numbers(values, part)
+                check_values(values, part, self._is_command)
+                parts[part] = values
+        except LogError as error:
+            raise self.located(error, table.index) from error
         if "time" in parts:
             counter = convert(2.0**32, self.layout.units["time"])
-            time, back = going_on(parts["time"].to_numpy(), self._form, counter)
-            parts["time"] = pd.Series(time, parts["time"].index)
-            by = "one hour (daylight saving)" if self._form else "by the range of its 32 bits"
+            parts["time"], back = going_on(parts["time"], self._form, counter)
             for first in map(self.source.place_of, back[:1]):
-                places = f"{counted(back.size, 'place')}, first at {first}"
                 self.notes.append(
-                    f"{self.path}: the clock goes back {by} in {places}; the time goes on"
+                    f"{self.path}: the clock goes back by the range of its 32 bits in "
+                    f"{counted(back.size, 'place')}, first at {first}; the time goes on"
                 )
         return pd.DataFrame(parts, copy=False)
 
@@ -338,15 +314,15 @@ class LogFile:
         lacking, bad = missing.sum(), missing.any(axis=1)
         names = {self.layout.name(part): n for part, n in lacking[lacking > 0].items()}
         counts = ", ".join(f"{name!r} in {n:,}" for name, n in names.items())
-        said = f"{self.path}: {bad.sum():,} of {self.n_rows:,} rows lack a value ({counts})"
-        if 2 * bad.sum() > self.n_rows:
+        said = f"{self.path}: {bad.sum():,} of {bad.size:,} rows lack a value ({counts})"
+        if 2 * bad.sum() > bad.size:
             raise LogError(f"{said}: too many to go on without them.")
         place = self.source.place_of(int(bad.idxmax()))
         self.notes.append(f"{said}; they are left out, the first of them {place}")
 
     def _numbers(self, column, part):
         numbers = as_numbers(column, self.source.decimal)
-        if part == "time" and not self._form and not np.isfinite(numbers).any():
+        if part == "time" and not np.isfinite(numbers).any():
             self._form = clock_form(column)
             if self._form:
                 self.notes.append(f"the time is read in s, its form is {self._form}")
@@ -391,28 +367,6 @@ def _joined_by_clock(table, runs, paths):
     return table, runs[is_new], told
 
 
-def _since_power_on(log):
-    """The log with the time of each run's power-on, where that is not its first row; notes.
-
-    Clocks of several runs that overlap, one of them from zero on, all begin at power-on: of a run
-    that was logged from later on too.
-    """
-    runs = log.groupby("run")
-    times, start = runs["time"], runs["power_on"].first()
-    notes, earliest = [], start.min()
-    step = log["time"].diff().abs().median() if len(start) > 1 else 0.0
-    if 0.0 <= earliest <= step and earliest + step < start.max() < times.last().min():
-        late = np.count_nonzero(start > earliest + step)
-        notes.append(
-            f"in {counted(late, 'run')} the clock begins up to {start.max():.4g} s after power-on, "
-            f"which is at {earliest:.4g} s as in the others"
-        )
-        log = log.assign(power_on=earliest)
-    if (log["power_on"] == times.transform("first")).all():
-        log = log.drop(columns="power_on")
-    return log, notes
-
-
 def _longest_step(time):
     steps = np.diff(time)
     forward = steps[steps > 0.0]
@@ -444,23 +398,3 @@ def find_logs(arguments):
     """The files that are named, with patterns filled in for a shell that does not."""
     found = [[] if os.path.lexists(name) else sorted(glob(name)) for name in arguments]
     return [path for name, paths in zip(arguments, found, strict=True) for path in paths or [name]]
-
-
-def digests_of(paths):
-    """Name, bytes and SHA-256 of each file.
-
-    LogError where one log is there twice: as two runs, each would be tested by the other.
-    """
-    found: dict = {}
-    for path in paths:
-        open_source(path, head_only=True)  # what is no log is refused before all of it is read
-        with open(path, "rb") as opened:
-            digest = hashlib.file_digest(opened, "sha256").hexdigest()
-            size = opened.tell()
-        if digest in found:
-            raise LogError(
-                f"{path}: holds the same bytes as {found[digest][0]}; a run that is there twice "
-                "would be tested by itself. Leave one of them out."
-            )
-        found[digest] = path, size
-    return tuple((Path(path).name, size, digest) for digest, (path, size) in found.items())

@@ -55,14 +55,13 @@ class _Figure(NamedTuple):
     needs: tuple[str, ...]
     also: str = ""
     combine: Callable | None = None
-    fewest_runs: int = 1
 
     def of(self, rows):
         also = {self.also: rows[self.also]} if self.also in rows else {}
         return self.function(*(rows[name] for name in self.needs), **also)
 
     def by_run(self, rows):
-        runs = rows_by_run(rows.get("run"), rows["rate"].size, self.fewest_runs)
+        runs = rows_by_run(rows.get("run"), rows["rate"].size)
         parts = [{name: column[run] for name, column in rows.items()} for run in runs]
         return np.array([self.of(part) for part in parts])
 
@@ -86,13 +85,12 @@ def figures_of_merit(full_scale=1.0):
     def spread(values):
         known = values[np.isfinite(values)]
         if known.size < 2:
-            raise ValueError("No repeatability: fewer than two runs have rows at rest.")
+            raise ValueError("No repeatability: fewer than two runs tell it.")
         return np.std(known, ddof=1)
 
     def relative_spread(slopes):
         return _PPM * spread(slopes) / abs(np.mean(slopes))
 
-    from_run_to_run = partial(_Figure, fewest_runs=2)
     return [
         _Figure("residual_rms", "deg/s", rms, residual),
         _Figure("residual_peak", "deg/s", _peak, residual),
@@ -104,12 +102,10 @@ def figures_of_merit(full_scale=1.0):
         _Figure("scale_factor_nonlinearity", full, largest, rates),
         _Figure("scale_factor_nonlinearity_rms", full, root, rates),
         _Figure("scale_factor_asymmetry", "ppm", _asymmetry, rates),
-        from_run_to_run(
-            "scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread
-        ),
+        _Figure("scale_factor_repeatability", "ppm", scale_factor, rates, combine=relative_spread),
         _Figure("scale_factor_temperature_sensitivity", "ppm/degC", _sensitivity, (*rates, heat)),
         _Figure("bias", "deg/h", bias, of_bias),
-        from_run_to_run("bias_repeatability", "deg/h", bias, of_bias, combine=spread),
+        _Figure("bias_repeatability", "deg/h", bias, of_bias, combine=spread),
         _Figure("bias_temperature_sensitivity", "deg/h/degC", slope, (*of_bias, heat), also=ramp),
         _Figure(
             "bias_ramp_sensitivity", "deg/h/(degC/min)", slope_in_ramp, (*of_bias, ramp), also=heat
@@ -138,13 +134,11 @@ def table_of(columns, labels=(), gaps=()):
     return pd.DataFrame(found)
 
 
-def rows_by_run(run, n_rows, at_least=1):
+def rows_by_run(run, n_rows):
     """Positions of the rows of each run, in order of appearance."""
     if run is None:
         return [np.arange(n_rows)]
-    place, labels = pd.factorize(check_labels(run, "run", n_rows), use_na_sentinel=False)
-    if len(labels) < at_least:
-        raise ValueError(f"There is {len(labels)} run; at least {at_least} are needed.")
+    place = pd.factorize(check_labels(run, "run", n_rows), use_na_sentinel=False)[0]
     return np.split(np.argsort(place, kind="stable"), np.cumsum(np.bincount(place))[:-1])
 
 
@@ -195,36 +189,41 @@ def biases_of_branches(edges, rate, error, temperature, temperature_rate):
     places = bins + np.where(temperature_rate[moving] > 0, 0, edges.size - 1)
     by_place = pd.DataFrame(columns).groupby(places)
     means = by_place.mean()
-    error, *of_rate = (columns - means.loc[places].to_numpy()).T
-    coefficients = np.linalg.lstsq(np.transpose(of_rate), error, rcond=None)[0]
+    columns -= means.loc[places].to_numpy()
+    coefficients = np.linalg.lstsq(columns[:, 1:], columns[:, 0], rcond=None)[0]
     at_rest = (means[0] - means.iloc[:, 1:] @ coefficients).where(by_place.size() >= ROWS_PER_MEAN)
     return at_rest.reindex(range(2 * (edges.size - 1))).to_numpy().reshape(2, -1)
 
 
-def allan_deviation(error, sampling_interval, run=None):
-    """Overlapping Allan deviation, by allantools, in octaves up to a tenth of the run.
+def allan_deviation(error, time, run=None):
+    """Overlapping Allan deviation, by allantools, in octaves up to a tenth of a stretch.
 
-    Of an error that is evenly sampled within each run [deg/s]; the variances of runs are averaged.
-    A table: averaging_time [s], deviation and its standard error [deg/h], by IEEE 952: that of the
-    differences of means that do not overlap.
+    Of an error [deg/s] over all stretches of the runs in which it is known and the time goes on
+    evenly; their variances are averaged. A table: averaging_time [s], deviation and its standard
+    error [deg/h], by IEEE 952: that of the differences of means that do not overlap.
     """
     told = "The Allan deviation needs allantools: pip install allantools."
     oadev = needed("allantools", told).oadev
-    error = check_column(error, "error")
-    if not (sampling_interval > 0 and np.isfinite(sampling_interval)):
-        raise ValueError(f"sampling_interval={sampling_interval} must be positive [s].")
-    runs = [rows for rows in rows_by_run(run, error.size) if rows.size >= _ROWS_PER_TIME]
-    if not runs:
-        raise ValueError(f"No Allan deviation: no run has {_ROWS_PER_TIME} rows.")
-    parts = []
+    runs = [rows for rows in rows_by_run(run, time.size) if rows.size >= _ROWS_PER_TIME]
+    usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs])) if runs else np.nan
+    stretches, parts = [], []
     for rows in runs:
+        known, steps = np.isfinite(error[rows]), np.diff(time[rows])
+        is_next = (steps > 0.0) & (np.abs(steps - usual) <= _UNEVEN * usual)
+        is_next &= known[1:] & known[:-1]
+        stretches += np.split(rows, np.flatnonzero(~is_next) + 1)
+    for rows in stretches:
+        if rows.size < _ROWS_PER_TIME:
+            continue
         # In units of the time between rows.
         steps, deviations, _, counts = oadev(error[rows], data_type="freq", taus="octave")
         part = pd.DataFrame({"steps": steps, "sum": counts * deviations**2, "n": counts})
         part["apart"] = rows.size / steps - 1.0
         parts.append(part[steps * _ROWS_PER_TIME <= rows.size])
+    if not parts:
+        raise ValueError(f"nowhere do {_ROWS_PER_TIME} rows in range follow evenly in time")
     sums = pd.concat(parts).groupby("steps", as_index=False).sum()
-    curve = pd.DataFrame({"averaging_time": sums["steps"] * sampling_interval})
+    curve = pd.DataFrame({"averaging_time": sums["steps"] * usual})
     curve["deviation"] = PER_HOUR * np.sqrt(sums["sum"] / sums["n"])
     return curve.assign(error=curve["deviation"] / np.sqrt(2.0 * sums["apart"]))
 
@@ -259,25 +258,6 @@ def allan_figures(tau, deviation):
         # sigma = K sqrt(tau / 3) with tau in h; 60 is the root of the seconds in an hour.
         "rate_random_walk": (drift * np.sqrt(3.0) * 60.0, no_drift),
     }
-
-
-def rows_for_allan(time, run, answered):
-    """Rows of stretches without a gap in time or answers; the time between them [s]; their labels.
-
-    ValueError says why there is no Allan deviation.
-    """
-    runs = [rows for rows in rows_by_run(run, time.size) if rows.size >= _ROWS_PER_TIME]
-    usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs])) if runs else np.nan
-    stretches = []
-    for rows in runs:
-        is_next = np.abs(np.diff(time[rows]) - usual) <= _UNEVEN * usual
-        is_next &= answered[rows[1:]] & answered[rows[:-1]]
-        stretches += np.split(rows, np.flatnonzero(~is_next) + 1)
-    stretches = [rows for rows in stretches if rows.size >= _ROWS_PER_TIME]
-    if not stretches:
-        raise ValueError(f"nowhere do {_ROWS_PER_TIME} rows in range follow evenly in time")
-    labels = np.repeat(np.arange(len(stretches)), [rows.size for rows in stretches])
-    return np.concatenate(stretches), float(usual), labels
 
 
 def _line(rate, output):

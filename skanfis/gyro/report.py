@@ -93,11 +93,8 @@ def gyro_report(
             f"rate_unit={rate_unit!r} must be one of {', '.join(RATE_UNITS)}, or None."
         )
     given = {*table, "output", "residual", "error", "of_bias"}
-    figures = [
-        figure
-        for figure in metrics.figures_of_merit(full_scale)
-        if given.issuperset(figure.needs) and (figure.fewest_runs < 2 or run is not None)
-    ]
+    every = metrics.figures_of_merit(full_scale)
+    figures = [figure for figure in every if given.issuperset(figure.needs)]
     answered = {name: table[name].to_numpy()[is_answered] for name in table}
     answered["of_bias"] = metrics.rows_of_bias(answered["rate"])
     units, kind = _units(answered)
@@ -109,7 +106,7 @@ def gyro_report(
     report, notes = pd.DataFrame(names, columns=["figure", "unit"]), {}
     for side in sides:
         cells = _cells(answered, side, figures, units, kind, draws)
-        cells += _allan_cells(table, side, is_answered.to_numpy()) if allan else []
+        cells += _allan_cells(table, side, is_answered) if allan else []
         *values, notes[side] = zip(*cells, strict=True)
         report[[side, f"{side}_low", f"{side}_high"]] = np.transpose(values)
     # Before compensation nothing is reduced.
@@ -189,11 +186,9 @@ def _of_side(rows, side):
 
 def _allan_cells(part, side, is_answered):
     """Coefficients read off the Allan deviation, where rows follow one another."""
-    time = part["time"].to_numpy()
+    error = (part[side] - part["rate"]).where(is_answered).to_numpy()
     try:
-        rows, interval, stretches = metrics.rows_for_allan(time, part.get("run"), is_answered)
-        error = (part[side] - part["rate"]).to_numpy()[rows]
-        curve = metrics.allan_deviation(error, interval, run=stretches)
+        curve = metrics.allan_deviation(error, part["time"].to_numpy(), part.get("run"))
         found = metrics.allan_figures(*curve[["averaging_time", "deviation"]].to_numpy().T)
     except ValueError as reason:
         return [(np.nan, np.nan, np.nan, str(reason))] * len(metrics.ALLAN_FIGURES)

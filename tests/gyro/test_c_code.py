@@ -89,6 +89,12 @@ def rules_raise():
     return model, X
 
 
+def rules_raise_beside_a_law_of_nan():
+    model, X = rules_raise()
+    model.base_.set_params(out_of_bounds="nan")
+    return model, X
+
+
 def cubic():
     """A polynomial in the place of the law, on four columns."""
     X = simulated()[["time", "temperature", "thermal_rate", "output"]]
@@ -100,7 +106,8 @@ def silent_cubic():
     return polynomial(X, model.base_.predict(X), "nan"), X
 
 
-CASES = [whole, everything, silent, rules_raise, cubic, silent_cubic]
+RAISE = [rules_raise, rules_raise_beside_a_law_of_nan]
+CASES = [whole, everything, silent, *RAISE, cubic, silent_cubic]
 
 
 def around(X, n_rows=4000):
@@ -159,7 +166,7 @@ def test_answers_as_predict(case, dtype, limit, std, tmp_path):
     scale = np.abs(wanted[bits == 0] if "cubic" in case.__name__ else simulated()["rate"]).max()
     assert off[bits == 0].max() < limit * scale
     assert off[answered].max() < limit * np.abs(wanted[answered]).max()
-    is_silent = case in (silent, rules_raise, silent_cubic)
+    is_silent = case in (silent, *RAISE, silent_cubic)
     assert (answered < sure).any() == is_silent
     silence = y[np.append(answered < sure, [True] * 3), 0]
     nothing = np.nan if "silent" in case.__name__ and std == "c99" else UNTOUCHED
@@ -238,14 +245,6 @@ def refused(base=None, residual=None):
         ({"base": LinearRegression()}, TypeError, "base must be an OpenLoopArcsineRegressor"),
         ({"residual": LinearRegression()}, TypeError, "LinearRegression has no rules"),
         ({"residual": make_pipeline(PolynomialFeatures(), quick(1))}, ValueError, "Polynomial"),
-        (
-            {
-                "base": OpenLoopArcsineRegressor("output", "temperature", out_of_bounds="nan"),
-                "residual": quick(n_mfs=1, out_of_bounds="raise"),
-            },
-            ValueError,
-            "Set both to one of the two",
-        ),
     ],
 )
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")

@@ -133,9 +133,6 @@ def test_bad_columns_are_named(log):
         draw(rate, before, after * np.nan, **columns)
     with pytest.raises(TypeError, match="GroupResidualDisplay needs groups, with one value per"):
         draw(rate, before, after)
-    lacking = after.where(after.index > 0)
-    with pytest.raises(ValueError, match="after is NaN in some rows; leave out these runs"):
-        AllanDisplay.from_predictions(rate, before, lacking, sampling_interval=1.0)
 
 
 def test_error_band_keeps_every_peak_and_leaves_gaps_open(log):
@@ -254,7 +251,7 @@ def test_allan_curve_of_white_noise_and_drift(rng):
     pytest.importorskip("allantools")
     noise = 0.01 * rng.standard_normal(40_000)
     drift = 0.02 * np.linspace(-1.0, 1.0, 40_000)
-    rates, options = (np.zeros(40_000), noise + drift, noise), {"sampling_interval": 0.1}
+    rates, options = (np.zeros(40_000), noise + drift, noise), {"time": 0.1 * np.arange(40_000)}
     display = AllanDisplay.from_predictions(*rates, **options)
     labels = [text.get_text() for text in display.ax_.get_legend().get_texts()]
     walks = [float(label.partition("N = ")[2].split()[0]) for label in labels]
@@ -267,3 +264,9 @@ def test_allan_curve_of_white_noise_and_drift(rng):
     assert slow.ax_.get_ylabel() == "Allan deviation [°/s]"
     found = slow.tables()["allan"]["Allan deviation [deg/s]"]
     np.testing.assert_allclose(found, table["Allan deviation [deg/h]"] / 3600.0, rtol=1e-12)
+    # A row that was refused ends a stretch of both curves.
+    noise[20_000] = np.nan
+    parted = AllanDisplay.from_predictions(*rates, **options).tables()["allan"]
+    assert parted["averaging time [s]"].max() == table["averaging time [s]"].max() / 2.0
+    last = parted.groupby("curve")["Allan deviation [deg/h]"].last()
+    assert last["before"] > 2 * last["after"]

@@ -56,7 +56,8 @@ def test_files_of_a_logger_that_begins_a_new_one_now_and_then(tmp_path, truth):
         reading = found(paths, columns={"time": clock})
         same(reading, truth)
         assert (pd.factorize(reading.log["run"])[0] == pd.factorize(truth["run"])[0]).all()
-        assert "power_on" not in reading.log
+        start = reading.log.groupby("run", observed=True)["time"].transform("first")
+        assert (reading.log["power_on"] == start).all()
         assert any("the run goes on in 10 files, first" in note for note in reading.notes)
         # Out of their order none goes on.
         assert found(paths[::-1], columns={"time": clock}).log["run"].nunique() == 15
@@ -162,26 +163,6 @@ def test_many_files_a_pattern_and_headers_that_nearly_agree(tmp_path, truth):
     table.rename(columns={"output": "gyro_counts"}).to_csv(folder / "r4.csv", index=False)
     with pytest.raises(LogError, match=r"r4.csv: the output is in counts, in .* in deg/s"):
         found([*paths, str(folder / "r4.csv")])
-
-
-def test_of_too_many_rows_every_kth_of_a_run_is_held(tmp_path, monkeypatch, truth):
-    monkeypatch.setattr("skanfis.gyro.log._ROWS", 37)
-    table = truth[[*PARTS, "run"]].sort_values("time", kind="stable").reset_index(drop=True)
-    table.to_csv(tmp_path / "log.csv", index=False)
-    request = Request(**ASKED)
-    some = read([tmp_path / "log.csv"], request, most_rows=100)
-    place = table.groupby("run").cumcount()
-    expected = table[place % 4 == 0]
-    assert (some.n_rows, len(some.log)) == (300, 75)
-    same(some, expected, PARTS)
-    assert some.log["run"].astype(int).tolist() == expected["run"].astype(int).tolist()
-    assert some.notes[1:] == ["of 300 rows 75 are used, one in 4 of each run"]
-    assert some.name_row(7).endswith(f"line {expected.index[7] + 2}")
-    # A row that would not be held is checked all the same.
-    table.loc[290, "time"] = 0.0
-    table.to_csv(tmp_path / "log.csv", index=False)
-    with pytest.raises(LogError, match=r"line 292, column 'time': time does not increase"):
-        read([tmp_path / "log.csv"], request, most_rows=100)
 
 
 @pytest.mark.parametrize(
@@ -370,18 +351,6 @@ def test_a_gap_in_one_column_is_no_power_on(tmp_path, truth):
     assert "50 of 120 rows lack a value" in "; ".join(reading.notes)
     # Where the clock stops as well, one was.
     assert found_in(tmp_path, table.drop(index=range(40, 90))).log["run"].nunique() == 2
-
-
-@pytest.mark.parametrize("form", ["%Y-%m-%d %H:%M:%S", "%H:%M:%S"])
-def test_a_clock_that_is_put_one_hour_back_goes_on(tmp_path, truth, form):
-    clock = pd.Timestamp("2026-10-25 01:00") + pd.to_timedelta(20.0 * np.arange(300), unit="s")
-    local = clock - pd.to_timedelta(3600.0 * (np.arange(300) >= 250), unit="s")
-    table = truth[PARTS].assign(time=local.strftime(form))
-    reading = found_in(tmp_path, table)
-    np.testing.assert_allclose(np.diff(reading.log["time"]), 20.0)
-    assert "run" not in reading.log
-    told = "; ".join(reading.notes)
-    assert "the clock goes back one hour (daylight saving) in 1 place, first at line 252" in told
 
 
 @pytest.mark.parametrize(("unit", "steps", "times"), [(1e-6, 2e7, 2), (1e-3, 6e5, 1)])

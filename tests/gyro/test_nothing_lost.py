@@ -10,7 +10,6 @@ from pathlib import Path
 
 import joblib
 import numpy as np
-import pandas as pd
 import pytest
 
 pytest.importorskip("matplotlib")
@@ -23,7 +22,7 @@ from ..quick import quick
 
 @pytest.fixture
 def files(tmp_path, monkeypatch):
-    """A log and a compensator of a constant, as JSON and as a .joblib."""
+    """A log and a compensator of a constant."""
     monkeypatch.chdir(tmp_path)
     log = make_ofog(n_devices=1, n_runs=3, duration=300.0, random_state=0)
     named = log.rename(columns={"temperature": "temp_c", "output": "gyro_dps"})
@@ -31,7 +30,6 @@ def files(tmp_path, monkeypatch):
     constant = quick(1, order=0).fit(log[["temperature"]], np.full(len(log), 0.5))
     compensator = GyroCompensator(constant, ("temperature",))
     compensator.write_json("model.json")
-    joblib.dump(compensator, "model.joblib")
     return log
 
 
@@ -56,25 +54,16 @@ def test_a_calibration_never_replaces_its_log(files, tmp_path, name, say):
     assert (code, f"{name} is what is read" in err) == (4, True)
 
 
-def test_a_joblib_runs_code_and_needs_trust(files, tmp_path, say):
-    arguments = ["--apply", "model.joblib", "log.csv", "--quiet"]
-    code, _, told = say(*arguments)
-    assert (code, "loading model.joblib runs the code that is in it" in told) == (2, True)
-    assert "--trust says that its maker is trusted" in told
-    assert not (tmp_path / "log-compensated.csv").exists()
-    code, _, told = say(*arguments, "--trust")
-    assert (code, "runs the code" in told) == (0, True)
-    rates = pd.read_csv("log-compensated.csv")
-    np.testing.assert_allclose(rates["rate_compensated"], files["output"] - 0.5)
-    Path("damaged.joblib").write_bytes(b"{}")
-    joblib.dump({"a": 1}, "model.joblib")
-    for model, message in (
-        ("model.joblib", "holds a dict"),
-        ("damaged.joblib", "is no file of joblib, or a damaged one"),
-        ("model.json", "JSON needs none"),
-    ):
-        code, _, told = say("--apply", model, "log.csv", "--trust", "--force")
-        assert (code, message in told) == (2, True)
+class RunsCode:
+    def __reduce__(self):
+        return Path.touch, (Path("ran"),)
+
+
+def test_a_pickle_is_refused_and_not_loaded(files, say):
+    joblib.dump(RunsCode(), "model.joblib")
+    code, _, told = say("--apply", "model.joblib", "log.csv", "--quiet")
+    assert (code, "is no gyro compensator: it is not the JSON" in told) == (2, True)
+    assert not Path("ran").exists()
 
 
 def test_apply_tells_errors_of_flagged_rows_apart(files, tmp_path, say):
@@ -106,7 +95,7 @@ def test_an_interrupt_while_pandas_reads_is_one(tmp_path, monkeypatch):
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
         with pytest.raises(KeyboardInterrupt):
-            list(source.pieces([0, 1], 10))
+            source.table([0, 1])
     finally:
         signal.signal(signal.SIGINT, before)
 

@@ -170,11 +170,14 @@ def test_legs_are_those_of_the_chamber(turns):
     assert np.mean(legs != expected) < 0.02
 
 
-def test_every_run_has_legs_of_its_own_and_long_logs_are_thinned():
+def test_every_run_has_legs_of_its_own_and_rounding_makes_none():
     one = cycle(20, 60, 20, n_rows=30_000)
     legs = find_legs(np.concatenate([one, one]), np.repeat(["b", "a"], one.size))
     assert np.bincount(legs).size == 4
     np.testing.assert_allclose(np.bincount(legs), 30_000, rtol=0.02)
+    # Soaks at which the last digit flickers.
+    soaks = cycle(20, 20, 60, 60, 20, 20, 60).round()
+    assert np.unique(find_legs(soaks)).tolist() == [0, 1, 2]
 
 
 def test_pieces_leave_each_temperature_to_the_other_direction():

@@ -1,11 +1,9 @@
 """Tables in C, in floating or fixed point, in the place of an error."""
 
-from dataclasses import replace
 from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from ...export.c.dialect import STATUS, Dialect, kept_lines, remark
 from ...export.c.header import header_of, input_lines
@@ -25,12 +23,12 @@ NAMES, _N_CELLS = {1: "gyro_table", 2: "gyro_rate_table"}, {1: 64, 2: 24}
 _MARGIN = 1.001  # of a fixed-point scale, for what is rounded
 
 _CODE = """
-table |/* The value between two. */
-table |static $wide $name_between($wide a, $wide b, $wide part)
-table |{
-table |    return a + (b - a) * part$per_one;
-table |}
-table |
+      |/* The value between two. */
+      |static $wide $name_between($wide a, $wide b, $wide part)
+      |{
+      |    return a + (b - a) * part$per_one;
+      |}
+      |
       |int $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
       |{
       |    $wide part[$NAME_N_INPUTS], value, cells;
@@ -55,10 +53,6 @@ fixed |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
       |        }
       |        part[i] = (value - ($wide)at[i] * $name_step[i])$times_one / $name_step[i];
       |    }
-cubic |    value = $name_values[at[0]][3];
-cubic |    for (i = 2; i >= 0; --i) {
-cubic |        value = value * part[0] + $name_values[at[0]][i];
-cubic |    }
 line  |    i = at[0];
 line  |    value = $name_between($name_values[i], $name_values[i + 1], part[0]);
 plane |    for (i = 0; i < 2; ++i) {
@@ -83,8 +77,6 @@ class Table:
         self.names = error.names
         n_cells = n_cells or _N_CELLS[len(self.names)]
         real, self.wide, self.bits = TYPES[type_name]
-        of_axes = "plane" if len(self.names) > 1 else "line"
-        self.facts = {"table", of_axes, "fixed" if self.bits else "real"}
         self.dialect = Dialect(NAMES[len(self.names)], real, "c99")
         self._place(error.ends[:, 0], error.ends[:, 1], n_cells)
         axes = zip(self.low, self.high, self.step, self.counts, self.scale, strict=True)
@@ -148,7 +140,8 @@ class Table:
         tables = {name: each.astype(dialect.dtype) for name, each in tables.items()}
         tables["last"] = self.counts - 1
         d = self.low.size
-        code = kept_lines(_CODE, self.facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
+        facts = {"plane" if d > 1 else "line", "fixed" if bits else "real"}
+        code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
         words = {"wide": self.wide, "per_one": f" / {one}" if bits else ""}
         words["times_one"] = f" * {one}" if bits else ""
         source = [
@@ -157,7 +150,7 @@ class Table:
             dialect.write(code, **words),
             self_test(self._answers(), dialect),
         ]
-        n_products = 2**d - 1 if "table" in self.facts else 3
+        n_products = 2**d - 1
         lines = [
             *map(remark, notes),
             f"{' x '.join(map(str, self.counts))} cells; C99, {dialect.real}.",
@@ -197,22 +190,6 @@ class Table:
         answers = X, y[:, None], np.array([slack])
         X, y, tolerance = (each.astype(self.dialect.dtype) for each in answers)
         return X, y, status, tolerance
-
-
-class Spline(Table):
-    """A cubic on every cell of the temperature, with a steady slope and bend, in floating point."""
-
-    def __init__(self, error, type_name, n_cells=16):
-        super().__init__(error, type_name, n_cells)
-        line = self.piecewise
-        found = CubicSpline(line.edges[0], self.values)
-        coefficients = found.c[::-1] * np.asarray(line.widths) ** np.arange(4)[:, None]
-        self.values = coefficients.T.astype(self.dialect.dtype)
-        sizes, eps = np.abs(self.values).max(axis=0), np.finfo(self.dialect.dtype).eps
-        slack = eps * (8.0 * n_cells * (sizes @ np.arange(4)) + 24.0 * sizes.sum())
-        powers, held = np.arange(4)[:, None], self.values.T.astype(float)
-        self.piecewise = replace(line, powers=powers, coefficients=held, slack=float(slack))
-        self.dialect, self.facts = replace(self.dialect, name="gyro_cubic"), {"cubic", "real"}
 
 
 def _shown(power):

@@ -10,12 +10,11 @@ from ..c_compensator import SUBTRACT, input_units, notes_on, raw_rate_of
 from ..metrics import rms
 from .autopilots import NOTES, Cubic
 from .error_model import ErrorModel, difference, spread
-from .tables import Spline, Table
+from .tables import Table
 
 FILES = {
     "table": ("gyro_table.h", "gyro_table.c"),
     "rate-table": ("gyro_rate_table.h", "gyro_rate_table.c"),
-    "cubic": ("gyro_cubic.h", "gyro_cubic.c"),
     "px4": ("px4.params",),
     "ardupilot": ("ardupilot.parm",),
 }
@@ -44,8 +43,7 @@ def _write(calibration, text, folder):
     make: Any = partial(Cubic, autopilot=name)
     is_code = name not in NOTES
     if is_code:
-        kind = Spline if name == "cubic" else Table
-        make = partial(kind, type_name=(details or ["float"])[0])
+        make = partial(Table, type_name=(details or ["float"])[0])
     error = ErrorModel(compensator, compensator.estimator, X)
     made = make(error)
     low, high = difference(error, made.piecewise)

@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 
 from skanfis.gyro.targets.error_model import difference
-from skanfis.gyro.targets.tables import TYPES, Spline, Table
+from skanfis.gyro.targets.tables import TYPES, Table
 
 from ...export.c_compiler import UNTOUCHED, evaluate_all, needs_compiler
 from .models import ENDS, error_of
@@ -17,8 +17,6 @@ REALS = {"float": np.float32, "double": np.float64, "q31": np.int32, "q15": np.i
 
 
 def made(kind, type_name, n_cells=8):
-    if kind == "cubic":
-        return error_of("rules", 1), Spline(error_of("rules", 1), type_name, n_cells)
     error = error_of("rules") if kind == "rate-table" else error_of("rules", 1)
     return error, Table(error, type_name, n_cells)
 
@@ -32,15 +30,8 @@ def scales_of(header):
 
 
 @needs_compiler
-@pytest.mark.parametrize(
-    ("kind", "type_name"),
-    [
-        *(("table", name) for name in TYPES),
-        *(("rate-table", name) for name in TYPES),
-        ("cubic", "float"),
-        ("cubic", "double"),
-    ],
-)
+@pytest.mark.parametrize("type_name", TYPES)
+@pytest.mark.parametrize("kind", ["table", "rate-table"])
 def test_what_c_says_is_within_the_certain_difference(kind, type_name, tmp_path):
     error, table = made(kind, type_name)
     code, real = table.code(["A note */ with stars * 2."], UNITS), REALS[type_name]
@@ -88,19 +79,6 @@ def test_a_table_is_the_interpolation_between_values_of_the_error(kind):
     points = np.random.default_rng(6).uniform(*ENDS[: len(axes)].T, (500, len(axes)))
     wanted = RegularGridInterpolator(axes, values)(points)
     np.testing.assert_allclose(table.piecewise(points), wanted, atol=1e-12)
-
-
-def test_a_piecewise_cubic_is_a_cubic_where_the_error_is_and_nearer_than_lines_elsewhere():
-    cubic = error_of("polynomial", 1)
-    points = np.random.default_rng(6).uniform(*ENDS[:1].T, (500, 1))
-    found = Spline(cubic, "double", 4).piecewise
-    np.testing.assert_allclose(found(points), cubic(points), rtol=0, atol=1e-13)
-    largest = {}
-    for kind in ("cubic", "table"):
-        error, target = made(kind, "double", 16)
-        low, high = difference(error, target.piecewise)
-        largest[kind] = max(-low, high)
-    assert largest["cubic"] < 0.1 * largest["table"]
 
 
 def test_the_header_says_what_goes_in_and_comes_out():
