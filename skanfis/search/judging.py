@@ -3,8 +3,8 @@ r"""What is expected of new rows: the error on rows that had no part in anything
 A sequence of candidates is grown anew without some of the rows, and its members are judged on
 these, size by size. With few rows in five folds; with many, half of the rows are enough to grow and
 half to judge, once. Rows that come in groups, runs of an instrument say, are left out in whole
-groups, a fifth of them at a time. Rows beyond the range that a fold grows on do not judge, unless
-most are.
+groups, in ten folds: the fewer runs are left out together, the smaller the gaps that they leave.
+Rows beyond the range that a fold grows on do not judge, unless most are.
 
 Rows are dealt in the order of their target, so that neither the order in which they come nor that
 of the columns makes a difference; what is equal in all columns is one row with a weight.
@@ -16,8 +16,8 @@ from sklearn.model_selection import GroupKFold
 from ..learning.data import StandardisedData
 from .sample import DIGITS, search_sample
 
-# Folds, and rows that are enough to judge on.
-FOLDS, ENOUGH = 5, 200
+# Folds of rows, and of groups; rows that are enough to judge on.
+FOLDS, GROUP_FOLDS, ENOUGH = 5, 10, 200
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
@@ -38,7 +38,7 @@ def n_groups(rows: StandardisedData) -> int:
 def folds(rows: StandardisedData):
     """Positions of the other rows and of its own, of every fold; whole groups, if there are any."""
     if n_groups(rows) > 1:
-        n_folds = min(FOLDS, n_groups(rows))
+        n_folds = min(GROUP_FOLDS, n_groups(rows))
         return list(GroupKFold(n_folds).split(rows.X, groups=rows.groups))
     every, n_folds = np.arange(rows.n_rows), min(FOLDS, rows.n_rows)
     return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
