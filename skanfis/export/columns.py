@@ -1,6 +1,5 @@
 """The inputs of a folded model, read from the user's tables; levels of one-hot encoded columns."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -25,24 +24,23 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """An input z: raw column ``source`` is offset + scale z, or z is an output of an encoder."""
+    """An input z: raw column ``source`` is offset + scale z, or z indicates a level of it."""
 
     source: int
     name: str
     offset: float = 0.0
     scale: float = 1.0
-    encode: Callable[..., np.ndarray] | None = None
-    place: int = -1  # of the output
-    level: Level | None = None  # that an encoder's output indicates
-    fill: Any = None  # replaces missing values
-    imputed: Callable[..., np.ndarray] | None = None  # the column as an imputer hands it on
+    place: int = -1  # of the indicator among an encoder's outputs
+    level: Level | None = None  # that it indicates
 
-    def values(self, X, encoded):
-        """The input, in raw units, from the user's table and the outputs of encoders."""
-        if self.encode is not None:
-            return encoded[self.encode][:, self.place].astype(np.float64)
-        numbers = as_numbers(part_of(X, [self.source]))[:, 0]
-        return numbers if self.fill is None else np.where(np.isnan(numbers), self.fill, numbers)
+    def values(self, X, z):
+        """The input as the user's table has it; an indicator, and what was missing, out of z."""
+        scaled_back = self.offset + self.scale * z
+        if self.level is not None:
+            # 0 or 1 again, whatever scalers behind the encoder have made of it.
+            return np.round(scaled_back)
+        numbers = as_numbers(safe_indexing(X, [self.source], axis=1))[:, 0]
+        return np.where(np.isnan(numbers), scaled_back, numbers)
 
 
 def by_column(levels):
@@ -60,9 +58,14 @@ def by_column(levels):
 
 @dataclass(frozen=True)
 class Reader:
-    """Takes the inputs of a model out of tables with columns of these names."""
+    """Takes the inputs of a model out of tables with columns of these names.
+
+    The steps before the model tell what imputers fill and encoders indicate.
+    """
 
     inputs: list[Column]
+    places: list[int]  # of these among what the last step hands on
+    steps: list[Any]
     names: list[str]
     is_named: bool
 
@@ -81,17 +84,12 @@ class Reader:
                 f"{', '.join(map(repr, given))}."
             )
         # What does not reach the model need not be numbers.
-        encoders = {one.encode for one in self.inputs if one.encode}
-        table = X if given is not None or encoders else as_numbers(X)
-        if (shape := np.shape(table))[1:] != (len(self.names),) or shape[0] == 0:
-            raise ValueError(f"X has the shape {shape}: the estimator takes rows of {known}.")
-        encoded = {encode: encode(table) for encode in encoders}
-        rows = np.column_stack([one.values(table, encoded) for one in self.inputs])
+        Z = X = X if hasattr(X, "shape") else np.asarray(X, dtype=object)
+        if X.shape[1:] != (len(self.names),) or X.shape[0] == 0:
+            raise ValueError(f"X has the shape {X.shape}: the estimator takes rows of {known}.")
+        for step in self.steps:
+            Z = step.transform(Z)
+        pairs = zip(self.inputs, as_numbers(Z).T[self.places], strict=True)
+        rows = np.column_stack([one.values(X, z) for one, z in pairs])
         check_finite(rows, "X", [one.name for one in self.inputs])
         return rows
-
-
-def part_of(X, columns):
-    """Columns of a frame, or of anything that is an array, by their positions."""
-    table = X if hasattr(X, "columns") else np.asarray(X, dtype=object)
-    return safe_indexing(table, columns, axis=1)
