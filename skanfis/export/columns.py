@@ -8,6 +8,8 @@ import numpy as np
 from .._sklearn import safe_indexing
 from .._validation import as_numbers, check_finite, refuse_lazy
 
+_ROUNDING = 1e-9  # of a sum of shares
+
 
 class Level(NamedTuple):
     """A level of a raw column, and all other levels; none of these if there may be unknown ones."""
@@ -43,17 +45,28 @@ class Column:
         return np.where(np.isnan(numbers), scaled_back, numbers)
 
 
-def by_column(levels):
-    """By raw column the names of its indicators, and the names of its levels without one."""
-    found: dict[str, list[str]] = {}
-    for name, level in levels.items():
-        found.setdefault(level.column, []).append(name)
-    unnamed = {}
-    for column, names in found.items():
-        named = {levels[name].level for name in names}
-        others = [other for other in levels[names[0]].others if other not in named]
-        unnamed[column] = others or ["other"]
-    return found, unnamed
+class Category(NamedTuple):
+    """The inputs that indicate levels of one raw column, and what each of them tells."""
+
+    inputs: list[int]
+    levels: list[str]
+    others: list[str]  # of training rows that have none of these, if there are such rows
+
+
+def categories(model, levels, among=None):
+    """By raw column its :class:`Category`, of all inputs of a model or of those ``among`` them."""
+    found: dict[str, Category] = {}
+    for j in range(model.n_inputs) if among is None else among:
+        if level := levels.get(model.input_names[j]):
+            own = found.setdefault(level.column, Category([], [], []))
+            own.inputs.append(j)
+            own.levels.append(level.level)
+    for column, own in found.items():
+        if model.reference[own.inputs].sum() < 1.0 - _ROUNDING:
+            every = [one for one in levels.values() if one.column == column]
+            indicated = {one.level for one in every}
+            own.others.extend([one for one in every[0].others if one not in indicated] or ["other"])
+    return found
 
 
 @dataclass(frozen=True)

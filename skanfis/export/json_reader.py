@@ -357,7 +357,7 @@ def _tree(groups, table):
     ends_alone = len({*leaves} - places) == len(leaves)
     if not (is_one_to_one and ends_alone and len(sides) == 2 * tree.n_nodes):
         raise ValueError(
-            "rules: the paths are no tree: each cut stands at one place, and at every place paths go "
-            "on to both sides of one cut, or one path ends."
+            "rules: the paths are no tree: each cut stands at one place, and there paths go on to "
+            "both of its sides; no path ends within another."
         )
     return tree

@@ -11,7 +11,7 @@ import pandas as pd
 
 from .._validation import check_count
 from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, rounded
-from ..export.columns import by_column
+from ..export.columns import categories
 from ..export.folding import fold_with_reader
 from ..learning.data import never_changes
 from ..policies import SILENT, policy_in_words
@@ -31,7 +31,7 @@ _WIDTH, _DIGITS_OF_RANGE = 96, 4
 # Inputs in no rule are named if they are so few, and else counted.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
-ROUNDING = 1e-9  # of a sum of shares
+_ROUNDING = 1e-9  # of a percentage
 # How to compute a prediction; the parts in braces are left out where there is no such thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
@@ -286,7 +286,7 @@ def _on_rows(model, found, r):
 def percent(part):
     """Write "48 %", "6.5 %", and of what is not all "99.5 %"."""
     share, rest = 100.0 * part, 100.0 * (1.0 - part)
-    if rest > ROUNDING and f"{share:.0f}" == "100":
+    if rest > _ROUNDING and f"{share:.0f}" == "100":
         return f"{plain(rounded(share, rest, 1))} %"
     return f"{share:{'.0f' if share >= 10.0 else '.2g'}} %"
 
@@ -319,31 +319,29 @@ def _legend(said, found, precision):
     has_part[model.antecedent.term_inputs] = True
     # Where nothing is predicted outside the range of any input, all of them have.
     with_part = set(called if model.out_of_bounds in SILENT else compress(called, has_part))
-    without_indicator = by_column(said.levels)[1]
-    categories: dict[str, list[int]] = {}
+    listed = []
     for j, name in enumerate(model.input_names):
         if called[j] not in with_part:
             continue
         terms = [term for term in named if term["input"] == name]
         if model.two_valued[j] and name in said.levels and not terms:
-            categories.setdefault(called[j], []).append(j)
+            listed.append(j)
             continue
         range_of = range_in_digits(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
         lines.append(f"  {name}: {range_of}")
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
-    for name, own in categories.items():
-        levels = [said.levels[model.input_names[j]].level for j in own]
-        if model.reference[own].sum() < 1.0 - ROUNDING:
-            levels += [other for other in without_indicator[name] if other not in levels]
-        lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
+    lists = categories(model, said.levels, listed)
+    for name, one in lists.items():
+        levels = ", ".join([*one.levels, *one.others])
+        lines.append(_wrapped(f"  {name}: {levels}", later=6 * " "))
     unnamed = [one for one in dict.fromkeys(called) if one not in with_part]
     with_slope = set(compress(called, model.coefficients[:, 1:].any(axis=(0, 2))))
     for has_slope, told in ((True, "slopes too small to be written"), (False, "in no rule")):
         if alike := [one for one in unnamed if (one in with_slope) == has_slope]:
             names = ", ".join(alike) if len(alike) <= MOST_NAMED else f"{len(alike)} more inputs"
             lines.append(_wrapped(f"  {names}: {told}", later=6 * " "))
-    if with_part - categories.keys():
+    if with_part - lists.keys():
         words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
         lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
