@@ -11,12 +11,13 @@ from scipy.stats import qmc
 
 from .._validation import check_count, feature_indices
 from ..export import fold
+from ..membership import FAMILIES
 from ..model import TSKModel
 from ..policies import SILENT
 from .construction import is_in_order
 from .enclosure import Enclosure, reach_of
 from .search import largest
-from .terms import is_known, size
+from .terms import size
 
 # Points that are tried first: so many all over the box, and its corners if inputs are this few.
 _POINTS, _MOST_INPUTS_OF_CORNERS = 1024, 8
@@ -265,7 +266,7 @@ def _checked(model, box, tol, max_boxes):
     """The frozen model in the user's units, and the box."""
     model = fold(model)
     for group in model.antecedent.groups:
-        if not is_known(group.family):
+        if group.family not in FAMILIES.values():
             raise ValueError(
                 f"The ranges of {group.family.name!r} memberships are not known: give another mf."
             )

@@ -21,7 +21,6 @@ from .constraints import Constraints
 from .construction import ONE_RULE, RuleOrder, nearest_in_order, with_equal_widths
 from .contradictions import contradicted
 from .quadratic_program import InfeasibleError
-from .way_back import WayBack
 
 # Ratios of squared errors, constrained over free: beyond the first, consequents nearer to the free
 # fit are sought; beyond the other, consequents that were drawn are worth a warning.
@@ -53,7 +52,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     ended, drawn = found.evaluation(local), float(is_line)
     held, before = found.model(local, is_line), float(evaluation.mean_squared_error)
     if ended.mean_squared_error > _COSTLY * before:
-        nearer, way = WayBack(found).nearest_proven(local)
+        nearer, way = found.nearest_proven(local)
         ended_nearer = found.evaluation(nearer)
         if ended_nearer.mean_squared_error < ended.mean_squared_error:
             held, ended, drawn = found.model(nearer), ended_nearer, way

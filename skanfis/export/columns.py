@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from .._sklearn import safe_indexing
 from .._validation import as_numbers, check_finite, refuse_lazy
@@ -97,9 +98,13 @@ class Reader:
                 f"{', '.join(map(repr, given))}."
             )
         # What does not reach the model need not be numbers.
-        Z = X = X if hasattr(X, "shape") else np.asarray(X, dtype=object)
+        X = X if hasattr(X, "shape") else np.asarray(X, dtype=object)
         if X.shape[1:] != (len(self.names),) or X.shape[0] == 0:
             raise ValueError(f"X has the shape {X.shape}: the estimator takes rows of {known}.")
+        Z = X
+        # Steps warn where there are names in one of fit and transform alone.
+        if self.steps and self.is_named == (given is None):
+            Z = pd.DataFrame(X, columns=self.names) if self.is_named else np.asarray(X)
         for step in self.steps:
             Z = step.transform(Z)
         pairs = zip(self.inputs, as_numbers(Z).T[self.places], strict=True)
