@@ -1,7 +1,7 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -209,7 +209,7 @@ def readability(
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     X : array-like of shape (n_samples, n_features)
-        Rows, read block by block; those outside the range count at its nearest point.
+        Rows; those outside the range count at its nearest point.
     y : array-like of shape (n_samples,) or (n_samples, n_outputs), default=None
         The target, whose standard deviation is the unit; None takes the predictions.
     sample_weight : array-like of shape (n_samples,), default=None
@@ -234,42 +234,27 @@ def readability(
     >>> readability(ANFISRegressor(n_mfs=2, agreement=1.0).fit(X, y), X, y).findings
     []
     """
-    return _readability(estimator, X, y, sample_weight)
-
-
-def _readability(estimator, X, y, sample_weight):
-    # Apart and without types: of what is array-like, mypy knows neither rows nor a shape.
     model, reader = fold_with_reader(estimator)
-    n_rows = X.shape[0] if hasattr(X, "shape") else len(X)
-    take = getattr(X, "iloc", X)
-
-    def read(part):
-        try:
-            return reader(take[part])
-        except (TypeError, ValueError):
-            # The whole table: the error then names the row by its place in it.
-            reader(X)
-            raise
-
+    rows, target, weight = reader(X), None, None
     if y is not None:
-        y = as_numbers(y, "y")
-        y = y.reshape(-1, 1) if y.ndim == 1 else y
-        if y.shape[1] != model.n_outputs:
+        target = as_numbers(y, "y")
+        target = target.reshape(-1, 1) if target.ndim == 1 else target
+        if target.shape[1] != model.n_outputs:
             raise ValueError(
-                f"y has {y.shape[1]} columns; the model has {model.n_outputs} outputs: "
+                f"y has {target.shape[1]} columns; the model has {model.n_outputs} outputs: "
                 f"{', '.join(map(repr, model.output_names))}."
             )
-        check_finite(y, "y", model.output_names)
+        check_finite(target, "y", model.output_names)
     if sample_weight is not None:
-        sample_weight = column_or_1d(check_array(sample_weight, dtype=float, ensure_2d=False))
-        positive_weights(sample_weight, n_rows)
-    check_consistent_length(X, y, sample_weight)
-    return Readability(model, measure(model, read, n_rows, y, sample_weight), reader.levels)
+        weight = column_or_1d(check_array(sample_weight, dtype=float, ensure_2d=False))
+        positive_weights(weight, len(rows))
+    check_consistent_length(rows, target, weight)
+    return replace(readability_of_rows(model, rows, target, weight), levels=reader.levels)
 
 
 def readability_of_rows(model, X, y=None, sample_weight=None):
     """Measure a model on arrays that have been checked."""
-    return Readability(model, measure(model, lambda part: X[part], X.shape[0], y, sample_weight))
+    return Readability(model, measure(model, X, y, sample_weight))
 
 
 def _on_signs(said):
