@@ -41,7 +41,7 @@ class Consequents:
         self.problem, self.free, self.constraints = problem, free, constraints
         # That outputs are held on top is monotone: what rules keep, predictions do.
         self._base = replace(model, target=None)
-        self.inequalities, self.output_names = constraints.inequalities(model), model.output_names
+        self.inequalities = constraints.inequalities(model)
         # A model with an output for each local consequent: what it adds to the standardised target.
         each = np.eye(problem.n_columns)
         self.columns = self._model(each, unit_scale(each))
