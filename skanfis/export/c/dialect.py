@@ -20,8 +20,6 @@ _FUNCTIONS = ("exp", "log", "sqrt", "asin")
 _NUMBER_IN_TEMPLATE = re.compile(r"(\d+\.\d+)R\b")
 # Decimal digits that give back the very same float or double.
 _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
-# A name in a comment stays on its line.
-_LONGEST_COMMENT = 60
 # Unsigned types of positions, and the bytes that they take nearly everywhere.
 _INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 _BITS = {
@@ -144,17 +142,10 @@ def literals(values, indent=""):
     )
 
 
-def comment(text):
-    """Any name as something that cannot end a comment, continue a line or make a trigraph."""
-    text = str(text)
-    rest = "..." if len(text) > _LONGEST_COMMENT else ""
-    return remark(text[:_LONGEST_COMMENT]) + rest
-
-
 def remark(text):
-    """A text of any length for a comment, in which a star may multiply."""
+    """A text for a comment that cannot end it, continue a line or make a trigraph."""
     unsafe = r"[^ -~]|\\|\?(?=\?)|\*(?=/)|(?<=/)\*"
-    return re.sub(unsafe, lambda found: f"<U+{ord(found[0]):04X}>", text)
+    return re.sub(unsafe, lambda found: f"<U+{ord(found[0]):04X}>", str(text))
 
 
 def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_NAME):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...digits import range_in_digits
 from ...policies import policy_in_words
-from .dialect import comment, remark, status_lines
+from .dialect import remark, status_lines
 
 # Of the width of a range: to about a hundred-thousandth.
 _DIGITS = 6
@@ -72,7 +72,7 @@ def header(source, units, notes):
     if source.limits is not None:
         ends = zip(model.output_names, *source.limits.T, strict=True)
         told = ", ".join(
-            f"{comment(name)} from {range_in_digits(a, b, _DIGITS)}" for name, a, b in ends
+            f"{remark(name)} from {range_in_digits(a, b, _DIGITS)}" for name, a, b in ends
         )
         lines += ["", f"Outputs are saturated beyond limits that were asked for: {told}."]
     lines += _precision_lines(numbers)
@@ -102,8 +102,8 @@ def input_lines(names, low, high, units):
 def _ranges(names, low, high, units):
     units, ranges = units or {}, zip(names, low, high, strict=True)
     for k, (name, least, most) in enumerate(ranges):
-        unit = f" [{comment(units[name])}]" if name in units else ""
-        yield f"  [{k}] {comment(name)}{unit}: {range_in_digits(least, most, _DIGITS)}"
+        unit = f" [{remark(units[name])}]" if name in units else ""
+        yield f"  [{k}] {remark(name)}{unit}: {range_in_digits(least, most, _DIGITS)}"
 
 
 def policy_line(model, where):
