@@ -9,7 +9,6 @@ inputs of the folded model in its place.
 from collections import UserList
 from copy import copy
 from dataclasses import replace
-from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,8 @@ from ..model import TSKModel
 from ..naming import default_term_names, distinct
 from ..options import policy_of
 from .columns import Column, Level, Reader
+
+_SCALERS = (StandardScaler, RobustScaler, MaxAbsScaler, MinMaxScaler)
 
 
 def fold(estimator: Any) -> TSKModel:
@@ -207,9 +208,10 @@ def _columns_after(label, step, columns):
             if not (isinstance(part, str) and part == "drop")
             for column in _columns_after(name, part, [columns[j] for j in _chosen(chosen, step)])
         ]
+    units = _offsets_and_scales(label, step, len(columns))
     return [
         replace(column, offset=column.offset + column.scale * offset, scale=column.scale * scale)
-        for column, (offset, scale) in zip(columns, _offsets_and_scales(label, step), strict=False)
+        for column, (offset, scale) in zip(columns, units, strict=True)
     ]
 
 
@@ -251,23 +253,19 @@ def _chosen(chosen, transformer):
     return np.ravel(safe_indexing(places, chosen, axis=1))
 
 
-def _offsets_and_scales(label, scaler):
+def _offsets_and_scales(label, scaler, n_columns):
     """Of x = offset + scale z, for every column of a fitted scaler."""
     kind = type(scaler)
     if getattr(scaler, "clip", False):
         _refuse(label, scaler, "clip=True bends it at the edge; out_of_bounds='clip' does the same")
-    offset: Any = None
-    scale: Any = None
-    if kind is StandardScaler:
-        offset, scale = (scaler.mean_ if scaler.with_mean else None), scaler.scale_
-    elif kind in (RobustScaler, MaxAbsScaler):
-        offset, scale = getattr(scaler, "center_", None), scaler.scale_
-    elif kind is MinMaxScaler:
-        offset, scale = -scaler.min_ / scaler.scale_, 1.0 / scaler.scale_
-    elif kind is not FunctionTransformer or scaler.func or scaler.inverse_func:
+    is_identity = kind is FunctionTransformer and not (scaler.func or scaler.inverse_func)
+    if kind not in _SCALERS and not is_identity:
         _refuse(label, scaler, "it does not map every column alone by a positive scale")
-    offsets = repeat(0.0) if offset is None else offset.tolist()
-    return zip(offsets, repeat(1.0) if scale is None else scale.tolist(), strict=False)
+    (offset,) = scaler.inverse_transform(np.zeros((1, n_columns)))
+    scale = getattr(scaler, "scale_", None)
+    scale = np.ones(n_columns) if scale is None else scale
+    # That of MinMaxScaler is the inverse of the others'.
+    return zip(offset, 1.0 / scale if kind is MinMaxScaler else scale, strict=True)
 
 
 def _refuse(label, step, reason):
