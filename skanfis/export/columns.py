@@ -54,17 +54,22 @@ class Category(NamedTuple):
     others: list[str]  # of training rows that have none of these, if there are such rows
 
 
-def categories(model, levels, among=None):
+def columns_of(model):
+    """The column that each input is of; those of one category by its name."""
+    return [model.levels.get(name, (name,))[0] for name in model.input_names]
+
+
+def categories(model, among=None):
     """By raw column its :class:`Category`, of all inputs of a model or of those ``among`` them."""
     found: dict[str, Category] = {}
     for j in range(model.n_inputs) if among is None else among:
-        if level := levels.get(model.input_names[j]):
+        if level := model.levels.get(model.input_names[j]):
             own = found.setdefault(level.column, Category([], [], []))
             own.inputs.append(j)
             own.levels.append(level.level)
     for column, own in found.items():
         if model.reference[own.inputs].sum() < 1.0 - _ROUNDING:
-            every = [one for one in levels.values() if one.column == column]
+            every = [one for one in model.levels.values() if one.column == column]
             indicated = {one.level for one in every}
             own.others.extend([one for one in every[0].others if one not in indicated] or ["other"])
     return found
@@ -82,11 +87,6 @@ class Reader:
     steps: list[Any]
     names: list[str]
     is_named: bool
-
-    @property
-    def levels(self) -> dict[str, Level]:
-        """What each indicator tells, by its name, such as "fibre_PM"."""
-        return {one.name: one.level for one in self.inputs if one.level is not None}
 
     def __call__(self, X) -> np.ndarray:
         """The rows; ValueError for other columns, and for numbers that are not finite."""

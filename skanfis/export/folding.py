@@ -138,7 +138,8 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
     for label, transformer in reversed(target_steps):
         model = _with_raw_target(model, label, transformer)
     inputs, before = [columns[j] for j in order], [step for _, step in steps]
-    return model, Reader(inputs, order, before, names, given is not None)
+    levels = {one.name: one.level for one in inputs if one.level is not None}
+    return replace(model, levels=levels), Reader(inputs, order, before, names, given is not None)
 
 
 def last_step(estimator: Any) -> Any:

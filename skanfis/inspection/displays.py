@@ -221,7 +221,7 @@ class ResponseSurfaceDisplay:
                     f"{model.minimum[j]:g}. Name two inputs that vary."
                 )
         k = checked_position(output, model.output_names, "output")
-        (xx0, xx1), rows, others = section_over(model, both, grid_resolution, held, reader.levels)
+        (xx0, xx1), rows, others = section_over(model, both, grid_resolution, held)
         coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
         display = cls(
             xx0=xx0,
@@ -292,7 +292,7 @@ def pyplot():
     return plt
 
 
-def section_over(model, both, n_points, held, levels):
+def section_over(model, both, n_points, held):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 
     The others take their value in ``held``, or their mean in training, in few digits, or what is
@@ -304,7 +304,7 @@ def section_over(model, both, n_points, held, levels):
     held = {} if held is None else held
     if not isinstance(held, Mapping):
         raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")
-    names, columns = model.input_names, categories(model, levels)
+    names, columns = model.input_names, categories(model)
     taken = {*both, *(checked_position(feature, names) for feature in held)}
     for one in columns.values():
         # The commonest level is held, unless a level is drawn or held already.

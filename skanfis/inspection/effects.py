@@ -229,7 +229,7 @@ class Study:
         if not isinstance(groups, Mapping | None):
             raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
         found, levels = {}, {}
-        for name, one in categories(model, read.levels).items():
+        for name, one in categories(model).items():
             found[name] = tuple(one.inputs)
             levels[name] = one.levels + ([" or ".join(one.others)] if one.others else [])
         for label, columns in (groups or {}).items():

@@ -1,7 +1,6 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,7 @@ from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import as_numbers, check_finite, positive_weights
 from ..digits import in_digits
-from ..export.columns import Level
-from ..export.folding import fold_with_reader
+from ..export import fold_with_rows
 from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
@@ -44,8 +42,6 @@ class Readability:
         The model that was measured.
     measures : Measures
         The figures as arrays.
-    levels : dict, default={}
-        What indicators of a ``OneHotEncoder`` tell, by name; the functions here find them.
     is_of_chunk : bool, default=False
         Whether the rows are those of the latest ``partial_fit`` alone, which is then said.
 
@@ -79,18 +75,17 @@ class Readability:
 
     model: TSKModel
     measures: Measures
-    levels: Mapping[str, Level] = field(default_factory=dict)
     is_of_chunk: bool = False
 
     @property
     def _said(self):
-        return Sentences.of(self.model, levels=self.levels)
+        return Sentences.of(self.model)
 
     @property
     def rules(self) -> Any:
         """The rules; see the class."""
         found, said = self.measures, self._said
-        premises = np.array(premise_texts(said.model, self.levels), dtype=object)
+        premises = np.array(premise_texts(said.model), dtype=object)
         rule = np.repeat(np.arange(premises.size), self.model.n_outputs)
         return pd.DataFrame(
             {
@@ -234,8 +229,7 @@ def readability(
     >>> readability(ANFISRegressor(n_mfs=2, agreement=1.0).fit(X, y), X, y).findings
     []
     """
-    model, reader = fold_with_reader(estimator)
-    rows, target, weight = reader(X), None, None
+    (model, rows), target, weight = fold_with_rows(estimator, X), None, None
     if y is not None:
         target = as_numbers(y, "y")
         target = target.reshape(-1, 1) if target.ndim == 1 else target
@@ -249,7 +243,7 @@ def readability(
         weight = column_or_1d(check_array(sample_weight, dtype=float, ensure_2d=False))
         positive_weights(weight, len(rows))
     check_consistent_length(rows, target, weight)
-    return replace(readability_of_rows(model, rows, target, weight), levels=reader.levels)
+    return readability_of_rows(model, rows, target, weight)
 
 
 def readability_of_rows(model, X, y=None, sample_weight=None):
@@ -272,7 +266,7 @@ def _on_signs(said):
             up, down = (np.flatnonzero(is_clear & (sign * slopes > 0.0)) for sign in (1.0, -1.0))
             if up.size and down.size:
                 name, of_output = model.input_names[j], f" (of {output})" * (model.n_outputs > 1)
-                level = said.levels.get(name)
+                level = model.levels.get(name)
                 cause = f"by {name}{of_output}"
                 if level is not None:
                     cause = f"if {level.said(True)}{of_output},"

@@ -26,19 +26,19 @@ def conditions(model):
     return [dict(sorted(rule.items())) for rule in rules]
 
 
-def premise_texts(model, levels=()):
+def premise_texts(model):
     """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" of a rule that asks nothing."""
-    names = model.input_names
     return [
-        " AND ".join(condition(names[j], term, levels) for j, term in rule.items()) or "anything"
+        " AND ".join(condition(model, j, term) for j, term in rule.items()) or "anything"
         for rule in conditions(model)
     ]
 
 
-def condition(name, term, levels=()):
+def condition(model, j, term):
     """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator."""
-    if term in ("0", "1") and name in levels:
-        return levels[name].said(term == "1")
+    name = model.input_names[j]
+    if term in ("0", "1") and name in model.levels:
+        return model.levels[name].said(term == "1")
     return f"{name} {term}" if term.startswith(("<", ">")) else f"{name} is {term}"
 
 
@@ -62,7 +62,7 @@ def parts_led(model):
     return rows / rows.sum() if has_training_data(model) else model.rule_weights
 
 
-def readability_in_training(estimator, model, levels):
+def readability_in_training(estimator, model):
     """The fit's ``readability_`` for ``model``, which is the estimator folded and renamed; or None.
 
     Behind a scaler the numbers are rounded in other units, and what the text errs is not known.
@@ -79,7 +79,7 @@ def readability_in_training(estimator, model, levels):
     )
     if not np.array_equal(own, fitted):
         measures = replace(measures, printed_errors=np.full(model.n_outputs, np.nan))
-    return replace(found, model=model, measures=measures, levels=levels)
+    return replace(found, model=model, measures=measures)
 
 
 def rename(model, feature_names, output_names):
@@ -219,7 +219,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
     source = order[row, place]
     beyond_names = [f"beyond {name}" for name in model.input_names]
-    texts = [*premise_texts(model, read.levels), *beyond_names, "held"]
+    texts = [*premise_texts(model), *beyond_names, "held"]
     return pd.DataFrame(
         {
             "row": row,

@@ -13,7 +13,6 @@ is that line's at the centre, so that f_r is also v_r less this part, plus the l
 rule's own slopes. Text, HTML, tables, and the model as it is printed are made of these numbers.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -21,7 +20,7 @@ import numpy as np
 
 from ..antecedent.tree import CRISP
 from ..digits import MOST_DIGITS, rounded
-from ..export.columns import Level, categories
+from ..export.columns import categories, columns_of
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..reading_cost import UNSAID
@@ -49,10 +48,9 @@ class Sentences:
     is_own: np.ndarray  # which of them the rule states itself
     common_place: np.ndarray  # (n_inputs,)
     common: np.ndarray  # the common line; zero where nothing is in common, (n_inputs, n_outputs)
-    levels: Mapping[str, Level]  # as ``Reader.levels``
 
     @classmethod
-    def of(cls, model: TSKModel, precision: int = PRECISION, levels=None):
+    def of(cls, model: TSKModel, precision: int = PRECISION):
         """What a model says; of 17 digits nothing is lost."""
         slopes = np.zeros((model.n_rules, model.n_inputs, model.n_outputs))
         slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
@@ -63,13 +61,12 @@ class Sentences:
             np.where(two_valued, np.round(np.clip(at, 0.0, 1.0)), rounded(at, model.spread, digits))
             for at in (centers, model.reference)
         )
-        is_common, levels, told = model.common_slopes, levels or {}, slopes
+        is_common, told = model.common_slopes, slopes
         is_fixed = np.zeros(places.shape, dtype=bool)
         if precision < MOST_DIGITS:
             # A case that all rows of a rule are, or none is, changes nothing there.
             is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
-            now = slopes, places, is_common
-            told, places, is_common = _from_a_level(model, levels, *now, ~is_fixed)
+            told, places, is_common = _from_a_level(model, slopes, places, is_common, ~is_fixed)
         values = np.einsum("rj,rjo->ro", places - model.reference, slopes)
         values += model.coefficients[:, 0]
         slopes = rounded(told, noise / model.spread[:, None], precision)
@@ -83,10 +80,10 @@ class Sentences:
         # What terms may be off by is a part of the output's deviation, not of the noise.
         more = int(np.floor(np.log10(scale / noise)).max(initial=0.0))
         digits = min(precision + more, MOST_DIGITS)
-        written, says_where = _written_terms(model, levels, digits)
+        written, says_where = _written_terms(model, digits)
         values, of_common = (rounded(one, noise, precision) for one in (values, of_common))
         of_rules = places, values, of_common, slopes, is_own
-        return cls(written, says_where, *of_rules, common_place, common, levels)
+        return cls(written, says_where, *of_rules, common_place, common)
 
     @property
     def printed(self) -> TSKModel:
@@ -112,12 +109,7 @@ class Sentences:
         return int(self.n_numbers.sum() + np.count_nonzero(self.common))
 
 
-def columns_of(model, levels):
-    """The column that each input is of; those of one category by its name."""
-    return [levels.get(name, (name,))[0] for name in model.input_names]
-
-
-def _from_a_level(model, levels, slopes, places, is_common, is_told):
+def _from_a_level(model, slopes, places, is_common, is_told):
     """Slopes and places of rules that say their value at one level of a category; what is common.
 
     Where all rows have a level their slopes are known but for a constant, and that level has none.
@@ -125,7 +117,7 @@ def _from_a_level(model, levels, slopes, places, is_common, is_told):
     the slope that is left then stands in its place. All of it where that is no more to say.
     """
     slopes, places, is_common = slopes.copy(), places.copy(), is_common.copy()
-    whole = [one.inputs for one in categories(model, levels).values() if not one.others]
+    whole = [one.inputs for one in categories(model).values() if not one.others]
     for own, (r, center) in product(map(np.array, whole), enumerate(model.rule_centers)):
         free = own[~is_common[r, own]]
         if free.size < own.size and (own.size > 2 or not is_told[r, free].any()):
@@ -150,7 +142,7 @@ def _resolution(model, slopes):
     return scale, np.clip(noise, _FINEST * scale, scale)
 
 
-def _written_terms(model, levels, digits):
+def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
     A name that somebody has given stays. Where every training row is on one side of a cut, to so
@@ -181,7 +173,7 @@ def _written_terms(model, levels, digits):
         start += group.n_terms
     written = replace(antecedent, groups=tuple(groups))
     if digits < MOST_DIGITS:
-        written = written.without_implied(UNSAID, columns_of(model, levels))
+        written = written.without_implied(UNSAID, columns_of(model))
     return replace(model, antecedent=written, term_names=tuple(names)), says_where
 
 
