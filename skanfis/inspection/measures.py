@@ -39,12 +39,9 @@ def measure(model, X, y=None, sample_weight=None):
     """Measure the rules on rows; y None is the predictions."""
     if y is None:
         y = model.with_out_of_bounds("clip").predict(X)
-    y, weight = np.asarray(y, dtype=float), np.ones(len(X))
-    if sample_weight is None:
-        target = column_statistics(y)
-    else:
-        weight = np.asarray(sample_weight, dtype=float)
-        target = column_statistics(y[weight > 0.0], weight[weight > 0.0])
+    y = np.asarray(y, dtype=float)
+    weight = np.ones(len(X)) if sample_weight is None else np.asarray(sample_weight, dtype=float)
+    target = column_statistics(y[weight > 0.0], weight[weight > 0.0])
     printed = Sentences.of(model).printed
     sums = (
         rule_sums(model, printed, target, X[part], y[part], weight[part])

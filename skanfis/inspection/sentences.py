@@ -52,8 +52,7 @@ class Sentences:
     @classmethod
     def of(cls, model: TSKModel, precision: int = PRECISION):
         """What a model says; of 17 digits nothing is lost."""
-        slopes = np.zeros((model.n_rules, model.n_inputs, model.n_outputs))
-        slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
+        slopes = model.consequents[:, 1:]
         scale, noise = _resolution(model, slopes)
         two_valued = model.two_valued
         digits, centers = max(_DIGITS_OF_PLACE, precision), model.rule_centers

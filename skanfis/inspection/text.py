@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, rounded
+from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, told_apart
 from ..export import fold
 from ..export.columns import categories, columns_of
 from ..learning.data import never_changes
@@ -31,7 +31,7 @@ _WIDTH, _DIGITS_OF_RANGE = 96, 4
 # Inputs in no rule are named if they are so few, and else counted.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
-_ROUNDING = 1e-9  # of a percentage
+_DECIMALS_OF_PERCENT = 9  # the others are rounding's
 # How to compute a prediction; the parts in braces are left out where there is no such thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
@@ -283,10 +283,8 @@ def _on_rows(model, found, r):
 
 def percent(part):
     """Write "48 %", "6.5 %", and of what is not all "99.5 %"."""
-    share, rest = 100.0 * part, 100.0 * (1.0 - part)
-    if rest > _ROUNDING and f"{share:.0f}" == "100":
-        return f"{plain(rounded(share, rest, 1))} %"
-    return f"{share:{'.0f' if share >= 10.0 else '.2g'}} %"
+    share = round(100.0 * part, _DECIMALS_OF_PERCENT)
+    return f"{told_apart([share, 100.0], 2)[0]} %"
 
 
 def _errors(found, r):

@@ -30,7 +30,8 @@ class TreeDisplay:
 
     A branch is the thicker the more rows take it. With ``kind="plane"`` it is the prediction over
     the two inputs that are cut, as :class:`ResponseSurfaceDisplay` draws it, with lines where
-    another rule becomes the strongest, and what each rule says there in the middle of its rows. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
+    another rule becomes the strongest, and what each rule says there in the middle of its rows.
+    ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
