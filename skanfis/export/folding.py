@@ -75,17 +75,18 @@ def fold(estimator: Any) -> TSKModel:
     >>> bool(np.allclose(model.predict(X)[:, 0], pipeline.predict(X)))
     True
     """
-    return fold_with_reader(estimator)[0]
+    return _fold_with_reader(estimator)[0]
 
 
-def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
+def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, Any]:
     """Return what :func:`fold` does, and the rows of the model's inputs out of a table.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
     X : array-like or DataFrame of shape (n_rows, n_features)
-        Checked: other columns than in training are refused, and numbers that are not finite.
+        Checked: other columns than in training are refused, and numbers that are not finite. None
+        gives no rows.
 
     Returns
     -------
@@ -102,11 +103,11 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     >>> model.strengths(rows).shape
     (20, 2)
     """
-    model, read = fold_with_reader(estimator)
-    return model, read(X)
+    model, read = _fold_with_reader(estimator)
+    return model, None if X is None else read(X)
 
 
-def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
+def _fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
     """Return what :func:`fold` does, and what takes the rows of its inputs out of a table."""
     if isinstance(estimator, TSKModel):
         inputs = [Column(j, name) for j, name in enumerate(estimator.input_names)]

@@ -13,9 +13,8 @@ from numpy.typing import ArrayLike
 from .._validation import check_count, checked_position
 from ..antecedent import TreeAntecedent
 from ..digits import rounded
-from ..export import fold, fold_with_rows
+from ..export import fold_with_rows
 from ..export.columns import categories
-from ..export.folding import fold_with_reader
 from ..learning.data import never_changes
 from .labels import as_label, on_axis, title_of
 from .rules import has_training_data
@@ -86,7 +85,7 @@ class MembershipDisplay:
         ax : matplotlib Axes or sequence of Axes, default=None
             One for each input that has terms; None makes a figure.
         """
-        model, rows = (fold(estimator), None) if X is None else fold_with_rows(estimator, X)
+        model, rows = fold_with_rows(estimator, X)
         with_terms = np.unique(model.antecedent.term_inputs).tolist()
         if not with_terms:
             raise ValueError("The model has no terms: nothing to draw.")
@@ -203,8 +202,7 @@ class ResponseSurfaceDisplay:
             None makes a figure.
         """
         check_count("grid_resolution", grid_resolution, 2)
-        model, reader = fold_with_reader(estimator)
-        points = None if X is None else reader(X)
+        model, points = fold_with_rows(estimator, X)
         if np.size(features) != 2:
             raise ValueError(f"features={features!r} must be two inputs.")
         if model.n_inputs == 1:

@@ -11,8 +11,8 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from .._validation import checked_position
+from ..export import fold_with_rows
 from ..export.columns import categories
-from ..export.folding import fold_with_reader
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
 from .text import MOST_NAMED, counted
@@ -221,9 +221,9 @@ class Study:
     @classmethod
     def of(cls, estimator, X, groups, output):
         """Of an estimator; ValueError as of :func:`effects`."""
-        model, read = fold_with_reader(estimator)
+        model, rows = fold_with_rows(estimator, X)
         k = checked_position(output, model.output_names, "output")
-        rows = None if X is None else np.clip(read(X), model.minimum, model.maximum)
+        rows = None if rows is None else np.clip(rows, model.minimum, model.maximum)
         if groups and rows is None:
             raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
         if not isinstance(groups, Mapping | None):

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_count
 from ..digits import MOST_DIGITS
-from ..export import fold
-from ..export.folding import fold_with_reader, last_step
+from ..export import fold, fold_with_rows
+from ..export.folding import last_step
 from .sentences import Sentences
 
 
@@ -189,8 +189,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     >>> bool(abs(table["contribution"].sum() - model.predict(X[:1])[0]) < 1e-12)
     True
     """
-    model, read = fold_with_reader(estimator)
-    rows = read(X)
+    model, rows = fold_with_rows(estimator, X)
     inside = model.in_bounds(rows)
     if model.out_of_bounds == "raise" and not inside.all():
         raise ValueError(model.describe_out_of_bounds(rows))
