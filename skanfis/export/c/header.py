@@ -59,7 +59,8 @@ int $name_self_test(void);
 def header(source, units, notes):
     """The header, whose first comment says what the model is and what it costs."""
     model, numbers, dialect = source.model, source.numbers, source.dialect
-    lowest, highest = model.output_limits
+    asked = (-np.inf, np.inf) if source.limits is None else source.limits.T
+    lowest, highest = np.clip(model.output_limits, *asked)
     lines = [
         *map(remark, [notes] if isinstance(notes, str) else notes),
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
@@ -69,12 +70,6 @@ def header(source, units, notes):
         "Outputs y, and what they are held within:",
         *_ranges(model.output_names, lowest, highest, units),
     ]
-    if source.limits is not None:
-        ends = zip(model.output_names, *source.limits.T, strict=True)
-        told = ", ".join(
-            f"{remark(name)} from {range_in_digits(a, b, _DIGITS)}" for name, a, b in ends
-        )
-        lines += ["", f"Outputs are saturated beyond limits that were asked for: {told}."]
     lines += _precision_lines(numbers)
     lines += ["", policy_line(model, "Outside this range")]
     lines.append("A row that is not finite gets no output either way.")
