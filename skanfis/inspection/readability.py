@@ -15,7 +15,7 @@ from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
 from .sentences import Sentences
-from .text import counted
+from .text import MOST_NAMED, counted
 
 # In deviations of the target: the strongest rule alone is then as far from the model as one that
 # explains three quarters of the variance is from the target; beyond, it says too little.
@@ -26,8 +26,6 @@ GREATEST_ERROR = 1.05
 _ROUNDING = np.sqrt(np.finfo(float).eps)
 # A slope has a sign if it is so many deviations from zero, in a rule of this part of the weight.
 _DEVIATIONS, _LEAST_WEIGHT = 2.0, 0.05
-# A sentence names so many, and counts the others.
-_MOST_NAMED = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -281,6 +279,6 @@ def _rules(numbers):
 
 
 def _named(parts, between=", "):
-    if len(parts) <= _MOST_NAMED:
+    if len(parts) <= MOST_NAMED:
         return between.join(parts)
-    return f"{between.join(parts[:_MOST_NAMED])} and {len(parts) - _MOST_NAMED} more"
+    return f"{between.join(parts[:MOST_NAMED])} and {len(parts) - MOST_NAMED} more"

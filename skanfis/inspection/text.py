@@ -28,7 +28,7 @@ from .sentences import PRECISION, Sentences
 
 # Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 4
-# Inputs in no rule are named if they are so few, and else counted.
+# A sentence names so many, and counts others.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
 _DECIMALS_OF_PERCENT = 9  # the others are rounding's
