@@ -278,31 +278,21 @@ def _checked(model, box, tol, max_boxes):
 
 def read_box(box, model: TSKModel):
     """The box as an array (n_inputs, 2); what is not given is the range of the training data."""
-    found = training_box(model)
-    if box is None:
-        return found
-    names = ", ".join(map(repr, model.input_names))
-    if isinstance(box, Mapping):
-        for name, ends in box.items():
-            (j,) = feature_indices([name], model.input_names, "box")
-            try:
-                low, high = ends
-                found[j] = low, high
-            except (TypeError, ValueError):
-                told = f"box[{name!r}]={ends!r} must be two numbers: (low, high)."
-                raise ValueError(told) from None
+    rows, given = training_box(model).tolist(), {} if box is None else box
+    if isinstance(given, Mapping):
+        for name, ends in given.items():
+            rows[feature_indices([name], model.input_names, "box")[0]] = ends
     else:
-        try:
-            given = np.array(box, dtype=float)
-            what = f"an array of shape {given.shape}"
-        except (TypeError, ValueError):
-            given, what = np.empty(0), repr(box)
-        if given.shape != found.shape:
-            raise ValueError(
-                f"box must have one (low, high) for each of the {model.n_inputs} inputs ({names}), "
-                f"or be a dict by their names; got {what}."
-            )
-        found = given
+        rows = given
+    try:
+        found = np.array(rows, dtype=float)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (model.n_inputs, 2):
+        raise ValueError(
+            f"box must have one (low, high) for each of the {model.n_inputs} inputs ("
+            f"{', '.join(map(repr, model.input_names))}), or be a dict by their names; got {box!r}"
+        )
     for name, (low, high) in zip(model.input_names, found, strict=True):
         if not low <= high:
             raise ValueError(

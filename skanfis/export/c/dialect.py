@@ -183,21 +183,16 @@ def read_limits(saturate, numbers):
         return None
     if hasattr(saturate, "lower"):
         saturate = np.stack([saturate.lower, saturate.upper], axis=-1)
-    given = np.array(saturate, dtype=float)
-    n_outputs = numbers.model.n_outputs
-    if given.shape != (n_outputs, 2):
-        raise ValueError(
-            f"saturate must have (low, high) for each of the {n_outputs} outputs, or be what "
-            f"skanfis.bounds.bounds returns for this model; got an array of shape {given.shape}."
-        )
-    limits = rounded_within(given.T, numbers.dtype).T
-    is_below = (given[:, 0] < given[:, 1]) & (limits[:, 0] <= limits[:, 1])
-    if not (np.isfinite([given, limits]).all() and is_below.all()):
-        raise ValueError(
-            f"saturate={given.tolist()} must be finite, each low below its high, with a number of "
-            f"{numbers.dtype} between them."
-        )
-    return limits
+    given, n_outputs = np.array(saturate, dtype=float), numbers.model.n_outputs
+    if given.shape == (n_outputs, 2) and (given[:, 0] < given[:, 1]).all():
+        limits = rounded_within(given.T, numbers.dtype).T
+        if np.isfinite([given, limits]).all() and (limits[:, 0] <= limits[:, 1]).all():
+            return limits
+    raise ValueError(
+        f"saturate={given.tolist()} must have finite (low, high), with low below high and with a "
+        f"number of {numbers.dtype} between them, for each of the {n_outputs} outputs; or be what "
+        "skanfis.bounds.bounds returns for this model."
+    )
 
 
 def write_files(code, path):
