@@ -133,22 +133,17 @@ def rules_table(estimator: Any) -> Any:
     ['value', 'x0', 'x1']
     """
     model = fold(estimator)
-    asked, said = conditions(model), Sentences.of(model, MOST_DIGITS)
-    # Pairs: an input may be called "value" too.
-    columns: list = [
-        (("if", model.input_names[j]), [rule.get(j) for rule in asked])
-        for j in sorted({j for rule in asked for j in rule})
-    ]
-    columns += [(("data", "weight"), model.rule_weights), (("data", "rows"), model.rule_rows)]
-    columns += zip([("at", name) for name in model.input_names], said.places.T, strict=True)
+    said, names = Sentences.of(model, MOST_DIGITS), list(model.input_names)
+    asked = pd.DataFrame(conditions(model)).sort_index(axis=1)
+    parts = {
+        "if": asked.rename(columns=dict(enumerate(names))),
+        "data": pd.DataFrame({"weight": model.rule_weights, "rows": model.rule_rows}),
+        "at": pd.DataFrame(said.places, columns=names),
+    }
     for k, output in enumerate(model.output_names):
-        names = [(f"then {output}", name) for name in ("value", *model.input_names)]
-        numbers = np.column_stack([said.values[:, k], said.slopes[:, :, k]]).T
-        columns += zip(names, numbers, strict=True)
-    keys, values = zip(*columns, strict=True)
-    index = pd.RangeIndex(model.n_rules, name="rule")
-    table = pd.DataFrame(dict(enumerate(values)), index=index)
-    return table.set_axis(pd.MultiIndex.from_tuples(keys), axis=1)
+        numbers = np.column_stack([said.values[:, k], said.slopes[:, :, k]])
+        parts[f"then {output}"] = pd.DataFrame(numbers, columns=["value", *names])
+    return pd.concat(parts, axis=1).rename_axis("rule")
 
 
 def explain(estimator: Any, X: ArrayLike) -> Any:
