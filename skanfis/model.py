@@ -16,9 +16,10 @@ others of these at their medians: it does not change with them, and turns no slo
 within limits as well, see :class:`~skanfis.policies.TargetRange`.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -79,6 +80,9 @@ class TSKModel:
         The L that the outermost training rows support, see ``training.freezing``.
     tangent_at : ndarray of shape (n_inputs,) or None
         Medians of the inputs that an output must rise or fall with, NaN for the others.
+    levels : dict
+        What indicators of a ``OneHotEncoder`` tell, by name, of a model that ``fold`` has made; see
+        ``export.columns``.
     """
 
     antecedent: Antecedent
@@ -100,6 +104,7 @@ class TSKModel:
     posterior: Posterior | None = None
     rows_extrapolation: float | None = None
     tangent_at: np.ndarray | None = None
+    levels: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self):
         if not self.term_names:

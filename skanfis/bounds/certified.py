@@ -11,12 +11,13 @@ from scipy.stats import qmc
 
 from .._validation import check_count, feature_indices
 from ..export import fold
+from ..membership import FAMILIES
 from ..model import TSKModel
 from ..policies import SILENT
 from .construction import is_in_order
 from .enclosure import Enclosure, reach_of
 from .search import largest
-from .terms import is_known, size
+from .terms import size
 
 # Points that are tried first: so many all over the box, and its corners if inputs are this few.
 _POINTS, _MOST_INPUTS_OF_CORNERS = 1024, 8
@@ -265,7 +266,7 @@ def _checked(model, box, tol, max_boxes):
     """The frozen model in the user's units, and the box."""
     model = fold(model)
     for group in model.antecedent.groups:
-        if not is_known(group.family):
+        if group.family not in FAMILIES.values():
             raise ValueError(
                 f"The ranges of {group.family.name!r} memberships are not known: give another mf."
             )
@@ -277,31 +278,21 @@ def _checked(model, box, tol, max_boxes):
 
 def read_box(box, model: TSKModel):
     """The box as an array (n_inputs, 2); what is not given is the range of the training data."""
-    found = training_box(model)
-    if box is None:
-        return found
-    names = ", ".join(map(repr, model.input_names))
-    if isinstance(box, Mapping):
-        for name, ends in box.items():
-            (j,) = feature_indices([name], model.input_names, "box")
-            try:
-                low, high = ends
-                found[j] = low, high
-            except (TypeError, ValueError):
-                told = f"box[{name!r}]={ends!r} must be two numbers: (low, high)."
-                raise ValueError(told) from None
+    rows, given = training_box(model).tolist(), {} if box is None else box
+    if isinstance(given, Mapping):
+        for name, ends in given.items():
+            rows[feature_indices([name], model.input_names, "box")[0]] = ends
     else:
-        try:
-            given = np.array(box, dtype=float)
-            what = f"an array of shape {given.shape}"
-        except (TypeError, ValueError):
-            given, what = np.empty(0), repr(box)
-        if given.shape != found.shape:
-            raise ValueError(
-                f"box must have one (low, high) for each of the {model.n_inputs} inputs ({names}), "
-                f"or be a dict by their names; got {what}."
-            )
-        found = given
+        rows = given
+    try:
+        found = np.array(rows, dtype=float)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (model.n_inputs, 2):
+        raise ValueError(
+            f"box must have one (low, high) for each of the {model.n_inputs} inputs ("
+            f"{', '.join(map(repr, model.input_names))}), or be a dict by their names; got {box!r}"
+        )
     for name, (low, high) in zip(model.input_names, found, strict=True):
         if not low <= high:
             raise ValueError(

@@ -65,10 +65,8 @@ class Enclosure:
             {j: terms.reshape(*shape, terms.shape[-1]) for j, terms in one.items()}
             for one, shape in zip(factors, shapes, strict=False)
         ]
-        coefficients = sign * model.coefficients[:, :, output]
-        self.height = coefficients[:, :1]
-        self.slopes = np.zeros((model.n_rules, model.n_inputs))
-        self.slopes[:, : coefficients.shape[1] - 1] = coefficients[:, 1:]
+        self.height = sign * model.coefficients[:, :1, output]
+        self.slopes = sign * model.consequents[:, 1:, output]
         self.place = {j: place for place, one in enumerate(self.factors) for j in one}
         self.reach, self.tangents = reach_of(model), model.tangent_groups
         answering = model.with_out_of_bounds("clip") if model.out_of_bounds in SILENT else model

@@ -5,6 +5,7 @@ or none holds, the best line for all rules does. If that raises the error by mor
 goes back towards the free one as far as branch and bound can prove that all are kept.
 """
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,7 +22,6 @@ from .constraints import Constraints
 from .construction import ONE_RULE, RuleOrder, nearest_in_order, with_equal_widths
 from .contradictions import contradicted
 from .quadratic_program import InfeasibleError
-from .way_back import WayBack
 
 # Ratios of squared errors, constrained over free: beyond the first, consequents nearer to the free
 # fit are sought; beyond the other, consequents that were drawn are worth a warning.
@@ -53,7 +53,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     ended, drawn = found.evaluation(local), float(is_line)
     held, before = found.model(local, is_line), float(evaluation.mean_squared_error)
     if ended.mean_squared_error > _COSTLY * before:
-        nearer, way = WayBack(found).nearest_proven(local)
+        nearer, way = found.nearest_proven(local)
         ended_nearer = found.evaluation(nearer)
         if ended_nearer.mean_squared_error < ended.mean_squared_error:
             held, ended, drawn = found.model(nearer), ended_nearer, way
@@ -100,26 +100,18 @@ def _in_order(found: Consequents):
         ways = ways_in_order(found.problem, found.free, found.constraints, *found.fixed)
         # Of rules rounding may be larger than the margin, of a line there is next to none.
         return next(way for way in ways if found.is_certified(*way))
-    except InfeasibleError as failure:
-        raise InfeasibleConstraintsError(_refusal(found, failure.by_equalities)) from None
+    except InfeasibleError:
+        raise InfeasibleConstraintsError(_refusal(found)) from None
 
 
-def _refusal(found, by_equalities):
+def _refusal(found):
     n_points, n_rules = len(found.constraints.points), found.problem.antecedent.n_rules
     rules = "1 rule" if n_rules == 1 else f"{n_rules} rules"
-    if by_equalities:
-        names = " and ".join(map(repr, found.output_names))
-        return (
-            f"constraints fixes {names} at {n_points} points, which {rules} cannot all meet: give "
-            "fewer points, none of them next to another, or use more rules."
-        )
+    points = "the 1 fixed point" if n_points == 1 else f"the {n_points} fixed points"
     names = " and ".join(one.name for one in found.inequalities)
-    points = "1 fixed point" if n_points == 1 else f"{n_points} fixed points"
-    with_points = f" together with the {points}" if n_points else ""
-    return (
-        f"No consequents of {rules} keep {names}{with_points}. Drop a constraint, or use "
-        f"{'' if found.columns.order else 'order=1 or '}more rules."
-    )
+    kept = " together with ".join(filter(None, [names, points if n_points else ""]))
+    more = "more rules" if found.columns.order else "order=1 or more rules"
+    return f"No consequents of {rules} keep {kept}. Drop a constraint, or use {more}."
 
 
 def at_equal_widths(problem, evaluation, constraints: Constraints):
@@ -137,13 +129,10 @@ def ways_in_order(problem, evaluation, constraints: Constraints, equal, equal_to
     InfeasibleError if neither exists. Of the equalities E u = e for local consequents u, ``equal``
     is E, ``equal_to`` e by output.
     """
-    failure = InfeasibleError(False)
     for is_line in (False, True):
-        try:
+        with suppress(InfeasibleError):
             yield _nearest(problem, evaluation, constraints, equal, equal_to, is_line), is_line
-        except InfeasibleError as error:
-            failure = error
-    raise failure
+    raise InfeasibleError
 
 
 def held_in_search(constraints: Constraints | None):
@@ -185,7 +174,7 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
     for k, signs in enumerate(constraints.signs):
         order = RuleOrder.of(antecedent, signs, limits[:, k], slopes)
         if order is None:
-            raise InfeasibleError(False)
+            raise InfeasibleError
         local[:, k] = to_local @ nearest_in_order(
             order, factor, start[:, k], to_rules, box, equal, equal_to[:, k]
         )

@@ -11,20 +11,14 @@ from scipy.optimize import nnls
 
 from ..consequent import NormalFactor
 
-# A minimum below this is zero; rows are of length one.
+# What is smaller is zero: a minimum, and, of rows of length one, what others leave of them.
 _ZERO = 1e-10
-# Equalities of which one follows from others.
-_DEPENDENT = 1e-10
 # Rounds in which inequalities are found.
 _MOST_ROUNDS = 1000
 
 
 class InfeasibleError(Exception):
-    """No consequents keep the constraints, or, if ``by_equalities``, not even the equalities."""
-
-    def __init__(self, by_equalities):
-        super().__init__()
-        self.by_equalities = by_equalities
+    """No consequents keep the constraints."""
 
 
 def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
@@ -34,16 +28,16 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
     if equal.size:
         base, triangle = np.linalg.qr(factor.half_solve(equal.T))
         sizes = np.abs(np.diagonal(triangle))
-        if (sizes <= _DEPENDENT * sizes.max(initial=0.0)).any() or equal.shape[0] > len(half):
-            raise InfeasibleError(True)
+        if (sizes <= _ZERO * sizes.max(initial=0.0)).any() or equal.shape[0] > len(half):
+            raise InfeasibleError
         toward = solve_triangular(triangle, equal_to - equal @ start, trans="T")
     short = least - at_least @ start - half.T @ (base @ toward)
     free = half - base @ (base.T @ half)
     length = np.sqrt(np.sum(free**2, axis=0))
     # Inequalities that the equalities decide, or no u can change: they hold, or nothing helps.
-    fixed = length <= _DEPENDENT * np.sqrt(np.sum(half**2, axis=0)) + np.finfo(float).tiny
+    fixed = length <= _ZERO * np.sqrt(np.sum(half**2, axis=0)) + np.finfo(float).tiny
     if (short[fixed] > _ZERO * (1.0 + np.abs(least[fixed]))).any():
-        raise InfeasibleError(False)
+        raise InfeasibleError
     multipliers = np.zeros(least.size)
     kept = ~fixed
     if (short[kept] > 0.0).any():
@@ -68,7 +62,7 @@ def nearest_by_exchange(factor, start, equal, equal_to, at_least, least, violate
         kept = holds_back | (np.arange(len(least)) < n_given)
         at_least = np.vstack([at_least[kept], more])
         least = np.append(least[kept], least_of_more)
-    raise InfeasibleError(False)
+    raise InfeasibleError
 
 
 def _least_distance(columns, short):
@@ -80,5 +74,5 @@ def _least_distance(columns, short):
     multipliers, distance = nnls(rows, target, maxiter=30 * max(rows.shape))
     rest = 1.0 - (short / scale) @ multipliers
     if distance <= _ZERO or rest <= _ZERO**2:
-        raise InfeasibleError(False)
+        raise InfeasibleError
     return scale * multipliers / rest

@@ -36,17 +36,11 @@ EPS = float(np.finfo(float).eps)
 # with room to spare. Those of sums are counted beside.
 ROUNDINGS = 32.0
 _SIDES, _PRODUCTS = tuple(SIDES.values()), tuple(PRODUCTS.values())
-_LOG_CONCAVE = (Gaussian, TwoSidedGaussian, SigmoidDifference, *_PRODUCTS, *_SIDES)
 _ONE_SIDED = (SShaped, ZShaped)
 _BY_SIDES = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
 # Where the logarithm of a floored flank is steepest, to the last bit: of the straight one as the
 # foot is reached; of two parabolas where 2 s^2 is about as large as the floor, s = 1 - t.
 _STEEPEST = {LinearProfile: np.nextafter(1.0, 0.0), SplineProfile: 1.0 - 5.506937986e-6}
-
-
-def is_known(family):
-    """Whether the ranges of a family of memberships are known."""
-    return family in (*_LOG_CONCAVE, *_BY_SIDES)
 
 
 class TermRanges(NamedTuple):

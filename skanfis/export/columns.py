@@ -1,13 +1,15 @@
 """The inputs of a folded model, read from the user's tables; levels of one-hot encoded columns."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 
 from .._sklearn import safe_indexing
 from .._validation import as_numbers, check_finite, refuse_lazy
+
+_ROUNDING = 1e-9  # of a sum of shares
 
 
 class Level(NamedTuple):
@@ -25,51 +27,66 @@ class Level(NamedTuple):
 
 @dataclass(frozen=True)
 class Column:
-    """An input z: raw column ``source`` is offset + scale z, or z is an output of an encoder."""
+    """An input z: raw column ``source`` is offset + scale z, or z indicates a level of it."""
 
     source: int
     name: str
     offset: float = 0.0
     scale: float = 1.0
-    encode: Callable[..., np.ndarray] | None = None
-    place: int = -1  # of the output
-    level: Level | None = None  # that an encoder's output indicates
-    fill: Any = None  # replaces missing values
-    imputed: Callable[..., np.ndarray] | None = None  # the column as an imputer hands it on
+    place: int = -1  # of the indicator among an encoder's outputs
+    level: Level | None = None  # that it indicates
 
-    def values(self, X, encoded):
-        """The input, in raw units, from the user's table and the outputs of encoders."""
-        if self.encode is not None:
-            return encoded[self.encode][:, self.place].astype(np.float64)
-        numbers = as_numbers(part_of(X, [self.source]))[:, 0]
-        return numbers if self.fill is None else np.where(np.isnan(numbers), self.fill, numbers)
+    def values(self, X, z):
+        """The input as the user's table has it; an indicator, and what was missing, out of z."""
+        scaled_back = self.offset + self.scale * z
+        if self.level is not None:
+            # 0 or 1 again, whatever scalers behind the encoder have made of it.
+            return np.round(scaled_back)
+        numbers = as_numbers(safe_indexing(X, [self.source], axis=1))[:, 0]
+        return np.where(np.isnan(numbers), scaled_back, numbers)
 
 
-def by_column(levels):
-    """By raw column the names of its indicators, and the names of its levels without one."""
-    found: dict[str, list[str]] = {}
-    for name, level in levels.items():
-        found.setdefault(level.column, []).append(name)
-    unnamed = {}
-    for column, names in found.items():
-        named = {levels[name].level for name in names}
-        others = [other for other in levels[names[0]].others if other not in named]
-        unnamed[column] = others or ["other"]
-    return found, unnamed
+class Category(NamedTuple):
+    """The inputs that indicate levels of one raw column, and what each of them tells."""
+
+    inputs: list[int]
+    levels: list[str]
+    others: list[str]  # of training rows that have none of these, if there are such rows
+
+
+def columns_of(model):
+    """The column that each input is of; those of one category by its name."""
+    return [model.levels.get(name, (name,))[0] for name in model.input_names]
+
+
+def categories(model, among=None):
+    """By raw column its :class:`Category`, of all inputs of a model or of those ``among`` them."""
+    found: dict[str, Category] = {}
+    for j in range(model.n_inputs) if among is None else among:
+        if level := model.levels.get(model.input_names[j]):
+            own = found.setdefault(level.column, Category([], [], []))
+            own.inputs.append(j)
+            own.levels.append(level.level)
+    for column, own in found.items():
+        if model.reference[own.inputs].sum() < 1.0 - _ROUNDING:
+            every = [one for one in model.levels.values() if one.column == column]
+            indicated = {one.level for one in every}
+            own.others.extend([one for one in every[0].others if one not in indicated] or ["other"])
+    return found
 
 
 @dataclass(frozen=True)
 class Reader:
-    """Takes the inputs of a model out of tables with columns of these names."""
+    """Takes the inputs of a model out of tables with columns of these names.
+
+    The steps before the model tell what imputers fill and encoders indicate.
+    """
 
     inputs: list[Column]
+    places: list[int]  # of these among what the last step hands on
+    steps: list[Any]
     names: list[str]
     is_named: bool
-
-    @property
-    def levels(self) -> dict[str, Level]:
-        """What each indicator tells, by its name, such as "fibre_PM"."""
-        return {one.name: one.level for one in self.inputs if one.level is not None}
 
     def __call__(self, X) -> np.ndarray:
         """The rows; ValueError for other columns, and for numbers that are not finite."""
@@ -81,17 +98,16 @@ class Reader:
                 f"{', '.join(map(repr, given))}."
             )
         # What does not reach the model need not be numbers.
-        encoders = {one.encode for one in self.inputs if one.encode}
-        table = X if given is not None or encoders else as_numbers(X)
-        if (shape := np.shape(table))[1:] != (len(self.names),) or shape[0] == 0:
-            raise ValueError(f"X has the shape {shape}: the estimator takes rows of {known}.")
-        encoded = {encode: encode(table) for encode in encoders}
-        rows = np.column_stack([one.values(table, encoded) for one in self.inputs])
+        X = X if hasattr(X, "shape") else np.asarray(X, dtype=object)
+        if X.shape[1:] != (len(self.names),) or X.shape[0] == 0:
+            raise ValueError(f"X has the shape {X.shape}: the estimator takes rows of {known}.")
+        Z = X
+        # Steps warn where there are names in one of fit and transform alone.
+        if self.steps and self.is_named == (given is None):
+            Z = pd.DataFrame(X, columns=self.names) if self.is_named else np.asarray(X)
+        for step in self.steps:
+            Z = step.transform(Z)
+        pairs = zip(self.inputs, as_numbers(Z).T[self.places], strict=True)
+        rows = np.column_stack([one.values(X, z) for one, z in pairs])
         check_finite(rows, "X", [one.name for one in self.inputs])
         return rows
-
-
-def part_of(X, columns):
-    """Columns of a frame, or of anything that is an array, by their positions."""
-    table = X if hasattr(X, "columns") else np.asarray(X, dtype=object)
-    return safe_indexing(table, columns, axis=1)

@@ -9,8 +9,6 @@ inputs of the folded model in its place.
 from collections import UserList
 from copy import copy
 from dataclasses import replace
-from functools import partial
-from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -34,7 +32,9 @@ from .._sklearn import safe_indexing
 from ..model import TSKModel
 from ..naming import default_term_names, distinct
 from ..options import policy_of
-from .columns import Column, Level, Reader, part_of
+from .columns import Column, Level, Reader
+
+_SCALERS = (StandardScaler, RobustScaler, MaxAbsScaler, MinMaxScaler)
 
 
 def fold(estimator: Any) -> TSKModel:
@@ -75,17 +75,18 @@ def fold(estimator: Any) -> TSKModel:
     >>> bool(np.allclose(model.predict(X)[:, 0], pipeline.predict(X)))
     True
     """
-    return fold_with_reader(estimator)[0]
+    return _fold_with_reader(estimator)[0]
 
 
-def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
+def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, Any]:
     """Return what :func:`fold` does, and the rows of the model's inputs out of a table.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
     X : array-like or DataFrame of shape (n_rows, n_features)
-        Checked: other columns than in training are refused, and numbers that are not finite.
+        Checked: other columns than in training are refused, and numbers that are not finite. None
+        gives no rows.
 
     Returns
     -------
@@ -102,18 +103,20 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, np.ndarray]:
     >>> model.strengths(rows).shape
     (20, 2)
     """
-    model, read = fold_with_reader(estimator)
-    return model, read(X)
+    model, read = _fold_with_reader(estimator)
+    return model, None if X is None else read(X)
 
 
-def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
+def _fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
     """Return what :func:`fold` does, and what takes the rows of its inputs out of a table."""
     if isinstance(estimator, TSKModel):
         inputs = [Column(j, name) for j, name in enumerate(estimator.input_names)]
-        return estimator, Reader(inputs, list(estimator.input_names), True)
+        places, names = list(range(len(inputs))), list(estimator.input_names)
+        return estimator, Reader(inputs, places, [], names, True)
     (*steps, (label, last)), target_steps = _steps_of("", estimator)
     model = _model_of(label, last)
-    first = next((step for _, step in steps if step not in (None, "passthrough")), last)
+    steps = [(label, step) for label, step in steps if step not in (None, "passthrough")]
+    first = steps[0][1] if steps else last
     given = getattr(first, "feature_names_in_", None)
     names = [f"x{j}" for j in range(first.n_features_in_)] if given is None else list(given)
     columns = [Column(j, name) for j, name in enumerate(names)]
@@ -127,15 +130,17 @@ def fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
                 f"Column {column.name!r} reaches the model {keys.count(key)} times: its rules "
                 "cannot be written with one membership per column. Let every column reach it once."
             )
-    order = np.array(sorted(range(len(columns)), key=keys.__getitem__))
+    order = sorted(range(len(columns)), key=keys.__getitem__)
     # A raw column keeps its name, even if an indicator would be called the same, "fibre_PM".
-    by_claim = sorted(order, key=lambda j: columns[j].encode is not None)
+    by_claim = sorted(order, key=lambda j: columns[j].level is not None)
     for j, name in zip(by_claim, distinct(columns[j].name for j in by_claim), strict=True):
         columns[j] = replace(columns[j], name=str(name))
-    model = _with_raw_inputs(model, columns, order)
+    model = _with_raw_inputs(model, columns, np.array(order))
     for label, transformer in reversed(target_steps):
         model = _with_raw_target(model, label, transformer)
-    return model, Reader([columns[j] for j in order], names, given is not None)
+    inputs, before = [columns[j] for j in order], [step for _, step in steps]
+    levels = {one.name: one.level for one in inputs if one.level is not None}
+    return replace(model, levels=levels), Reader(inputs, order, before, names, given is not None)
 
 
 def last_step(estimator: Any) -> Any:
@@ -205,49 +210,29 @@ def _columns_after(label, step, columns):
             if not (isinstance(part, str) and part == "drop")
             for column in _columns_after(name, part, [columns[j] for j in _chosen(chosen, step)])
         ]
+    units = _offsets_and_scales(label, step, len(columns))
     return [
         replace(column, offset=column.offset + column.scale * offset, scale=column.scale * scale)
-        for column, (offset, scale) in zip(columns, _offsets_and_scales(label, step), strict=False)
+        for column, (offset, scale) in zip(columns, units, strict=True)
     ]
 
 
 def _imputed(label, imputer, columns):
-    """The columns, with what stands for missing values."""
+    """The columns as they are: what is missing is no matter of the rules."""
     if imputer.add_indicator or not pd.isna(imputer.missing_values):
         _refuse(label, imputer, "it needs add_indicator=False and missing_values=nan")
     if pd.isna(imputer.statistics_).any():
         _refuse(label, imputer, "it drops a column that has no values")
-
-    def imputed(j, X):
-        return np.asarray(imputer.transform(part_of(X, [one.source for one in columns])))[:, j]
-
-    found = list(columns)
-    for j, (one, fill) in enumerate(zip(columns, imputer.statistics_.tolist(), strict=True)):
-        # One imputer leaves the next nothing to fill.
-        if not one.imputed:
-            raw = fill if (one.offset, one.scale) == (0.0, 1.0) else one.offset + one.scale * fill
-            found[j] = replace(one, fill=raw, imputed=partial(imputed, j))
-    return found
+    return columns
 
 
 def _encoded(label, encoder, columns):
     """Indicators in the place of the columns that an encoder is given."""
-    if any(one.encode or (one.offset, one.scale) != (0.0, 1.0) for one in columns):
+    if any(one.level or (one.offset, one.scale) != (0.0, 1.0) for one in columns):
         _refuse(label, encoder, "it must be given columns of the table as they are")
     sources = {column.name: column.source for column in columns}
     given = None if hasattr(encoder, "feature_names_in_") else list(sources)
     by_column = copy(encoder).set_params(feature_name_combiner=lambda name, _: name)
-
-    def encode(X):
-        table = part_of(X, list(sources.values()))
-        if any(one.imputed for one in columns):
-            # By the imputer itself: to one that fills NaN, None is a category.
-            parts = [one.imputed(X) if one.imputed else part_of(X, [one.source]) for one in columns]
-            table = pd.DataFrame(np.column_stack(parts), columns=list(sources), dtype=object)
-            table = table if hasattr(encoder, "feature_names_in_") else table.to_numpy()
-        encoded = encoder.transform(table)
-        return encoded.toarray() if hasattr(encoded, "toarray") else np.asarray(encoded)
-
     of_each = (one.get_feature_names_out(given).tolist() for one in (by_column, encoder))
     # All that there can be.
     is_all = encoder.handle_unknown == "error" and not hasattr(encoder, "infrequent_categories_")
@@ -257,7 +242,7 @@ def _encoded(label, encoder, columns):
         level = name.removeprefix(f"{column}_")
         others = tuple(other for other in map(str, known.get(column, ())) if other != level)
         told = Level(column, level, others)
-        found.append(Column(sources[column], name, encode=encode, place=place, level=told))
+        found.append(Column(sources[column], name, place=place, level=told))
     return found
 
 
@@ -270,23 +255,19 @@ def _chosen(chosen, transformer):
     return np.ravel(safe_indexing(places, chosen, axis=1))
 
 
-def _offsets_and_scales(label, scaler):
+def _offsets_and_scales(label, scaler, n_columns):
     """Of x = offset + scale z, for every column of a fitted scaler."""
     kind = type(scaler)
     if getattr(scaler, "clip", False):
         _refuse(label, scaler, "clip=True bends it at the edge; out_of_bounds='clip' does the same")
-    offset: Any = None
-    scale: Any = None
-    if kind is StandardScaler:
-        offset, scale = (scaler.mean_ if scaler.with_mean else None), scaler.scale_
-    elif kind in (RobustScaler, MaxAbsScaler):
-        offset, scale = getattr(scaler, "center_", None), scaler.scale_
-    elif kind is MinMaxScaler:
-        offset, scale = -scaler.min_ / scaler.scale_, 1.0 / scaler.scale_
-    elif kind is not FunctionTransformer or scaler.func or scaler.inverse_func:
+    is_identity = kind is FunctionTransformer and not (scaler.func or scaler.inverse_func)
+    if kind not in _SCALERS and not is_identity:
         _refuse(label, scaler, "it does not map every column alone by a positive scale")
-    offsets = repeat(0.0) if offset is None else offset.tolist()
-    return zip(offsets, repeat(1.0) if scale is None else scale.tolist(), strict=False)
+    (offset,) = scaler.inverse_transform(np.zeros((1, n_columns)))
+    scale = getattr(scaler, "scale_", None)
+    scale = np.ones(n_columns) if scale is None else scale
+    # That of MinMaxScaler is the inverse of the others'.
+    return zip(offset, 1.0 / scale if kind is MinMaxScaler else scale, strict=True)
 
 
 def _refuse(label, step, reason):

@@ -6,7 +6,7 @@ value and its place in the file.
 
 import json
 from functools import partial
-from itertools import chain, groupby
+from itertools import groupby
 from math import inf, nan, prod
 
 import numpy as np
@@ -27,7 +27,6 @@ from ..support import RuleSupport
 from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, numbers, shown
 
 FORMAT = "skanfis-model"
-# The first knew no trees.
 VERSION = 2
 KINDS: dict[type[Antecedent], str] = {
     GridAntecedent: "grid",
@@ -71,7 +70,7 @@ _not_negative = partial(number, lowest=0.0)
 _log = partial(number, lowest=-float(np.log(LARGEST_NUMBER)), highest=float(np.log(LARGEST_NUMBER)))
 _FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
     "format": partial(_one_of, (FORMAT,)),
-    "version": _whole(1, VERSION),
+    "version": _whole(VERSION, VERSION),
     "out_of_bounds": partial(_one_of, OUT_OF_BOUNDS),
     "max_extrapolation": _or_null(_not_negative, inf),
     "rule_base": partial(_one_of, tuple(KINDS.values())),
@@ -104,16 +103,11 @@ def model_of(document):
     """The model that a file's content describes."""
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ValueError(f'not a model of skanfis: it has no "format": "{FORMAT}".')
-    version = document.get("version")
-    if type(version) is not int or version < 1:
-        raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
-    if version > VERSION:
+    if (version := document.get("version")) != VERSION:
         raise ValueError(
-            f"the file is of version {shown(version)}, this skanfis reads versions 1 to {VERSION}: "
-            "upgrade skanfis to read it."
+            f"the file is of version {shown(version)}, this skanfis reads version {VERSION}: "
+            "upgrade skanfis to read a later one."
         )
-    if version == 1:
-        document = _of_version_1(document)
     file = _members({"posterior": None} | document, _FILE, "the file")
     n_rules, n_terms = len(file["rules"]), len(file["terms"])
     n_inputs, n_outputs = len(file["inputs"]), len(file["outputs"])
@@ -180,23 +174,6 @@ def _check_all(holds, message):
     """Raise ValueError with the place of the first for which a condition does not hold."""
     if not np.all(holds):
         raise ValueError(message.format(np.argmin(holds)))
-
-
-def _of_version_1(document):
-    """The same in the present form: no tangents of their own, a triangle as one list."""
-    found = dict(document)
-    if isinstance(found.get("inputs"), list):
-        no_tangent = {"tangent_at": None}
-        found["inputs"] = [
-            one | no_tangent if isinstance(one, dict) else one for one in found["inputs"]
-        ]
-    posterior = found.get("posterior")
-    if isinstance(posterior, dict) and isinstance(posterior.get("consequents"), list):
-        rows = [row if isinstance(row, list) else [row] for row in posterior["consequents"]]
-        n_outputs = len(_list(found.get("outputs"), "outputs"))
-        triangle = {"consequents": list(chain.from_iterable(rows))}
-        found["posterior"] = {"pinned": [[]] * n_outputs} | posterior | triangle
-    return found
 
 
 def _inputs(inputs):
@@ -372,25 +349,15 @@ def _tree(groups, table):
     is_same = (above.inputs == below.inputs) & (above.theta == below.theta).all(axis=0)
     _check_all(is_same, "terms[{}]: the side below has another input, cut or width.")
     tree = TreeAntecedent(groups, table)
-    paths, seen = tree.paths, set()
-    pending = [(list(range(len(paths))), 0)]
-    while pending:
-        leaves, depth = pending.pop()
-        nodes = {paths[r][depth][0] if depth < len(paths[r]) else None for r in leaves}
-        if nodes == {None} and len(leaves) == 1:
-            continue
-        node = nodes.pop()
-        if nodes or node is None or node in seen:
-            raise ValueError(
-                f"rules[{leaves[0]}].terms: the paths are no tree: each cut stands at one place, "
-                "and all paths that come to a place go on by one cut, or one of them ends there."
-            )
-        seen.add(node)
-        for side in (True, False):
-            own = [r for r in leaves if paths[r][depth][1] is side]
-            if not own:
-                raise ValueError(f"rules: none goes on {'above' if side else 'below'} cut {node}.")
-            pending.append((own, depth + 1))
-    if len(seen) < tree.n_nodes:
-        raise ValueError(f"terms: {tree.n_nodes - len(seen)} cuts are on no path.")
+    leaves = [tuple(path) for path in tree.paths]
+    steps = {(path[:k], node) for path in leaves for k, (node, _) in enumerate(path)}
+    places, cuts = ({step[i] for step in steps} for i in (0, 1))
+    sides = {side for path in leaves for side in path}
+    is_one_to_one = len(steps) == len(places) == len(cuts) == tree.n_nodes
+    ends_alone = len({*leaves} - places) == len(leaves)
+    if not (is_one_to_one and ends_alone and len(sides) == 2 * tree.n_nodes):
+        raise ValueError(
+            "rules: the paths are no tree: each cut stands at one place, and there paths go on to "
+            "both of its sides; no path ends within another."
+        )
     return tree

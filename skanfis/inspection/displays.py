@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from numbers import Real
 from textwrap import fill
 from typing import Any, NamedTuple, Self
@@ -12,9 +13,8 @@ from numpy.typing import ArrayLike
 from .._validation import check_count, checked_position
 from ..antecedent import TreeAntecedent
 from ..digits import rounded
-from ..export import fold, fold_with_rows
-from ..export.columns import by_column
-from ..export.folding import fold_with_reader
+from ..export import fold_with_rows
+from ..export.columns import categories
 from ..learning.data import never_changes
 from .labels import as_label, on_axis, title_of
 from .rules import has_training_data
@@ -85,7 +85,7 @@ class MembershipDisplay:
         ax : matplotlib Axes or sequence of Axes, default=None
             One for each input that has terms; None makes a figure.
         """
-        model, rows = (fold(estimator), None) if X is None else fold_with_rows(estimator, X)
+        model, rows = fold_with_rows(estimator, X)
         with_terms = np.unique(model.antecedent.term_inputs).tolist()
         if not with_terms:
             raise ValueError("The model has no terms: nothing to draw.")
@@ -202,8 +202,7 @@ class ResponseSurfaceDisplay:
             None makes a figure.
         """
         check_count("grid_resolution", grid_resolution, 2)
-        model, reader = fold_with_reader(estimator)
-        points = None if X is None else reader(X)
+        model, points = fold_with_rows(estimator, X)
         if np.size(features) != 2:
             raise ValueError(f"features={features!r} must be two inputs.")
         if model.n_inputs == 1:
@@ -220,7 +219,7 @@ class ResponseSurfaceDisplay:
                     f"{model.minimum[j]:g}. Name two inputs that vary."
                 )
         k = checked_position(output, model.output_names, "output")
-        (xx0, xx1), rows, others = section_over(model, both, grid_resolution, held, reader.levels)
+        (xx0, xx1), rows, others = section_over(model, both, grid_resolution, held)
         coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
         display = cls(
             xx0=xx0,
@@ -291,7 +290,7 @@ def pyplot():
     return plt
 
 
-def section_over(model, both, n_points, held, levels):
+def section_over(model, both, n_points, held):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 
     The others take their value in ``held``, or their mean in training, in few digits, or what is
@@ -303,15 +302,14 @@ def section_over(model, both, n_points, held, levels):
     held = {} if held is None else held
     if not isinstance(held, Mapping):
         raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")
-    names, (categories, unnamed) = list(model.input_names), by_column(levels)
+    names, columns = model.input_names, categories(model)
     taken = {*both, *(checked_position(feature, names) for feature in held)}
-    for indicators in categories.values():
-        own = [names.index(name) for name in indicators]
+    for one in columns.values():
         # The commonest level is held, unless a level is drawn or held already.
-        row[own] = 0.0
-        share = model.reference[own]
-        if taken.isdisjoint(own) and share.max() >= 1.0 - share.sum():
-            row[own[int(share.argmax())]] = 1.0
+        row[one.inputs] = 0.0
+        share = model.reference[one.inputs]
+        if taken.isdisjoint(one.inputs) and share.max() >= 1.0 - share.sum():
+            row[one.inputs[int(share.argmax())]] = 1.0
     for feature, value in held.items():
         j = checked_position(feature, model.input_names)
         if j in both:
@@ -327,9 +325,8 @@ def section_over(model, both, n_points, held, levels):
     rows = np.tile(row, (n_points**2, 1))
     rows[:, both] = np.stack(grid, axis=-1).reshape(-1, 2)
     others: dict[str, Any] = {name: float(row[j]) for j, name in enumerate(names) if j not in both}
-    for column, indicators in categories.items():
-        if others.keys() >= set(indicators):
-            of_indicators = {levels[name].level: others.pop(name) for name in indicators}
-            said = [level for level, value in of_indicators.items() if value]
-            others[column] = (said or unnamed[column])[0]
+    for column, one in columns.items():
+        if not {*both} & {*one.inputs}:
+            values = [others.pop(names[j]) for j in one.inputs]
+            others[column] = [*compress(one.levels, values), *one.others, "other"][0]
     return grid, rows, others

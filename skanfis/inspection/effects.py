@@ -11,11 +11,11 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from .._validation import checked_position
-from ..export.columns import by_column
-from ..export.folding import fold_with_reader
+from ..export import fold_with_rows
+from ..export.columns import categories
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
-from .text import MOST_NAMED, ROUNDING, counted
+from .text import MOST_NAMED, counted
 
 # Notes are made of shares that differ by more, and of outputs held on more of the combinations.
 _DIFFERENT, _HELD = 0.1, 0.01
@@ -221,19 +221,17 @@ class Study:
     @classmethod
     def of(cls, estimator, X, groups, output):
         """Of an estimator; ValueError as of :func:`effects`."""
-        model, read = fold_with_reader(estimator)
+        model, rows = fold_with_rows(estimator, X)
         k = checked_position(output, model.output_names, "output")
-        rows = None if X is None else np.clip(read(X), model.minimum, model.maximum)
+        rows = None if rows is None else np.clip(rows, model.minimum, model.maximum)
         if groups and rows is None:
             raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
         if not isinstance(groups, Mapping | None):
             raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
-        place, (indicators, others) = model.input_names.index, by_column(read.levels)
-        found = {name: tuple(map(place, own)) for name, own in indicators.items()}
-        levels = {name: [read.levels[one].level for one in own] for name, own in indicators.items()}
-        for name, places in found.items():
-            if model.reference[list(places)].sum() < 1.0 - ROUNDING:
-                levels[name].append(" or ".join(others[name]))
+        found, levels = {}, {}
+        for name, one in categories(model).items():
+            found[name] = tuple(one.inputs)
+            levels[name] = one.levels + ([" or ".join(one.others)] if one.others else [])
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):
                 raise ValueError(f"groups[{label!r}] is {columns!r}: a list of columns is needed.")

@@ -1,13 +1,11 @@
 """Names from files and tables, as pictures and terminals may show them."""
 
-import unicodedata
 from textwrap import fill, wrap
 
 from .text import counted
 
-# Categories of what no reader sees; and joiners, without which some scripts are not written.
-_HIDDEN = ("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp")
-_JOINERS = "\u200c\u200d"
+# Joiners, without which some scripts are not written, and blanks between numbers and units.
+_SHOWN = "\u200c\u200d\u00a0\u202f"
 # Inputs that a title names; letters in a line of a title, and of a label along an axis.
 _MOST_HELD, _LETTERS, _LETTERS_ON_AXIS = 4, 60, 20
 
@@ -15,10 +13,7 @@ _MOST_HELD, _LETTERS, _LETTERS_ON_AXIS = 4, 60, 20
 def printable(text):
     """The text with escapes for what no reader sees: control signs, lone surrogates, line ends."""
     return "".join(
-        sign.encode("unicode_escape").decode("ascii")
-        if unicodedata.category(sign) in _HIDDEN and sign not in _JOINERS
-        else sign
-        for sign in str(text)
+        sign if sign.isprintable() or sign in _SHOWN else ascii(sign)[1:-1] for sign in str(text)
     )
 
 

@@ -35,20 +35,18 @@ class Measures:
     printed_errors: np.ndarray  # the same of the model as it is printed
 
 
-def measure(model, read, n_rows, y=None, sample_weight=None):
-    """Measure the rules on rows, which ``read`` gives from a slice; y None is the predictions."""
-    blocks = row_blocks(n_rows, LARGE_BLOCK_ROWS) or [slice(0, 0)]
+def measure(model, X, y=None, sample_weight=None):
+    """Measure the rules on rows; y None is the predictions."""
     if y is None:
-        held = model.with_out_of_bounds("clip")
-        y = np.concatenate([held.predict(read(part)) for part in blocks])
-    y, weight = np.asarray(y, dtype=float), np.ones(n_rows)
-    if sample_weight is None:
-        target = column_statistics(y)
-    else:
-        weight = np.asarray(sample_weight, dtype=float)
-        target = column_statistics(y[weight > 0.0], weight[weight > 0.0])
+        y = model.with_out_of_bounds("clip").predict(X)
+    y = np.asarray(y, dtype=float)
+    weight = np.ones(len(X)) if sample_weight is None else np.asarray(sample_weight, dtype=float)
+    target = column_statistics(y[weight > 0.0], weight[weight > 0.0])
     printed = Sentences.of(model).printed
-    sums = (rule_sums(model, printed, target, read(part), y[part], weight[part]) for part in blocks)
+    sums = (
+        rule_sums(model, printed, target, X[part], y[part], weight[part])
+        for part in row_blocks(len(X), LARGE_BLOCK_ROWS)
+    )
     return measures_of(target, reduce(add_each, sums))
 
 

@@ -1,7 +1,6 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,13 +10,12 @@ from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import as_numbers, check_finite, positive_weights
 from ..digits import in_digits
-from ..export.columns import Level
-from ..export.folding import fold_with_reader
+from ..export import fold_with_rows
 from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
 from .sentences import Sentences
-from .text import counted
+from .text import MOST_NAMED, counted
 
 # In deviations of the target: the strongest rule alone is then as far from the model as one that
 # explains three quarters of the variance is from the target; beyond, it says too little.
@@ -28,8 +26,6 @@ GREATEST_ERROR = 1.05
 _ROUNDING = np.sqrt(np.finfo(float).eps)
 # A slope has a sign if it is so many deviations from zero, in a rule of this part of the weight.
 _DEVIATIONS, _LEAST_WEIGHT = 2.0, 0.05
-# A sentence names so many, and counts the others.
-_MOST_NAMED = 5
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,8 +40,6 @@ class Readability:
         The model that was measured.
     measures : Measures
         The figures as arrays.
-    levels : dict, default={}
-        What indicators of a ``OneHotEncoder`` tell, by name; the functions here find them.
     is_of_chunk : bool, default=False
         Whether the rows are those of the latest ``partial_fit`` alone, which is then said.
 
@@ -79,18 +73,17 @@ class Readability:
 
     model: TSKModel
     measures: Measures
-    levels: Mapping[str, Level] = field(default_factory=dict)
     is_of_chunk: bool = False
 
     @property
     def _said(self):
-        return Sentences.of(self.model, levels=self.levels)
+        return Sentences.of(self.model)
 
     @property
     def rules(self) -> Any:
         """The rules; see the class."""
         found, said = self.measures, self._said
-        premises = np.array(premise_texts(said.model, self.levels), dtype=object)
+        premises = np.array(premise_texts(said.model), dtype=object)
         rule = np.repeat(np.arange(premises.size), self.model.n_outputs)
         return pd.DataFrame(
             {
@@ -209,7 +202,7 @@ def readability(
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     X : array-like of shape (n_samples, n_features)
-        Rows, read block by block; those outside the range count at its nearest point.
+        Rows; those outside the range count at its nearest point.
     y : array-like of shape (n_samples,) or (n_samples, n_outputs), default=None
         The target, whose standard deviation is the unit; None takes the predictions.
     sample_weight : array-like of shape (n_samples,), default=None
@@ -234,42 +227,26 @@ def readability(
     >>> readability(ANFISRegressor(n_mfs=2, agreement=1.0).fit(X, y), X, y).findings
     []
     """
-    return _readability(estimator, X, y, sample_weight)
-
-
-def _readability(estimator, X, y, sample_weight):
-    # Apart and without types: of what is array-like, mypy knows neither rows nor a shape.
-    model, reader = fold_with_reader(estimator)
-    n_rows = X.shape[0] if hasattr(X, "shape") else len(X)
-    take = getattr(X, "iloc", X)
-
-    def read(part):
-        try:
-            return reader(take[part])
-        except (TypeError, ValueError):
-            # The whole table: the error then names the row by its place in it.
-            reader(X)
-            raise
-
+    (model, rows), target, weight = fold_with_rows(estimator, X), None, None
     if y is not None:
-        y = as_numbers(y, "y")
-        y = y.reshape(-1, 1) if y.ndim == 1 else y
-        if y.shape[1] != model.n_outputs:
+        target = as_numbers(y, "y")
+        target = target.reshape(-1, 1) if target.ndim == 1 else target
+        if target.shape[1] != model.n_outputs:
             raise ValueError(
-                f"y has {y.shape[1]} columns; the model has {model.n_outputs} outputs: "
+                f"y has {target.shape[1]} columns; the model has {model.n_outputs} outputs: "
                 f"{', '.join(map(repr, model.output_names))}."
             )
-        check_finite(y, "y", model.output_names)
+        check_finite(target, "y", model.output_names)
     if sample_weight is not None:
-        sample_weight = column_or_1d(check_array(sample_weight, dtype=float, ensure_2d=False))
-        positive_weights(sample_weight, n_rows)
-    check_consistent_length(X, y, sample_weight)
-    return Readability(model, measure(model, read, n_rows, y, sample_weight), reader.levels)
+        weight = column_or_1d(check_array(sample_weight, dtype=float, ensure_2d=False))
+        positive_weights(weight, len(rows))
+    check_consistent_length(rows, target, weight)
+    return readability_of_rows(model, rows, target, weight)
 
 
 def readability_of_rows(model, X, y=None, sample_weight=None):
     """Measure a model on arrays that have been checked."""
-    return Readability(model, measure(model, lambda part: X[part], X.shape[0], y, sample_weight))
+    return Readability(model, measure(model, X, y, sample_weight))
 
 
 def _on_signs(said):
@@ -287,7 +264,7 @@ def _on_signs(said):
             up, down = (np.flatnonzero(is_clear & (sign * slopes > 0.0)) for sign in (1.0, -1.0))
             if up.size and down.size:
                 name, of_output = model.input_names[j], f" (of {output})" * (model.n_outputs > 1)
-                level = said.levels.get(name)
+                level = model.levels.get(name)
                 cause = f"by {name}{of_output}"
                 if level is not None:
                     cause = f"if {level.said(True)}{of_output},"
@@ -302,6 +279,6 @@ def _rules(numbers):
 
 
 def _named(parts, between=", "):
-    if len(parts) <= _MOST_NAMED:
+    if len(parts) <= MOST_NAMED:
         return between.join(parts)
-    return f"{between.join(parts[:_MOST_NAMED])} and {len(parts) - _MOST_NAMED} more"
+    return f"{between.join(parts[:MOST_NAMED])} and {len(parts) - MOST_NAMED} more"

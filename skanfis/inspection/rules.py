@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 
 from .._validation import check_count
 from ..digits import MOST_DIGITS
-from ..export import fold
-from ..export.folding import fold_with_reader, last_step
+from ..export import fold, fold_with_rows
+from ..export.folding import last_step
 from .sentences import Sentences
 
 
@@ -26,19 +26,19 @@ def conditions(model):
     return [dict(sorted(rule.items())) for rule in rules]
 
 
-def premise_texts(model, levels=()):
+def premise_texts(model):
     """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" of a rule that asks nothing."""
-    names = model.input_names
     return [
-        " AND ".join(condition(names[j], term, levels) for j, term in rule.items()) or "anything"
+        " AND ".join(condition(model, j, term) for j, term in rule.items()) or "anything"
         for rule in conditions(model)
     ]
 
 
-def condition(name, term, levels=()):
+def condition(model, j, term):
     """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator."""
-    if term in ("0", "1") and name in levels:
-        return levels[name].said(term == "1")
+    name = model.input_names[j]
+    if term in ("0", "1") and name in model.levels:
+        return model.levels[name].said(term == "1")
     return f"{name} {term}" if term.startswith(("<", ">")) else f"{name} is {term}"
 
 
@@ -62,7 +62,7 @@ def parts_led(model):
     return rows / rows.sum() if has_training_data(model) else model.rule_weights
 
 
-def readability_in_training(estimator, model, levels):
+def readability_in_training(estimator, model):
     """The fit's ``readability_`` for ``model``, which is the estimator folded and renamed; or None.
 
     Behind a scaler the numbers are rounded in other units, and what the text errs is not known.
@@ -79,7 +79,7 @@ def readability_in_training(estimator, model, levels):
     )
     if not np.array_equal(own, fitted):
         measures = replace(measures, printed_errors=np.full(model.n_outputs, np.nan))
-    return replace(found, model=model, measures=measures, levels=levels)
+    return replace(found, model=model, measures=measures)
 
 
 def rename(model, feature_names, output_names):
@@ -133,22 +133,17 @@ def rules_table(estimator: Any) -> Any:
     ['value', 'x0', 'x1']
     """
     model = fold(estimator)
-    asked, said = conditions(model), Sentences.of(model, MOST_DIGITS)
-    # Pairs: an input may be called "value" too.
-    columns: list = [
-        (("if", model.input_names[j]), [rule.get(j) for rule in asked])
-        for j in sorted({j for rule in asked for j in rule})
-    ]
-    columns += [(("data", "weight"), model.rule_weights), (("data", "rows"), model.rule_rows)]
-    columns += zip([("at", name) for name in model.input_names], said.places.T, strict=True)
+    said, names = Sentences.of(model, MOST_DIGITS), list(model.input_names)
+    asked = pd.DataFrame(conditions(model)).sort_index(axis=1)
+    parts = {
+        "if": asked.rename(columns=dict(enumerate(names))),
+        "data": pd.DataFrame({"weight": model.rule_weights, "rows": model.rule_rows}),
+        "at": pd.DataFrame(said.places, columns=names),
+    }
     for k, output in enumerate(model.output_names):
-        names = [(f"then {output}", name) for name in ("value", *model.input_names)]
-        numbers = np.column_stack([said.values[:, k], said.slopes[:, :, k]]).T
-        columns += zip(names, numbers, strict=True)
-    keys, values = zip(*columns, strict=True)
-    index = pd.RangeIndex(model.n_rules, name="rule")
-    table = pd.DataFrame(dict(enumerate(values)), index=index)
-    return table.set_axis(pd.MultiIndex.from_tuples(keys), axis=1)
+        numbers = np.column_stack([said.values[:, k], said.slopes[:, :, k]])
+        parts[f"then {output}"] = pd.DataFrame(numbers, columns=["value", *names])
+    return pd.concat(parts, axis=1).rename_axis("rule")
 
 
 def explain(estimator: Any, X: ArrayLike) -> Any:
@@ -189,8 +184,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     >>> bool(abs(table["contribution"].sum() - model.predict(X[:1])[0]) < 1e-12)
     True
     """
-    model, read = fold_with_reader(estimator)
-    rows = read(X)
+    model, rows = fold_with_rows(estimator, X)
     inside = model.in_bounds(rows)
     if model.out_of_bounds == "raise" and not inside.all():
         raise ValueError(model.describe_out_of_bounds(rows))
@@ -219,7 +213,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
     source = order[row, place]
     beyond_names = [f"beyond {name}" for name in model.input_names]
-    texts = [*premise_texts(model, read.levels), *beyond_names, "held"]
+    texts = [*premise_texts(model), *beyond_names, "held"]
     return pd.DataFrame(
         {
             "row": row,

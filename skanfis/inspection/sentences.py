@@ -13,14 +13,14 @@ is that line's at the centre, so that f_r is also v_r less this part, plus the l
 rule's own slopes. Text, HTML, tables, and the model as it is printed are made of these numbers.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
 from ..antecedent.tree import CRISP
 from ..digits import MOST_DIGITS, rounded
-from ..export.columns import Level, by_column
+from ..export.columns import categories, columns_of
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..reading_cost import UNSAID
@@ -48,13 +48,11 @@ class Sentences:
     is_own: np.ndarray  # which of them the rule states itself
     common_place: np.ndarray  # (n_inputs,)
     common: np.ndarray  # the common line; zero where nothing is in common, (n_inputs, n_outputs)
-    levels: Mapping[str, Level]  # as ``Reader.levels``
 
     @classmethod
-    def of(cls, model: TSKModel, precision: int = PRECISION, levels=None):
+    def of(cls, model: TSKModel, precision: int = PRECISION):
         """What a model says; of 17 digits nothing is lost."""
-        slopes = np.zeros((model.n_rules, model.n_inputs, model.n_outputs))
-        slopes[:, : model.coefficients.shape[1] - 1] = model.coefficients[:, 1:]
+        slopes = model.consequents[:, 1:]
         scale, noise = _resolution(model, slopes)
         two_valued = model.two_valued
         digits, centers = max(_DIGITS_OF_PLACE, precision), model.rule_centers
@@ -62,12 +60,12 @@ class Sentences:
             np.where(two_valued, np.round(np.clip(at, 0.0, 1.0)), rounded(at, model.spread, digits))
             for at in (centers, model.reference)
         )
-        is_common, levels, told = model.common_slopes, levels or {}, slopes.copy()
+        is_common, told = model.common_slopes, slopes
         is_fixed = np.zeros(places.shape, dtype=bool)
         if precision < MOST_DIGITS:
             # A case that all rows of a rule are, or none is, changes nothing there.
             is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
-            _tell_from_levels(model, levels, told, places, is_common, ~is_fixed)
+            told, places, is_common = _from_a_level(model, slopes, places, is_common, ~is_fixed)
         values = np.einsum("rj,rjo->ro", places - model.reference, slopes)
         values += model.coefficients[:, 0]
         slopes = rounded(told, noise / model.spread[:, None], precision)
@@ -81,10 +79,10 @@ class Sentences:
         # What terms may be off by is a part of the output's deviation, not of the noise.
         more = int(np.floor(np.log10(scale / noise)).max(initial=0.0))
         digits = min(precision + more, MOST_DIGITS)
-        written, says_where = _written_terms(model, levels, digits)
+        written, says_where = _written_terms(model, digits)
         values, of_common = (rounded(one, noise, precision) for one in (values, of_common))
         of_rules = places, values, of_common, slopes, is_own
-        return cls(written, says_where, *of_rules, common_place, common, levels)
+        return cls(written, says_where, *of_rules, common_place, common)
 
     @property
     def printed(self) -> TSKModel:
@@ -110,36 +108,25 @@ class Sentences:
         return int(self.n_numbers.sum() + np.count_nonzero(self.common))
 
 
-def columns_of(model, levels):
-    """The column that each input is of; those of one category by its name."""
-    return [levels.get(name, (name,))[0] for name in model.input_names]
+def _from_a_level(model, slopes, places, is_common, is_told):
+    """Slopes and places of rules that say their value at one level of a category; what is common.
 
-
-def _tell_from_levels(model, levels, slopes, places, is_common, is_told):
-    """Let rules say their value at the commonest level of a category, and how others differ.
-
-    In place; where all rows have an indicator, which then sum to one, and that is no more to say.
+    Where all rows have a level their slopes are known but for a constant, and that level has none.
+    It is the commonest one of the rule; of two levels, of which one has a common slope, the other:
+    the slope that is left then stands in its place. All of it where that is no more to say.
     """
-    centers, names = model.rule_centers, list(model.input_names)
-    for indicators in by_column(levels)[0].values():
-        own = [names.index(name) for name in indicators if name in names]
-        if np.round(model.reference[own].sum(), _DIGITS_OF_CASE) != 1.0:
+    slopes, places, is_common = slopes.copy(), places.copy(), is_common.copy()
+    whole = [one.inputs for one in categories(model).values() if not one.others]
+    for own, (r, center) in product(map(np.array, whole), enumerate(model.rule_centers)):
+        free = own[~is_common[r, own]]
+        if free.size < own.size and (own.size > 2 or not is_told[r, free].any()):
             continue
-        if is_common[:, own].any():
-            # Of two levels one slope says all, in place of the common one.
-            for r in np.flatnonzero(is_common[:, own].sum(axis=1) == 1) if len(own) == 2 else ():
-                j, other = sorted(own, key=is_common[r].__getitem__, reverse=True)
-                if (slopes[r, other] * is_told[r, other]).any():
-                    slopes[r, j], slopes[r, other] = slopes[r, j] - slopes[r, other], 0.0
-                    is_common[r, j], places[r, other] = False, 1.0 - places[r, j]
-            continue
-        base = centers[:, own].argmax(axis=1)[:, None] == np.arange(len(own))
-        now, said = slopes[:, own], is_told[:, own, None]
-        changes = np.where(said, now - now[base][:, None], 0.0)
-        fewest, most = (np.count_nonzero(one, axis=(1, 2)) for one in (changes, now * said))
-        is_short = fewest <= most
-        rules = np.ix_(is_short, own)
-        slopes[rules], places[rules] = changes[is_short], base[is_short]
+        base = free[center[free].argmax()]
+        changes = np.where(is_told[r, own, None], slopes[r, own] - slopes[r, base], 0.0)
+        now = slopes[r, free] * is_told[r, free, None]
+        if np.count_nonzero(changes) <= np.count_nonzero(now):
+            slopes[r, own], places[r, own], is_common[r, own] = changes, own == base, False
+    return slopes, places, is_common
 
 
 def _resolution(model, slopes):
@@ -154,7 +141,7 @@ def _resolution(model, slopes):
     return scale, np.clip(noise, _FINEST * scale, scale)
 
 
-def _written_terms(model, levels, digits):
+def _written_terms(model, digits):
     """The model with its terms as they are written, and which of them say by name where they turn.
 
     A name that somebody has given stays. Where every training row is on one side of a cut, to so
@@ -185,7 +172,7 @@ def _written_terms(model, levels, digits):
         start += group.n_terms
     written = replace(antecedent, groups=tuple(groups))
     if digits < MOST_DIGITS:
-        written = written.without_implied(UNSAID, columns_of(model, levels))
+        written = written.without_implied(UNSAID, columns_of(model))
     return replace(model, antecedent=written, term_names=tuple(names)), says_where
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, rounded
-from ..export.columns import by_column
-from ..export.folding import fold_with_reader
+from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, told_apart
+from ..export import fold
+from ..export.columns import categories, columns_of
 from ..learning.data import never_changes
 from ..policies import SILENT, policy_in_words
 from .rules import (
@@ -24,14 +24,14 @@ from .rules import (
     rename,
     shown_rules,
 )
-from .sentences import PRECISION, Sentences, columns_of
+from .sentences import PRECISION, Sentences
 
 # Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 4
-# Inputs in no rule are named if they are so few, and else counted.
+# A sentence names so many, and counts others.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
-ROUNDING = 1e-9  # of a sum of shares
+_DECIMALS_OF_PERCENT = 9  # the others are rounding's
 # How to compute a prediction; the parts in braces are left out where there is no such thing.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
@@ -127,7 +127,7 @@ def export_text(
     parts += [_wrapped(f"Common to the rules, {line}.") for line in common]
     if common:
         parts[-1] += f"\n{_IN_PLACE}"
-    premises = premise_texts(model, said.levels)
+    premises = premise_texts(model)
     for r in chosen:
         heading = ", ".join([f"Rule {r}", *_on_rows(model, found, r)])
         lines = [f"IF {premises[r]}"]
@@ -173,7 +173,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     """
     said, found = _said(estimator)
     model, chosen = said.model, shown_rules(said.model, max_shown)
-    premises = premise_texts(model, said.levels)
+    premises = premise_texts(model)
     cells: dict = {}
     if has_training_data(model):
         cells["data", "rows"] = [percent(part) for part in parts_led(model)[chosen]]
@@ -203,10 +203,8 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
 def _said(estimator, precision=PRECISION, feature_names=None, output_names=None):
     """What the rules say in so many digits, and what the fit found of them, if it is known."""
     check_count("precision", precision, 1, MOST_DIGITS)
-    folded, reader = fold_with_reader(estimator)
-    model = rename(folded, feature_names, output_names)
-    said = Sentences.of(model, precision, reader.levels)
-    return said, readability_in_training(estimator, model, said.levels)
+    model = rename(fold(estimator), feature_names, output_names)
+    return Sentences.of(model, precision), readability_in_training(estimator, model)
 
 
 def _inputs_and_rows(model):
@@ -254,7 +252,7 @@ def _slopes(said, slopes, places, is_said):
     Levels of a category stand together; none in place of a common one is "no change with rooms".
     """
     model, parts, does = said.model, [], np.abs(slopes) * said.model.spread
-    called = columns_of(model, said.levels)
+    called = columns_of(model)
     most: dict[str, float] = {}
     for j in np.flatnonzero(is_said):
         most[called[j]] = max(most.get(called[j], 0.0), does[j])
@@ -264,7 +262,7 @@ def _slopes(said, slopes, places, is_said):
         if model.two_valued[j]:
             other = 1.0 - place
             change = _signed(slope * (other - place)) if slope else "no change"
-            parts.append(f"{change} if {condition(name, plain(other), said.levels)}")
+            parts.append(f"{change} if {condition(model, j, plain(other))}")
         elif not slope:
             parts.append(f"no change with {name}")
         else:
@@ -285,10 +283,8 @@ def _on_rows(model, found, r):
 
 def percent(part):
     """Write "48 %", "6.5 %", and of what is not all "99.5 %"."""
-    share, rest = 100.0 * part, 100.0 * (1.0 - part)
-    if rest > ROUNDING and f"{share:.0f}" == "100":
-        return f"{plain(rounded(share, rest, 1))} %"
-    return f"{share:{'.0f' if share >= 10.0 else '.2g'}} %"
+    share = round(100.0 * part, _DECIMALS_OF_PERCENT)
+    return f"{told_apart([share, 100.0], 2)[0]} %"
 
 
 def _errors(found, r):
@@ -314,36 +310,34 @@ def _legend(said, found, precision):
     families = [group.family for group in model.antecedent.groups]
     at = {one.name for family in families for one in family.parameters if one.kind == "location"}
     named = list(compress(model.memberships(), ~said.says_where))
-    called = columns_of(model, said.levels)
+    called = columns_of(model)
     has_part = said.is_own.any(axis=(0, 2)) | said.common.any(axis=1)
     has_part[model.antecedent.term_inputs] = True
     # Where nothing is predicted outside the range of any input, all of them have.
     with_part = set(called if model.out_of_bounds in SILENT else compress(called, has_part))
-    without_indicator = by_column(said.levels)[1]
-    categories: dict[str, list[int]] = {}
+    listed = []
     for j, name in enumerate(model.input_names):
         if called[j] not in with_part:
             continue
         terms = [term for term in named if term["input"] == name]
-        if model.two_valued[j] and name in said.levels and not terms:
-            categories.setdefault(called[j], []).append(j)
+        if model.two_valued[j] and name in model.levels and not terms:
+            listed.append(j)
             continue
         range_of = range_in_digits(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
         lines.append(f"  {name}: {range_of}")
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
-    for name, own in categories.items():
-        levels = [said.levels[model.input_names[j]].level for j in own]
-        if model.reference[own].sum() < 1.0 - ROUNDING:
-            levels += [other for other in without_indicator[name] if other not in levels]
-        lines.append(_wrapped(f"  {name}: {', '.join(levels)}", later=6 * " "))
+    lists = categories(model, listed)
+    for name, one in lists.items():
+        levels = ", ".join([*one.levels, *one.others])
+        lines.append(_wrapped(f"  {name}: {levels}", later=6 * " "))
     unnamed = [one for one in dict.fromkeys(called) if one not in with_part]
     with_slope = set(compress(called, model.coefficients[:, 1:].any(axis=(0, 2))))
     for has_slope, told in ((True, "slopes too small to be written"), (False, "in no rule")):
         if alike := [one for one in unnamed if (one in with_slope) == has_slope]:
             names = ", ".join(alike) if len(alike) <= MOST_NAMED else f"{len(alike)} more inputs"
             lines.append(_wrapped(f"  {names}: {told}", later=6 * " "))
-    if with_part - categories.keys():
+    if with_part - lists.keys():
         words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
         lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):

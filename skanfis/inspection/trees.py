@@ -1,7 +1,6 @@
 """Pictures of a tree: its cuts and what stands at the leaves, and the plane that they cut."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Self, cast
 
 import numpy as np
@@ -9,11 +8,10 @@ import numpy as np
 from .._validation import check_choice, checked_position
 from ..antecedent import TreeAntecedent
 from ..digits import plain, rounded
-from ..export.columns import Level
-from ..export.folding import fold_with_reader
+from ..export import fold
 from ..model import TSKModel
-from .displays import axes_or_new, section_over
-from .labels import as_label, on_axis, title_of
+from .displays import ResponseSurfaceDisplay, axes_or_new, section_over
+from .labels import as_label
 from .rules import condition, parts_led
 from .sentences import Sentences
 from .text import counted, percent
@@ -31,8 +29,9 @@ class TreeDisplay:
     """The rules of a tree: cuts, and at each leaf its value and on which part of the rows it leads.
 
     A branch is the thicker the more rows take it. With ``kind="plane"`` it is the prediction over
-    the two inputs that are cut, with lines where another rule becomes the strongest, and what each
-    rule says there in the middle of its rows. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
+    the two inputs that are cut, as :class:`ResponseSurfaceDisplay` draws it, with lines where
+    another rule becomes the strongest, and what each rule says there in the middle of its rows.
+    ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
@@ -41,8 +40,6 @@ class TreeDisplay:
     output : int, default=0
         Whose values stand at the leaves.
     kind : {"tree", "plane"}, default="tree"
-    levels : dict, default={}
-        What indicators of a ``OneHotEncoder`` tell, by name; ``from_estimator`` finds them.
 
     Examples
     --------
@@ -58,7 +55,6 @@ class TreeDisplay:
     model: TSKModel
     output: int = 0
     kind: str = "tree"
-    levels: Mapping[str, Level] = field(default_factory=dict)
 
     @classmethod
     def from_estimator(
@@ -84,7 +80,7 @@ class TreeDisplay:
             If the rules are no tree, or the plane is asked of one that cuts more or fewer inputs.
         """
         check_choice("kind", kind, ("tree", "plane"))
-        model, reader = fold_with_reader(estimator)
+        model = fold(estimator)
         if not isinstance(model.antecedent, TreeAntecedent):
             raise ValueError(
                 f"The model has {counted(model.n_rules, 'rule')} and is no tree: there are no cuts "
@@ -95,11 +91,11 @@ class TreeDisplay:
             names = ", ".join(repr(model.input_names[j]) for j in inputs)
             raise ValueError(f"kind='plane' is of two inputs; this tree cuts {names}.")
         place = checked_position(output, model.output_names, "output")
-        return cls(model=model, output=place, kind=kind, levels=reader.levels).plot(ax=ax)
+        return cls(model=model, output=place, kind=kind).plot(ax=ax)
 
     @property
     def _said(self):
-        return Sentences.of(self.model, levels=self.levels)
+        return Sentences.of(self.model)
 
     @property
     def values(self) -> np.ndarray:
@@ -122,10 +118,9 @@ class TreeDisplay:
     def _draw_tree(self, ax):
         model, tree = self.model, cast(TreeAntecedent, self.model.antecedent)
         (order, ends), n_rules = tree.walk, model.n_rules
-        names = [model.input_names[j] for j in tree.term_inputs]
         # Above and below each node.
-        terms = zip(names, self._said.model.term_names, strict=True)
-        words = [as_label(condition(name, term, self.levels)) for name, term in terms]
+        terms = zip(tree.term_inputs, self._said.model.term_names, strict=True)
+        words = [as_label(condition(model, j, term)) for j, term in terms]
         words = np.reshape(words, (2, -1)).T[order]
         # By place, leaves first: how high it stands, how far from the root, what comes to it.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
@@ -159,14 +154,15 @@ class TreeDisplay:
 
     def _draw_plane(self, ax):
         model, both = self.model, np.unique(self.model.antecedent.term_inputs)
-        ax = self.ax_ = axes_or_new(ax)
-        axes, rows, held = section_over(model, both, _N_POINTS, None, self.levels)
-        response = model.predict(rows)[:, self.output].reshape(_N_POINTS, _N_POINTS)
-        colours = ax.pcolormesh(*axes, response, shading="nearest", rasterized=True)
-        ax.figure.colorbar(colours, ax=ax, label=on_axis(model.output_names[self.output]))
+        surface = ResponseSurfaceDisplay.from_estimator(
+            model, features=both, output=self.output, grid_resolution=_N_POINTS, ax=ax
+        )
+        ax, response = surface.ax_, surface.response
+        self.ax_ = ax
+        axes, rows, _ = section_over(model, both, _N_POINTS, None)
         strongest = model.strengths(rows).argmax(axis=1).reshape(response.shape)
         borders = np.arange(model.n_rules - 1) + 0.5
-        ax.contour(*axes, strongest, levels=borders, colors="white", linewidths=1.5)
+        ax.contour(*axes, strongest, levels=borders, colors="black", linewidths=1.0)
         box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "boxstyle": "round"}
         said, low, high = self._said, model.minimum[both], model.maximum[both]
         # From the middle of its rows to where the other inputs are held.
@@ -177,7 +173,3 @@ class TreeDisplay:
         inside = np.clip(said.places[:, both], *low + np.outer(_INSIDE, high - low))
         for value, center in zip(values, inside, strict=True):
             ax.text(*center, plain(value), fontsize="small", ha="center", va="center", bbox=box)
-        first, second = (on_axis(model.input_names[j]) for j in both)
-        xlim, ylim = zip(low, high, strict=True)
-        ax.set(xlabel=first, ylabel=second, xlim=xlim, ylim=ylim)
-        ax.set_title(title_of(held), fontsize="small", loc="left")

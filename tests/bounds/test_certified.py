@@ -88,7 +88,10 @@ def test_the_box_is_held_where_the_policy_holds(rng):
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        ({"box": [(0.0, 1.0)]}, r"one \(low, high\) for each of the 3 inputs .*shape \(1, 2\)"),
+        (
+            {"box": [(0.0, 1.0)]},
+            r"for each of the 3 inputs .*got \[\(0.0, 1.0\)\]",
+        ),
         ({"box": "all"}, r"one \(low, high\) for each of the 3 inputs .*got 'all'"),
         (
             {"box": {"speed": (0.0, 1.0)}},
@@ -96,7 +99,7 @@ def test_the_box_is_held_where_the_policy_holds(rng):
         ),
         ({"box": {"rate": (1.0, 0.0)}}, r"box has \(1, 0\) for 'rate': low must not be above high"),
         ({"box": {"rate": (np.nan, 0.0)}}, "above high, or NaN"),
-        ({"box": {"rate": ("a", 1.0)}}, r"box\['rate'\]=\('a', 1.0\) must be two numbers"),
+        ({"box": {"rate": ("a", 1.0)}}, r"got {'rate': \('a', 1.0\)}"),
         ({"tol": -1}, "tol=-1 must be a number, zero or positive"),
         ({"tol": "a"}, "tol='a' must be a number"),
         ({"max_boxes": 0}, "max_boxes=0 must be a whole number of 1 or more"),

@@ -264,3 +264,10 @@ def test_rows_are_checked():
     frame.loc[3, "kelvin"] = np.nan
     with pytest.raises(ValueError, match="NaN in column 'kelvin', first at row 3"):
         fold_with_rows(pipe, frame)
+
+
+def test_steps_take_rows_with_and_without_names_in_silence():
+    frame = pd.DataFrame(X, columns=NAMES)
+    for known, given in ((X, frame), (frame, X), (frame, X.tolist())):
+        pipe = make_pipeline(StandardScaler(), regressor(n_mfs=2)).fit(known, Y)
+        assert_array_equal(fold_with_rows(pipe, given)[1], X)

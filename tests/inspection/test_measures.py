@@ -18,10 +18,6 @@ ONE = MODELS["one rule, order 1, 1 outputs"]
 A_TABLE = MODELS["rule table, order 1, 2 outputs"]
 
 
-def found_of(model, X, y=None, weight=None):
-    return measure(model, lambda part: X[part], len(X), y, weight)
-
-
 def data_of(model, n_rows=40):
     """Rows in and out of the box, a target that the model does not fit, weights with a zero."""
     X = rows_of(model, 1.2, n_rows)
@@ -87,7 +83,7 @@ def test_measures_are_what_loops_find(model, unit):
     X, y, weight = data_of(model)
     data = X, unit * y, weight
     # The textbook form of the consequents, far from the origin, has lost digits: so the tolerance.
-    assert_alike(found_of(model, *data), by_loops(model, *data), rtol=1e-6)
+    assert_alike(measure(model, *data), by_loops(model, *data), rtol=1e-6)
 
 
 def of_two_rules(first, second):
@@ -107,8 +103,8 @@ def of_two_rules(first, second):
 
 def test_a_constant_target_has_a_deviation_of_one():
     X, y, _ = data_of(ONE)
-    assert_array_equal(found_of(ONE, X, np.full_like(y, 0.1)).deviation, 1.0)
+    assert_array_equal(measure(ONE, X, np.full_like(y, 0.1)).deviation, 1.0)
     flat = of_two_rules(0.1, 0.1)  # predictions that differ by rounding errors
-    found = found_of(flat, np.random.default_rng(0).uniform(-2, 2, (99, 3)))
+    found = measure(flat, np.random.default_rng(0).uniform(-2, 2, (99, 3)))
     assert_array_equal(found.deviation, 1.0)
     assert found.alone[0] < 1e-12

@@ -14,7 +14,7 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
-from skanfis.export import export_json, read_json
+from skanfis.export import export_json, fold, read_json
 from skanfis.inspection import explain, export_text, readability, rules_html
 from skanfis.inspection.rules import parts_led
 from skanfis.inspection.sentences import Sentences
@@ -213,6 +213,7 @@ def test_a_level_of_a_category_is_called_by_its_column(rng):
     told = export_text(pipe).partition("Inputs")[0]
     assert "\n  IF fibre is PM\n" in told
     assert "\n  IF fibre is not PM\n" in told
+    assert "\n  IF fibre is not PM\n" in export_text(fold(pipe))
     assert re.search(r"(\+1\S* if fibre is SM|-1\S* if fibre is HB)", told)
     assert "fibre_" not in told
     assert "fibre is not PM" in rules_html(pipe)

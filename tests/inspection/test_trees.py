@@ -115,7 +115,7 @@ def test_plane_has_the_cuts_and_the_values(rng):
     y = X[:, 2] + 4.0 * X[:, 1] * (X[:, 0] > 0.2) + 0.01 * rng.normal(size=300)
     model = quick(partition="tree", premise_features=[0, 2], max_rules=4, simplicity=0).fit(X, y)
     display = TreeDisplay.from_estimator(model, kind="plane")
-    assert display.ax_.get_title(loc="left") == "x1 = 0"
+    assert display.ax_.get_title(loc="left").partition(";")[0] == "x1 = 0"
     assert display.values.max() > 3.0
     for text, place in texts(display).items():
         assert 0.05 < place[1] < 0.95

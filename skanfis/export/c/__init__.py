@@ -2,8 +2,8 @@
 
 ``fold`` takes scalers in, ``_numbers`` rounds and shifts what is written. ``source`` chooses lines
 of ``templates`` by facts of the model; ``dialect`` fills in names, types and numbers. What these
-functions name is written before them: helpers, memberships (from formulas, by ``_expressions``) and
-tables. ``self_test`` and ``header`` complete the files.
+functions name is written before them: helpers, memberships and tables. ``self_test`` and ``header``
+complete the files.
 """
 
 from collections.abc import Mapping, Sequence

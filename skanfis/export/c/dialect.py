@@ -20,8 +20,6 @@ _FUNCTIONS = ("exp", "log", "sqrt", "asin")
 _NUMBER_IN_TEMPLATE = re.compile(r"(\d+\.\d+)R\b")
 # Decimal digits that give back the very same float or double.
 _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
-# A name in a comment stays on its line.
-_LONGEST_COMMENT = 60
 # Unsigned types of positions, and the bytes that they take nearly everywhere.
 _INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 _BITS = {
@@ -144,17 +142,10 @@ def literals(values, indent=""):
     )
 
 
-def comment(text):
-    """Any name as something that cannot end a comment, continue a line or make a trigraph."""
-    text = str(text)
-    rest = "..." if len(text) > _LONGEST_COMMENT else ""
-    return remark(text[:_LONGEST_COMMENT]) + rest
-
-
 def remark(text):
-    """A text of any length for a comment, in which a star may multiply."""
+    """A text for a comment that cannot end it, continue a line or make a trigraph."""
     unsafe = r"[^ -~]|\\|\?(?=\?)|\*(?=/)|(?<=/)\*"
-    return re.sub(unsafe, lambda found: f"<U+{ord(found[0]):04X}>", text)
+    return re.sub(unsafe, lambda found: f"<U+{ord(found[0]):04X}>", str(text))
 
 
 def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_NAME):
@@ -192,21 +183,16 @@ def read_limits(saturate, numbers):
         return None
     if hasattr(saturate, "lower"):
         saturate = np.stack([saturate.lower, saturate.upper], axis=-1)
-    given = np.array(saturate, dtype=float)
-    n_outputs = numbers.model.n_outputs
-    if given.shape != (n_outputs, 2):
-        raise ValueError(
-            f"saturate must have (low, high) for each of the {n_outputs} outputs, or be what "
-            f"skanfis.bounds.bounds returns for this model; got an array of shape {given.shape}."
-        )
-    limits = rounded_within(given.T, numbers.dtype).T
-    is_below = (given[:, 0] < given[:, 1]) & (limits[:, 0] <= limits[:, 1])
-    if not (np.isfinite([given, limits]).all() and is_below.all()):
-        raise ValueError(
-            f"saturate={given.tolist()} must be finite, each low below its high, with a number of "
-            f"{numbers.dtype} between them."
-        )
-    return limits
+    given, n_outputs = np.array(saturate, dtype=float), numbers.model.n_outputs
+    if given.shape == (n_outputs, 2) and (given[:, 0] < given[:, 1]).all():
+        limits = rounded_within(given.T, numbers.dtype).T
+        if np.isfinite([given, limits]).all() and (limits[:, 0] <= limits[:, 1]).all():
+            return limits
+    raise ValueError(
+        f"saturate={given.tolist()} must have finite (low, high), with low below high and with a "
+        f"number of {numbers.dtype} between them, for each of the {n_outputs} outputs; or be what "
+        "skanfis.bounds.bounds returns for this model."
+    )
 
 
 def write_files(code, path):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...digits import range_in_digits
 from ...policies import policy_in_words
-from .dialect import comment, remark, status_lines
+from .dialect import remark, status_lines
 
 # Of the width of a range: to about a hundred-thousandth.
 _DIGITS = 6
@@ -59,7 +59,8 @@ int $name_self_test(void);
 def header(source, units, notes):
     """The header, whose first comment says what the model is and what it costs."""
     model, numbers, dialect = source.model, source.numbers, source.dialect
-    lowest, highest = model.output_limits
+    asked = (-np.inf, np.inf) if source.limits is None else source.limits.T
+    lowest, highest = np.clip(model.output_limits, *asked)
     lines = [
         *map(remark, [notes] if isinstance(notes, str) else notes),
         f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
@@ -69,12 +70,6 @@ def header(source, units, notes):
         "Outputs y, and what they are held within:",
         *_ranges(model.output_names, lowest, highest, units),
     ]
-    if source.limits is not None:
-        ends = zip(model.output_names, *source.limits.T, strict=True)
-        told = ", ".join(
-            f"{comment(name)} from {range_in_digits(a, b, _DIGITS)}" for name, a, b in ends
-        )
-        lines += ["", f"Outputs are saturated beyond limits that were asked for: {told}."]
     lines += _precision_lines(numbers)
     lines += ["", policy_line(model, "Outside this range")]
     lines.append("A row that is not finite gets no output either way.")
@@ -102,8 +97,8 @@ def input_lines(names, low, high, units):
 def _ranges(names, low, high, units):
     units, ranges = units or {}, zip(names, low, high, strict=True)
     for k, (name, least, most) in enumerate(ranges):
-        unit = f" [{comment(units[name])}]" if name in units else ""
-        yield f"  [{k}] {comment(name)}{unit}: {range_in_digits(least, most, _DIGITS)}"
+        unit = f" [{remark(units[name])}]" if name in units else ""
+        yield f"  [{k}] {remark(name)}{unit}: {range_in_digits(least, most, _DIGITS)}"
 
 
 def policy_line(model, where):

@@ -1,21 +1,23 @@
 """The .c file: constant tables, and the functions that read them.
 
-The functions are in ``templates``; here is which of their lines there are, how many of each thing,
-and what it costs. The order of work is that of ``skanfis.model``; "linear" is worked out outside
-the box alone, by the derivative along the way from its nearest point.
+The functions are in ``templates``; those of memberships are made of formulas in ``_families``. Here
+is which lines there are, how many of each thing, and what it costs. The order of work is that of
+``skanfis.model``; "linear" is worked out outside the box alone, by the derivative along the way
+from its nearest point.
 """
 
 import re
+from collections import Counter
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partialmethod
 from typing import Any
 
 import numpy as np
 
 from ...policies import SILENT
+from .._families import FORMULAS
 from .._numbers import Numbers
 from . import templates
-from ._expressions import Body
 from .dialect import STATUS, Dialect, kept_lines, read_limits, table_bytes
 
 
@@ -209,7 +211,7 @@ class Source:
                         what=what,
                         family=family.name,
                         of=of,
-                        lines=Body(family, self.dialect, bool(of)).text,
+                        lines=_Body(family, self.dialect, bool(of)).text,
                     )
 
     @cached_property
@@ -256,7 +258,7 @@ class Source:
             return sizes["n_nodes"] * np.array([1, 0, 4 + is_slope, 1])
         operations = np.zeros(4, dtype=int)
         for terms in numbers.terms:
-            of_term = Body(terms.family, self.dialect, is_slope).cost
+            of_term = _Body(terms.family, self.dialect, is_slope).cost
             operations += len(terms.constants) * np.array(of_term)
         n_shares = sizes["n_rules" if "sums" in facts else "n_terms"]
         if is_slope:
@@ -287,3 +289,61 @@ class RulesPart(Source):
         macros = [f"#define {prefix}_{key} {value}\n" for key, value in sizes.items()]
         macros += [f"#define {prefix}_{key} {self._outer}_{key}\n" for key in STATUS]
         return f"\n/* Of the rules. */\n{''.join(macros)}\n{self.body()}"
+
+
+class _Number:
+    """A number in C; every operation on it becomes a line of the body."""
+
+    def __init__(self, text, body):
+        self.text, self.body = text, body
+
+    def _line(self, *others, template):
+        return self.body.add(template, (self, *others))
+
+    def _comparison(self, other, sign):
+        # Is no number: stands where it is used.
+        return _Number(f"{self.text} {sign} {self.body.text_of(other)}", self.body)
+
+    __add__ = partialmethod(_line, template="{0} + {1}")
+    __sub__ = partialmethod(_line, template="{0} - {1}")
+    __mul__ = partialmethod(_line, template="{0} * {1}")
+    __truediv__ = partialmethod(_line, template="{0} / {1}")
+    __neg__ = partialmethod(_line, template="-{0}")
+    __lt__ = partialmethod(_comparison, sign="<")
+    __gt__ = partialmethod(_comparison, sign=">")
+    exp = partialmethod(_line, template="$EXP({0})")
+    log = partialmethod(_line, template="$LOG({0})")
+    abs = partialmethod(_line, template="{0} < 0.0R ? -{0} : {0}")
+    at_most = partialmethod(_line, template="{0} < {1} ? {0} : {1}")
+    at_least = partialmethod(_line, template="{0} > {1} ? {0} : {1}")
+    where = partialmethod(_line, template="{0} ? {1} : {2}")
+
+
+class _Body:
+    """A function of x and p: log mu of a family, or its derivative by x.
+
+    ``text`` are its statements, ``cost`` their exponentials, logarithms, products and divisions.
+    """
+
+    def __init__(self, family, dialect, is_slope):
+        self.dialect = dialect
+        self._lines: list[str] = []
+        self._operations: Counter = Counter()
+        formula = FORMULAS[family]
+        n_constants = len(formula.constants([0.0] * len(family.parameters)))
+        p = [_Number(f"p[{k}]", self) for k in range(n_constants)]
+        result = formula.of(_Number("x", self), p)[is_slope]()
+        self.text = "".join([*self._lines, f"    return {result.text};"])
+        operations = ("$EXP({0})", "$LOG({0})", "{0} * {1}", "{0} / {1}")
+        self.cost = [self._operations[one] for one in operations]
+
+    def add(self, template, operands):
+        """The number that a new line makes of others."""
+        self._operations[template] += 1
+        name, text = f"t{len(self._lines)}", template.format(*map(self.text_of, operands))
+        self._lines.append(self.dialect.write(f"    const $real {name} = {text};\n"))
+        return _Number(name, self)
+
+    def text_of(self, number):
+        """A number as it stands in a line."""
+        return number.text if isinstance(number, _Number) else self.dialect.number(number)
