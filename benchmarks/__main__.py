@@ -21,9 +21,7 @@ ON_REQUEST = (
     "compensation",
     "c_code",
     "large_data",
-    "long_logs",
 )
-ROWS = 10_000_000
 RESULTS = Path(__file__).with_name("RESULTS.md")
 
 
@@ -42,9 +40,6 @@ def parse():
         help="a CSV of a rate-table campaign, columns gyro_counts, temp_c, rate_true_deg_s",
     )
     parser.add_argument("--details", action="store_true", help="certain: also one by one")
-    parser.add_argument(
-        "--rows", type=int, default=ROWS, metavar="N", help="long_logs: rows of a log"
-    )
     many = parser.add_argument_group("structure, trees, and what else has many cases")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
@@ -78,7 +73,6 @@ def command(options):
     words = ["python", "-m", "benchmarks", *options.names]
     words += ["--campaign", "PATH"] if options.campaign else []
     words += ["--details"] if options.details else []
-    words += [f"--rows={options.rows}"] if options.rows != ROWS else []
     words += [f"--every={options.every}"] if options.every > 1 else []
     words += [f"--only={options.only}"] if options.only else []
     words += ["--quick"] if options.quick else []
