@@ -3,7 +3,7 @@ r"""What is expected of new rows: the error on rows that had no part in anything
 A sequence of candidates is grown anew without some of the rows, and its members are judged on
 these, size by size. With few rows in five folds; with many, half of the rows are enough to grow and
 half to judge, once. Rows that come in groups, runs of an instrument say, are left out in whole
-groups, in ten folds: the fewer runs are left out together, the smaller the gaps that they leave.
+groups, and of few groups each alone: the more runs are left out together, the wider the gaps.
 Rows beyond the range that a fold grows on do not judge, unless most are.
 
 Rows are dealt in the order of their target, so that neither the order in which they come nor that
@@ -16,8 +16,10 @@ from sklearn.model_selection import GroupKFold
 from ..learning.data import StandardisedData
 from .sample import DIGITS, search_sample
 
-# Folds of rows, and of groups; rows that are enough to judge on.
-FOLDS, GROUP_FOLDS, ENOUGH = 5, 10, 200
+# Of so many groups each is left out alone; of rows, and of more groups, a fifth at a time.
+FOLDS, FEW_GROUPS = 5, 10
+# Rows, and groups, that are enough to judge on.
+ENOUGH, ENOUGH_GROUPS = 200, 20
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
@@ -37,26 +39,39 @@ def n_groups(rows: StandardisedData) -> int:
 
 def folds(rows: StandardisedData):
     """Positions of the other rows and of its own, of every fold; whole groups, if there are any."""
-    if n_groups(rows) > 1:
-        n_folds = min(GROUP_FOLDS, n_groups(rows))
-        return list(GroupKFold(n_folds).split(rows.X, groups=rows.groups))
+    found = n_groups(rows)
+    if found > 1:
+        return _group_folds(rows, found if found <= FEW_GROUPS else FOLDS)
     every, n_folds = np.arange(rows.n_rows), min(FOLDS, rows.n_rows)
     return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
 
 
+def _group_folds(rows, n_folds):
+    return list(GroupKFold(n_folds).split(rows.X, groups=rows.groups))
+
+
 def judging_folds(rows: StandardisedData):
-    """Positions to grow on and positions to judge on, of every fold that is needed."""
-    n_rows, every = rows.n_rows, np.arange(rows.n_rows)
+    """Positions to grow on and positions to judge on, of every fold that is needed; if it is half.
+
+    Half of many rows is enough to grow on, too.
+    """
+    n_rows, every, is_grouped = rows.n_rows, np.arange(rows.n_rows), n_groups(rows) > 1
     if n_rows == 1:
-        return [(every, every)]
-    found = folds(rows)
-    if n_groups(rows) == 1:
-        if n_rows >= FOLDS * ENOUGH:
-            found = [(every[1::2], every[::2])]
-        found = found[: int(np.ceil(len(found) * ENOUGH / n_rows))]
+        return [(every, every)], True
+    n_times_enough = n_rows / ENOUGH
+    if is_grouped:
+        n_times_enough = min(n_times_enough, n_groups(rows) / ENOUGH_GROUPS)
+    is_half = n_times_enough >= FOLDS
+    if is_half:
+        found = _group_folds(rows, 2)[:1] if is_grouped else [(every[1::2], every[::2])]
+    else:
+        found = folds(rows)
+        found = found[: int(np.ceil(len(found) / n_times_enough))]
     inside = [(grow, _in_range(rows.X, grow, judge)) for grow, judge in found]
     left_out, in_range = (sum(judge.size for _, judge in part) for part in (found, inside))
-    return [part for part in inside if part[1].size] if 2 * in_range >= left_out else found
+    if 2 * in_range >= left_out:
+        found = [part for part in inside if part[1].size]
+    return found, is_half
 
 
 def _in_range(X, grow, judge):

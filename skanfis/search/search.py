@@ -15,7 +15,7 @@ from ..learning.data import StandardisedData
 from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
-from .judging import dealt_rows, judging_folds, n_groups
+from .judging import dealt_rows, judging_folds
 from .start import Start, started
 from .trials import Plan, Trials
 from .tuning import cost_of
@@ -33,13 +33,11 @@ class StructureSearch:
     def __init__(self, rows: StandardisedData, plan: Plan, simplicity: float):
         self.plan, self.simplicity = plan, simplicity
         sample = dealt_rows(rows)
-        found = judging_folds(sample)
+        found, is_half = judging_folds(sample)
         n_basis = 1 + plan.consequent_inputs.size
         is_wide = sample.n_rows < ROWS_PER_CONSEQUENT * _FEW_RULES * n_basis
         self.folds = [Trials(sample.part(grow), plan, is_wide) for grow, _ in found]
         self.left_out = [sample.part(judge) for _, judge in found]
-        # Half of many rows is enough to grow on; one group, where the others judge, is not.
-        is_half = len(found) == 1 and n_groups(sample) == 1
         self.trials = self.folds[0] if is_half else Trials(sample, plan, is_wide)
         self.judges = Judges.of(self.left_out)
         self.judged: list[Judged] = []

@@ -40,7 +40,8 @@ class TestSplits:
     @pytest.mark.parametrize("n_rows", [2, 4, 37, 150, 400, 999, 1000, 3001])
     def test_each_row_is_left_out_once_or_two_hundred_are(self, rng, n_rows):
         rows = dealt(*measured(rng, n_rows))
-        folds = judging_folds(rows)
+        folds, is_half = judging_folds(rows)
+        assert is_half == (n_rows >= 1000)
         parts = [left_out(rows, grow) for grow, _ in folds]
         left = np.concatenate(parts)
         assert np.unique(left).size == left.size >= min(n_rows, 200)
@@ -49,14 +50,20 @@ class TestSplits:
             assert max(map(len, parts)) - min(map(len, parts)) <= 1
         assert_judges(rows, folds)
 
-    @pytest.mark.parametrize(("n_groups", "n_folds"), [(2, 2), (8, 8), (23, 10)])
-    def test_groups_are_left_out_whole(self, rng, n_groups, n_folds):
+    @pytest.mark.parametrize(
+        ("n_groups", "n_folds", "n_judging"),
+        [(2, 2, 2), (8, 8, 8), (11, 5, 11), (23, 5, 23), (50, 2, 20), (99, 2, 40), (100, 1, 50)],
+    )
+    def test_groups_are_left_out_whole(self, rng, n_groups, n_folds, n_judging):
+        """Few alone, of many a part."""
         X, y = measured(rng, 3000)
-        rows = dealt(X, y, groups=rng.integers(0, n_groups, 3000))
-        folds = judging_folds(rows)
+        rows = dealt(X, y, groups=np.arange(3000) % n_groups)
+        folds, is_half = judging_folds(rows)
         assert len(folds) == n_folds
+        assert is_half == (n_groups == 100)
         left = [left_out(rows, grow) for grow, _ in folds]
-        assert_array_equal(np.sort(np.concatenate(left)), np.arange(3000))
+        assert np.unique(np.concatenate(left)).size == sum(map(len, left))
+        assert np.unique(rows.groups[np.concatenate(left)]).size == n_judging
         for (grow, _), own in zip(folds, left, strict=True):
             assert not np.intersect1d(rows.groups[grow], rows.groups[own]).size
         assert_judges(rows, folds)
@@ -66,13 +73,13 @@ class TestSplits:
         X, y = measured(rng, 500)
         X[:, 0] = groups = np.arange(500) % 5
         rows = dealt(X, y, groups=groups)
-        folds = judging_folds(rows)
+        folds, _ = judging_folds(rows)
         assert len(folds) == 3
         assert_array_equal(np.unique(rows.groups[np.concatenate([j for _, j in folds])]), [1, 2, 3])
         # Of three runs most rows are at an end: the search cannot do without.
         rows = dealt(X[groups < 3], y[groups < 3], groups=groups[groups < 3])
         assert_array_equal(
-            np.sort(np.concatenate([j for _, j in judging_folds(rows)])), np.arange(300)
+            np.sort(np.concatenate([j for _, j in judging_folds(rows)[0]])), np.arange(300)
         )
 
     def test_rounding_neither_parts_rows_nor_takes_them_out_of_range(self, rng):
@@ -82,10 +89,10 @@ class TestSplits:
         exact, found = dealt(X, y), dealt(wobble, y)
         assert_array_equal(found.sample_weight, exact.sample_weight)
         assert_allclose(found.X, exact.X, atol=1e-12)
-        parts = zip(judging_folds(found), judging_folds(exact), strict=True)
+        parts = zip(judging_folds(found)[0], judging_folds(exact)[0], strict=True)
         for (_, own), (_, expected) in parts:
             assert_array_equal(own, expected)
 
     def test_one_row_judges_itself(self, rng):
-        (fold,) = judging_folds(dealt(*measured(rng)).part([0]))
+        (fold,), _ = judging_folds(dealt(*measured(rng)).part([0]))
         assert_array_equal(fold, [[0], [0]])

@@ -248,7 +248,7 @@ def test_expected_error_of_the_linear_model_is_that_of_its_folds(rng, n_groups):
     (told,) = [one for one in model.structures_ if one["structure"] == "one rule"]
     rows = dealt_rows(StandardisedData.of(X, y[:, None], groups=groups))
     Z, t, squares, weights = rows.X, rows.y[:, 0], [], []
-    for grow, rest in judging_folds(rows):
+    for grow, rest in judging_folds(rows)[0]:
         plane = LinearRegression().fit(Z[grow], t[grow])
         squares.append((plane.predict(Z[rest]) - t[rest]) ** 2)
         weights.append(grow.size)
