@@ -3,8 +3,8 @@ r"""What is expected of new rows: the error on rows that had no part in anything
 A sequence of candidates is grown anew without some of the rows, and its members are judged on
 these, size by size. With few rows in five folds; with many, half of the rows are enough to grow and
 half to judge, once. Rows that come in groups, runs of an instrument say, are left out in whole
-groups, and of few groups each alone: the more runs are left out together, the wider the gaps.
-Rows beyond the range that a fold grows on do not judge, unless most are.
+groups, and of few groups each alone: the more runs are left out together, the wider the gaps. Rows
+beyond the range that a fold grows on do not judge, unless most are.
 
 Rows are dealt in the order of their target, so that neither the order in which they come nor that
 of the columns makes a difference; what is equal in all columns is one row with a weight.
@@ -16,10 +16,10 @@ from sklearn.model_selection import GroupKFold
 from ..learning.data import StandardisedData
 from .sample import DIGITS, search_sample
 
-# Of so many groups each is left out alone; of rows, and of more groups, a fifth at a time.
+# Of few groups each is left out alone; of more, and of rows, a fifth at a time.
 FOLDS, FEW_GROUPS = 5, 10
 # Rows, and groups, that are enough to judge on.
-ENOUGH, ENOUGH_GROUPS = 200, 20
+ENOUGH, ENOUGH_GROUPS = 200, 40
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
@@ -55,18 +55,14 @@ def judging_folds(rows: StandardisedData):
 
     Half of many rows is enough to grow on, too.
     """
-    n_rows, every, is_grouped = rows.n_rows, np.arange(rows.n_rows), n_groups(rows) > 1
+    n_rows, every = rows.n_rows, np.arange(rows.n_rows)
     if n_rows == 1:
         return [(every, every)], True
-    n_times_enough = n_rows / ENOUGH
-    if is_grouped:
-        n_times_enough = min(n_times_enough, n_groups(rows) / ENOUGH_GROUPS)
-    is_half = n_times_enough >= FOLDS
-    if is_half:
-        found = _group_folds(rows, 2)[:1] if is_grouped else [(every[1::2], every[::2])]
-    else:
-        found = folds(rows)
-        found = found[: int(np.ceil(len(found) / n_times_enough))]
+    is_grouped = n_groups(rows) > 1
+    is_half = not is_grouped and n_rows >= FOLDS * ENOUGH
+    found = [(every[1::2], every[::2])] if is_half else folds(rows)
+    times_enough = n_groups(rows) / ENOUGH_GROUPS if is_grouped else n_rows / ENOUGH
+    found = found[: int(np.ceil(len(found) / times_enough))]
     inside = [(grow, _in_range(rows.X, grow, judge)) for grow, judge in found]
     left_out, in_range = (sum(judge.size for _, judge in part) for part in (found, inside))
     if 2 * in_range >= left_out:
