@@ -44,6 +44,8 @@ _ROWS_PER_LEVEL = 3
 _WIDEST_GAP = 0.4
 # What a temperature must come back by for a turn: of its range, and at least [degC].
 _TURN, _SMALLEST_TURN = 0.2, 3.0
+# A turning point is looked for among so many rows of each run.
+_MOST_POINTS = 5_000
 _NO_CLOCK = (
     " No column of the time was found, whose gaps would tell runs apart: name it with --columns "
     "time=NAME."
@@ -298,10 +300,13 @@ def find_legs(temperature, run=None):
 
 def _turns(temperature, least):
     """Rows at which the temperature turns, and comes back by ``least`` or more before the next."""
-    highs, lows = (find_peaks(side, prominence=least)[0] for side in (temperature, -temperature))
+    # Of some rows: a soak with many that are equally high takes the square of their number.
+    every = -(-temperature.size // _MOST_POINTS)
+    some = temperature[::every]
+    highs, lows = (find_peaks(side, prominence=least)[0] for side in (some, -some))
     turns = pd.concat([pd.Series("high", highs), pd.Series("low", lows)]).sort_index()
     # Of several that are equally high, as rounding leaves at a soak, the first.
-    return turns.index[turns != turns.shift()]
+    return turns.index[turns != turns.shift()] * every
 
 
 def _pieces(legs):

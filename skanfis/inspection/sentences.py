@@ -118,7 +118,7 @@ def _from_a_level(model, slopes, places, is_common, is_told):
     slopes, places, is_common = slopes.copy(), places.copy(), is_common.copy()
     whole = [one.inputs for one in categories(model).values() if not one.others]
     for own, (r, center) in product(map(np.array, whole), enumerate(model.rule_centers)):
-        free = own[~is_common[r, own]]
+        free = own[~is_common[:, own].any(axis=0)]
         if free.size < own.size and (own.size > 2 or not is_told[r, free].any()):
             continue
         base = free[center[free].argmax()]

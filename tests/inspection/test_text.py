@@ -278,22 +278,26 @@ def test_a_value_is_that_of_a_level_and_others_are_told_from_it(handle_unknown, 
 
 
 @pytest.mark.parametrize("handle_unknown", ["error", "ignore"])
-def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(handle_unknown, rng):
-    X = pd.DataFrame({"rate": rng.normal(size=300), "on": rng.choice(["n", "y"], 300)})
+@pytest.mark.parametrize("slopes_of_rule", [(4.0, 2.0), (0.0, 5.0)])
+def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(
+    slopes_of_rule, handle_unknown, rng
+):
+    levels = rng.choice(["n", "y"], 300, p=[0.3, 0.7])
+    X = pd.DataFrame({"rate": rng.normal(size=300), "on": levels})
     encoder = OneHotEncoder(sparse_output=False, handle_unknown=handle_unknown)
     encoder = make_column_transformer((encoder, ["on"]), remainder="passthrough")
     model = ANFISRegressor(partition="tree", max_rules=3, order=1)
     y = np.where(X["rate"] > 0.7, 9.0, np.where(X["rate"] < -0.7, -9.0, 0.0))
     pipe = make_pipeline(encoder, model).fit(X, y + 0.1 * rng.normal(size=300))
-    # By the one indicator two rules have a common slope, by the other the third has its own.
+    # By one indicator two rules have a common slope; the third has its own by either.
     coefficients = np.zeros((3, 4, 1))
-    coefficients[:, 0, 0], coefficients[1:, 2, 0], coefficients[0, 1, 0] = [1.0, 5.0, 9.0], 2.0, 4.0
-    coefficients[0, 2, 0] = 2.0
+    coefficients[:, 0, 0], coefficients[1:, 2, 0] = [1.0, 5.0, 9.0], 2.0
+    coefficients[0, 1:3, 0] = slopes_of_rule
     pipe[-1].model_ = replace(pipe[-1].model_, coefficients=coefficients)
     text = export_text(pipe)
     line = re.search(r"Common to the rules, y: (.*)\.", text)[1]
     told = re.findall(r"Rule (\d)[\s\S]*?THEN y is about (\S+)(?:, of it (\S+) .*)?(: .*)?\n", text)
-    assert {r for r, *_, slopes in told if slopes} == {"0"}
+    assert {r: slopes.count(" if on ") for r, *_, slopes in told if slopes} == {"0": 1}
     # What a rule says itself is said in place of the line.
     for level in "ny":
         row = pd.DataFrame({"rate": [0.0], "on": [level]})
