@@ -7,10 +7,11 @@ and larger than memory.
 """
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
-from ..blocks import BLOCK_ROWS, row_blocks
+from ..blocks import BLOCK_ROWS, add_each, row_blocks
 from ..policies import ROUNDING
 
 # Blocks per unit of parallel work. It depends on nothing, so that sums are taken in the same order
@@ -185,7 +186,8 @@ class StandardisedData:
 
     def chunks(self, block_rows):
         """Units of parallel work: lists of slices of at most ``block_rows`` rows."""
-        blocks = row_blocks(self.n_rows, block_rows)
+        # Of no rows there is one block: its sums are zeros of their shapes.
+        blocks = row_blocks(self.n_rows, block_rows) or [slice(0, 0)]
         step = _BLOCKS_PER_CHUNK
         return [blocks[start : start + step] for start in range(0, len(blocks), step)]
 
@@ -197,16 +199,9 @@ class StandardisedData:
         """
 
         def of_chunk(chunk):
-            sums = [np.zeros(shape, order="F") for shape in one_pass.shapes]
-            for part in chunk:
-                one_pass(*self.read(part), sums)
-            return sums
+            return reduce(add_each, (one_pass(*self.read(part)) for part in chunk))
 
-        totals = [np.zeros(shape, order="F") for shape in one_pass.shapes]
-        for sums in map_ordered(of_chunk, self.chunks(block_rows)):
-            for total, one in zip(totals, sums, strict=True):
-                total += one
-        return totals
+        return reduce(add_each, map_ordered(of_chunk, self.chunks(block_rows)))
 
     def reduce(self, of_rows, merge):
         """What ``of_rows`` makes of the rows; where they are in parts, merged two by two."""
@@ -221,11 +216,17 @@ class StandardisedData:
     def numbers(self, of_block):
         """One number for every row, which a function makes of Z and the target of a block."""
         numbers = np.empty(self.n_rows)
-        for part in row_blocks(self.n_rows, BLOCK_ROWS):
-            numbers[part] = of_block(*self.read(part)[:2])
+        for part, Z, target, _ in self.blocks():
+            numbers[part] = of_block(Z, target)
         return numbers
 
+    def blocks(self, block_rows=BLOCK_ROWS):
+        """Blocks of at most so many rows, in order: slice, and what is read of it."""
+        for part in row_blocks(self.n_rows, block_rows):
+            yield part, *self.read(part)
+
     def read(self, part):
-        """Z, standardised target, and weights or None, of one block."""
-        weight = None if self.sample_weight is None else self.sample_weight[part]
-        return self.inputs.apply(self.X[part].T), self.targets.apply(self.y[part].T), weight
+        """Z, standardised target, and weights, of one block."""
+        Z, target = self.inputs.apply(self.X[part].T), self.targets.apply(self.y[part].T)
+        weight = np.ones(Z.shape[1]) if self.sample_weight is None else self.sample_weight[part]
+        return Z, target, weight

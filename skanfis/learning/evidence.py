@@ -174,8 +174,8 @@ def laplace(
     # Of one constant there is no penalty at all: any size will do.
     size = np.trace(matrix) / matrix.shape[0] or 1.0
     # ``matrix`` takes on the factor's shift.
-    free = line.own.free(penalty)
-    own, _, error = normal.with_penalty(matrix, evaluation.mean_squared_error, free)
+    free = line.free(penalty)
+    own, _, squares = normal.with_penalty(matrix, evaluation.mean_squares, free)
     factor, solved = own.factor, own.coefficients
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), free)
@@ -183,10 +183,11 @@ def laplace(
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
     paid[_STIFFNESS] *= np.dot(displacement, displacement)
     paid[_OTHERS] *= line.squares(solved)
+    paid_by_all = np.vdot(solved, matrix @ solved) + paid[_STIFFNESS]
     return Laplace(
         penalty,
         n_rows,
-        max(error + float(np.vdot(solved, matrix @ solved) + paid[_STIFFNESS]), _LEAST_ERROR),
+        max(float(squares.sum() + paid_by_all), _LEAST_ERROR),
         n_outputs,
         factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(line.n_rules),
         paid,

@@ -45,7 +45,7 @@ class RuleRows:
         which they have slopes, (n_rules, n_slopes).
         """
         best, top = strongest_rules(strengths), strengths.max(axis=0)
-        weighted = basis_rows if weight is None else basis_rows * weight
+        weighted = basis_rows * weight
         rule, row = np.nonzero(strengths >= FIRES * top)
         root, extent = np.sqrt(strengths), np.empty_like(centers)
         for j, x in enumerate(X[slope_inputs]):

@@ -131,7 +131,7 @@ def test_evaluation_is_that_of_the_dense_ridge_regression(case):
     assert_all_close(found.coefficients, dense.coefficients(case.point), 1e-9)
     squares = dense.weight @ (dense.y - dense.design(case.point) @ found.coefficients) ** 2
     assert_allclose(found.mean_squared_error, np.sum(squares), rtol=1e-10)
-    assert_allclose(case.problem.mean_squares(found), squares, rtol=1e-9)
+    assert_allclose(found.mean_squares, squares, rtol=1e-9)
     firing = oracles.strengths(case.problem.antecedent, case.point, dense.Z)
     assert_allclose(found.masses, firing @ dense.weight, rtol=1e-11, atol=1e-15)
 
