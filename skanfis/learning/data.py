@@ -184,6 +184,19 @@ class StandardisedData:
         """Their sum."""
         return float(np.sum(self.weights))
 
+    @property
+    def effective_weight(self):
+        """Rows by weight: their sum, or as many as their spread leaves, whichever are more.
+
+        A whole weight is so many copies of a row. Weights that are less than whole cannot be
+        copies; then the size of an unweighted sample of the same precision stands for it,
+        W^2 / sum s^2 (Kish 1965), where that is more.
+        """
+        # By the largest: squares of tiny weights would vanish.
+        largest = float(np.max(self.weights))
+        share = self.weights / largest
+        return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
+
     def chunks(self, block_rows):
         """Units of parallel work: lists of slices of at most ``block_rows`` rows."""
         # Of no rows there is one block: its sums are zeros of their shapes.

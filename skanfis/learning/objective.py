@@ -129,7 +129,7 @@ class SeparableProblem:
             + 6 * antecedent.parameters.size
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
-        self._weight = rows.total_weight
+        self._weight, self.n_rows = rows.total_weight, rows.effective_weight
         # glibc hands back what is freed beyond limits that grow with the largest piece freed so
         # far; without one of this size, every block gets its arrays page by page again, and a pass
         # takes up to twice as long. Nothing is written to it.
@@ -168,6 +168,7 @@ class SeparableProblem:
         """
         other = copy.copy(self)
         other.rows, other._weight, other.on_sample = rows, rows.total_weight, self
+        other.n_rows = rows.effective_weight
         other._sums_at_start = None
         return other
 
@@ -290,13 +291,13 @@ class SeparableProblem:
             residual = target - outputs_of_rules(by_output, strengths, basis_rows)
             yield part, strengths, basis_rows, residual, weight
 
-    def leave_one_out_error(self, evaluation, n_rows):
+    def leave_one_out_error(self, evaluation):
         """Mean squared error of leaving out each row, at fixed premises (Allen 1974).
 
-        The mean of (r_i / (1 - h_i))^2, h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. The weights are
-        those of so many rows: of a row that stands for several, one is left out.
+        The mean of (r_i / (1 - h_i))^2, h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. Of a
+        row that stands for several, one is left out.
         """
-        total, unit = 0.0, self._weight / n_rows
+        total, unit = 0.0, self._weight / self.n_rows
         # L^-1 T': what is changed is a matrix of few rows, and not the design.
         root = self.local.to_global(evaluation.normal.factor.root.T).T
         for _, strengths, basis_rows, residual, weight in self._fired(evaluation):

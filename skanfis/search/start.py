@@ -19,7 +19,7 @@ from ..learning.premise import Premise
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
-from .sample import effective_weight, search_sample
+from .sample import search_sample
 from .trials import FEWEST_SEEN, Plan
 from .tuning import (
     ARRIVING,
@@ -82,16 +82,15 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     """A start from rules that are given, with the weights that are not given found on the rows."""
     sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
-    n_sample, (low, high) = effective_weight(sample), sample.inputs.box
-    premise = Premise.of(antecedent, low, high)
+    premise = Premise.of(antecedent, *sample.inputs.box)
     turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)
-    best = tune(problem, premise, free, n_sample, turns, steps)
+    best = tune(problem, premise, free, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
     if is_bounded and has_rows and problem.n_columns <= MANY_COLUMNS:
-        unbounded = Premise.of(antecedent, low, high, is_unbounded=True)
-        freed = tune_unbounded(problem, unbounded, free, n_sample)
+        unbounded = Premise.of(antecedent, *sample.inputs.box, is_unbounded=True)
+        freed = tune_unbounded(problem, unbounded, free)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best = freed
     room, worths = 1.0, SLOPE_WORTHS if turns else ()

@@ -66,12 +66,12 @@ class Tuned:
     posterior: Laplace
 
     @classmethod
-    def start(cls, problem: SeparableProblem, premise: Premise, free, n_rows: float):
+    def start(cls, problem: SeparableProblem, premise: Premise, free):
         """Where premises have not moved, and weights are those of the problem's penalty."""
         x = np.zeros(premise.size)
         evaluation, line = problem.evaluate(premise.parameters(x)), problem.common_line
         n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
-        posterior = laplace(evaluation, line, problem.penalty, n_rows, n_outputs, x)
+        posterior = laplace(evaluation, line, problem.penalty, problem.n_rows, n_outputs, x)
         return cls(problem, premise, free, evaluation, x, posterior)
 
     def with_penalty(self, penalty, curvature=None):
@@ -116,7 +116,7 @@ class Tuned:
         share = self.posterior.n_effective_premises / n_rows
         if share >= 1.0:
             return np.inf
-        left_out = self.problem.leave_one_out_error(self.solved, n_rows)
+        left_out = self.problem.leave_one_out_error(self.solved)
         return left_out * (1.0 + share) / (1.0 - share)
 
 
@@ -124,39 +124,37 @@ def tune(
     problem: SeparableProblem,
     premise: Premise,
     free,
-    n_rows: float,
     turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
 ) -> Tuned:
     """Find the ``free`` weights, of ``evidence.FREE``, and the premises that go with them.
 
     The weights start at those of the problem's penalty and take ``first_steps`` before the premises
-    move, in so many ``turns`` at most; with 0 these stay where they are. ``n_rows`` are rows by
-    weight.
+    move, in so many ``turns`` at most; with 0 these stay where they are.
     """
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
         first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
-    start = _improved(Tuned.start(problem, premise, free, n_rows), first_steps)
+    start = _improved(Tuned.start(problem, premise, free), first_steps)
     if premise.size == 0 or turns == 0:
         return start
     penalty = start.penalty
     if "stiffness" in free:
-        stiffness = start.posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
+        stiffness = start.posterior.noise_variance / (problem.n_rows * PRIOR_DISPLACEMENT**2)
         penalty = replace(penalty, stiffness=stiffness)
     return _risen(turned(start, penalty, steps), turns - 1, steps)
 
 
-def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: float) -> Tuned:
+def tune_unbounded(problem: SeparableProblem, premise: Premise, free) -> Tuned:
     """The same with the premises first, and weights that may be next to nothing.
 
     What the premises of the start leave of data without noise would be taken for noise.
     """
     least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
     penalty = replace(problem.penalty, **least)
-    start = Tuned.start(problem, premise, free, n_rows).with_penalty(penalty)
+    start = Tuned.start(problem, premise, free).with_penalty(penalty)
     first = turned(start, penalty, FIRST_STEPS, _UNBOUNDED_ITERATIONS)
     return _risen(first, MOST_TURNS - 1, _STEPS)
 

@@ -184,7 +184,7 @@ class _ProblemOfSums(SeparableProblem):
         self.rows = StandardisedData(none, none, None, sums.inputs, sums.targets)
         self.consequent_inputs, self.n_basis = sums.consequent_inputs, sums.n_basis
         self.n_columns, self.n_outputs = sums.slope.shape
-        self.on_sample = None
+        self.on_sample, self.n_rows = None, sums.effective_weight
         means = (sums.gram / sums.weight, sums.slope / sums.weight, sums.square / sums.weight)
         self._sums_at_start = means
         self.local = LocalBasis.from_gram(means[0], self.antecedent.n_rules)
@@ -249,7 +249,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
     if free:
         premise = Premise(antecedent, none, none, none, none.astype(int), ())
-        tuned = tune(problem, premise, free, sums.effective_weight, turns=0, first_steps=ARRIVING)
+        tuned = tune(problem, premise, free, turns=0, first_steps=ARRIVING)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
     overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight

@@ -240,11 +240,11 @@ def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs
     phi, total = dense.design(antecedent.parameters), 0.0
     held = dense.residual_matrix(antecedent.parameters)[40:]
     # The weights may be those of other numbers of rows than there are of them.
-    n_rows = 0.8 * rows.total_weight
+    n_rows = problem.n_rows = 0.8 * rows.total_weight
     for i in range(40):
         weight = dense.weight.copy()
         weight[i] -= 1.0 / n_rows  # as much as one row has
         gram = (phi.T * weight) @ phi + held.T @ held
         beta = np.linalg.solve(gram, (phi.T * weight) @ dense.y)
         total += dense.weight[i] * np.sum((dense.y[i] - phi[i] @ beta) ** 2)
-    assert_allclose(problem.leave_one_out_error(evaluation, n_rows), total, rtol=1e-8)
+    assert_allclose(problem.leave_one_out_error(evaluation), total, rtol=1e-8)
