@@ -77,6 +77,14 @@ def strongest_rules(strengths):
     return (strengths >= (1.0 - 1e-9) * strengths.max(axis=0)).argmax(axis=0)
 
 
+def combinations(parts):
+    """Products of one row of each part, all combinations, the last part's row fastest."""
+    found, *others = parts
+    for other in others:
+        found = (found[:, None, :] * other).reshape(-1, found.shape[1])
+    return found
+
+
 def softmax_in_place(log_values):
     """Softmax along the last axis but one."""
     log_values -= np.maximum.reduce(log_values, axis=-2, keepdims=True)

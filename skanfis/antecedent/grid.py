@@ -7,7 +7,7 @@ from math import prod
 
 import numpy as np
 
-from .base import Antecedent, groups_of, softmax_in_place
+from .base import Antecedent, combinations, groups_of, softmax_in_place
 
 
 def _grid_rule_terms(counts):
@@ -94,10 +94,7 @@ class GridAntecedent(Antecedent):
         else:
             for share in shares:
                 softmax_in_place(share)
-        strengths = shares[0]
-        for share in shares[1:]:
-            strengths = (strengths[:, None, :] * share).reshape(-1, n_rows)
-        return strengths, log_mu
+        return combinations(shares), log_mu
 
     def sum_over_rules(self, values):
         return _grid_indicator(self.counts).astype(values.dtype, copy=False) @ values

@@ -82,6 +82,7 @@ def column_statistics(values, sample_weight=None):
     Differences are summed, from the first row and then from the mean: columns far from the origin
     lose no digits. A constant column has scale one.
     """
+    weight = np.ones(len(values)) if sample_weight is None else sample_weight
     minimum, maximum = np.full((2, values.shape[1]), [[np.inf], [-np.inf]])
     origin = _columns(values, slice(1))
     total, first, second = 0.0, np.zeros(values.shape[1]), np.zeros(values.shape[1])
@@ -89,15 +90,15 @@ def column_statistics(values, sample_weight=None):
         block = _columns(values, part)
         np.minimum(minimum, block.min(axis=1), out=minimum)
         np.maximum(maximum, block.max(axis=1), out=maximum)
-        total += float(block.shape[1] if sample_weight is None else sample_weight[part].sum())
-        first += _sum(block - origin, sample_weight, part)
+        total += float(weight[part].sum())
+        first += (block - origin) @ weight[part]
     mean = origin + (first / total)[:, None]
     constant = never_changes(minimum, maximum)
     # In parts of the range: else squares of what varies by next to nothing would vanish, unseen.
     span = np.where(constant, 1.0, maximum - minimum)
     for part in row_blocks(values.shape[0], BLOCK_ROWS):
         deviations = (_columns(values, part) - mean) / span[:, None]
-        second += _sum(deviations**2, sample_weight, part)
+        second += deviations**2 @ weight[part]
     scale = span * np.sqrt(second / total)
     return Scale(
         np.where(constant, minimum, mean[:, 0]),
@@ -115,10 +116,6 @@ def never_changes(minimum, maximum):
 def _columns(values, part):
     """Some rows as columns of their own, which sums run along."""
     return np.array(values[part].T, dtype=float, order="C")
-
-
-def _sum(block, sample_weight, part):
-    return block.sum(axis=1) if sample_weight is None else block @ sample_weight[part]
 
 
 def check_scales(inputs, targets, input_names, output_names):
@@ -199,8 +196,7 @@ class StandardisedData:
 
     def chunks(self, block_rows):
         """Units of parallel work: lists of slices of at most ``block_rows`` rows."""
-        # Of no rows there is one block: its sums are zeros of their shapes.
-        blocks = row_blocks(self.n_rows, block_rows) or [slice(0, 0)]
+        blocks = row_blocks(self.n_rows, block_rows)
         step = _BLOCKS_PER_CHUNK
         return [blocks[start : start + step] for start in range(0, len(blocks), step)]
 
@@ -214,7 +210,7 @@ class StandardisedData:
         def of_chunk(chunk):
             return reduce(add_each, (one_pass(*self.read(part)) for part in chunk))
 
-        return reduce(add_each, map_ordered(of_chunk, self.chunks(block_rows)))
+        return reduce(add_each, map_ordered(of_chunk, self.chunks(block_rows)), [])
 
     def reduce(self, of_rows, merge):
         """What ``of_rows`` makes of the rows; where they are in parts, merged two by two."""

@@ -43,28 +43,27 @@ def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients:
     ``firing`` is the :class:`RuleFiring` of the same rows, with distinct inputs counted up to
     ``n_coefficients``.
     """
-    n_rules, n_inputs = antecedent.n_rules, firing.second.shape[1] - 1
-    known = np.flatnonzero(firing.n_distinct)
-    center, factor = np.zeros((n_rules, n_inputs)), np.zeros((n_rules, n_inputs, n_inputs))
-    center[known], factor[known] = places(firing.second[known])
+    center, factor = places(firing.second, firing.n_distinct > 0)
     radius = rows.reduce(
         partial(_radii, antecedent=antecedent, center=center, factor=factor), np.maximum
     )
     return RuleSupport(firing.n_distinct / n_coefficients, center, factor, radius)
 
 
-def places(second):
+def places(second, is_known):
     """Means of the rows of rules, and lower triangular W, W' W the inverse of their covariances.
 
-    ``second`` are sums of s w_r [1, z] [1, z]'; covariances are thickened.
+    ``second`` are sums of s w_r [1, z] [1, z]'; covariances are thickened. Both are zero for rules
+    that are not known.
     """
-    moments = second / np.maximum(second[:, :1, :1], np.finfo(float).tiny)
+    known = np.asarray(is_known)[:, None, None]
+    moments = known * second / np.maximum(second[:, :1, :1], np.finfo(float).tiny)
     center = moments[:, 0, 1:].copy()
     covariance = moments[:, 1:, 1:] - center[:, :, None] * center[:, None, :]
     # Rows on a line or a surface (two thermometers on one gyro) keep some thickness, and the
     # distance stays finite off it.
     covariance += TOLD_APART**2 * np.eye(center.shape[1])
-    return center, np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
+    return center, known * np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def _sums(rows, antecedent, enough):

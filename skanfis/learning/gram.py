@@ -21,6 +21,8 @@ from math import prod
 
 import numpy as np
 
+from ..antecedent.base import combinations
+
 
 def pairs(rows, others):
     """Products rows_i * others_j for all j >= i, (n (n + 1) / 2, n_rows)."""
@@ -40,14 +42,6 @@ def pair_index(n):
     index = np.zeros((n, n), dtype=np.int32)
     index[np.triu_indices(n)] = np.arange(n * (n + 1) // 2)
     return np.maximum(index, index.T)
-
-
-def _products(groups, n_rows):
-    """Products of one row of each group, all combinations, the last group's row fastest."""
-    result = np.ones((1, n_rows)) if not groups else groups[0]
-    for group in groups[1:]:
-        result = (result[:, None, :] * group).reshape(-1, n_rows)
-    return result
 
 
 class DesignMoments:
@@ -76,9 +70,9 @@ class DesignMoments:
         # Behind the last factor there is nothing.
         factors = np.split(shares, np.cumsum(self._lengths[:-1]))[:-1]
         groups = [*(pairs(own, own) for own in factors), pairs(weighted_basis, basis_rows)]
-        n_rows = basis_rows.shape[1]
-        left = _products(groups[: self._split], n_rows)
-        return left @ _products(groups[self._split :], n_rows).T
+        left, right = groups[: self._split], groups[self._split :]
+        # On the left there may be none: the basis begins with 1.
+        return combinations(left or [basis_rows[:1]]) @ combinations(right).T
 
     def gram(self, moments):
         """Phi' S Phi out of the moments of all rows, (n_columns, n_columns)."""

@@ -112,8 +112,6 @@ class CommonLine:
         along = orthonormal * scale[:, None]  # S Q
         from_line = np.diag(scale) - orthonormal @ along.T  # N
         by_part, self.components, component = departures(from_line, antecedent, slopes)
-        # N'N, what all components pay alike; made without D it is rounded less.
-        self._together = np.diag(scale**2) - along @ along.T
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
         is_varying = np.array([j is not None for j in slopes], dtype=bool)
         self.slopes = [j for j in slopes if j is not None]
@@ -161,15 +159,8 @@ class CommonLine:
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
         weights = self.weights(penalty)[len(WEIGHTS) :]
         rooted = np.sqrt(weights)[self._part, None] * self._rows
-        if penalty.pulls:
-            matrix = rooted.T @ rooted
-        else:
-            slopes = rooted[: len(self.slopes)]
-            matrix = penalty.alpha * self._together + slopes.T @ slopes
-        if self._to_none.size:
-            # What is constant has no slope to learn, but one that is held.
-            matrix += penalty.slope * self._to_none.T @ self._to_none
-        return matrix
+        # What is constant has no slope to learn, but one that is held.
+        return rooted.T @ rooted + penalty.slope * self._to_none.T @ self._to_none
 
     def weights(self, penalty: Penalty):
         """All weights in a row, of these ``kinds``: of ``WEIGHTS``, every slope and component."""

@@ -37,7 +37,6 @@ def with_sample(rows, most=None):
     most = SAMPLE_ROWS if most is None else most
     drawn = rows.reduce(partial(_draw, most=most), partial(_smallest, most=most))
     X, y, weight, _, _, *labels = drawn
-    weight = None if (weight == 1.0).all() else weight
     groups = [group_numbers(own, len(X)) for own in labels]
     sample = StandardisedData(X, y, weight, rows.inputs, rows.targets, *groups)
     return replace(rows, sample=sample)
