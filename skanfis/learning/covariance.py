@@ -43,14 +43,13 @@ def posterior_of(
     noise = np.sqrt(_mean_squares(problem, evaluation, robust))
     premises = np.zeros((0, n_parameters))
     cross = np.zeros((problem.n_outputs, 0, len(half)))
-    n_varying = max(int(np.count_nonzero(~rows.targets.is_constant)), 1)
     n_determined = 0.0
     if premise is not None and premise.size:
         premises, cross, n_determined = _premises(problem, premise, evaluation)
     # Where rows leave no freedom, the noise is that of one.
-    freedom = max(n_rows - n_effective - n_determined / n_varying, 1.0)
+    freedom = max(n_rows - n_effective - n_determined / problem.n_varying, 1.0)
     noise *= np.sqrt(n_rows / freedom)
-    shared = np.sqrt(np.sum(noise**2) / n_varying)
+    shared = np.sqrt(np.sum(noise**2) / problem.n_varying)
     # L^-1 T' is the factor of consequents on [1, z], T the local basis.
     half = np.ascontiguousarray(problem.local.to_global(half.T).T)
     blocks = half.reshape(len(half), -1, problem.n_basis)

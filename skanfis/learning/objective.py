@@ -152,6 +152,11 @@ class SeparableProblem:
                 np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
         return np.maximum(farthest, 1.0)
 
+    @property
+    def n_varying(self):
+        """Outputs that vary, one at least: a constant one says nothing of the noise of others."""
+        return max(int(np.count_nonzero(~self.rows.targets.is_constant)), 1)
+
     def with_penalty(self, penalty):
         """Return the same problem with another penalty; no pass over the rows."""
         other = copy.copy(self)

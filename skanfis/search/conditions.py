@@ -41,7 +41,12 @@ def with_fewer_conditions(tuned: Tuned) -> Tuned:
         evaluation = problem.evaluate(now.parameters)
         at = premise.displacement(now.parameters)
         found = replace(
-            found, problem=problem, premise=premise, evaluation=evaluation, displacement=at
+            found,
+            problem=problem,
+            premise=premise,
+            evaluation=evaluation,
+            solved=evaluation,
+            displacement=at,
         )
     if found is tuned:
         return tuned

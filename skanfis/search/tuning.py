@@ -62,6 +62,7 @@ class Tuned:
     premise: Premise
     free: Sequence[str]  # weights that are found, of ``evidence.FREE``
     evaluation: Evaluation
+    solved: Evaluation  # the same, solved again at the weights found
     displacement: np.ndarray
     posterior: Laplace
 
@@ -69,28 +70,26 @@ class Tuned:
     def start(cls, problem: SeparableProblem, premise: Premise, free):
         """Where premises have not moved, and weights are those of the problem's penalty."""
         x = np.zeros(premise.size)
-        evaluation, line = problem.evaluate(premise.parameters(x)), problem.common_line
-        n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
-        posterior = laplace(evaluation, line, problem.penalty, problem.n_rows, n_outputs, x)
-        return cls(problem, premise, free, evaluation, x, posterior)
+        evaluation = problem.evaluate(premise.parameters(x))
+        posterior = laplace(problem, evaluation, x)
+        return cls(problem, premise, free, evaluation, evaluation, x, posterior)
 
     def with_penalty(self, penalty, curvature=None):
         """The same point at other weights; ``curvature`` where it is not that of before."""
-        before = self.posterior
-        curvature = before.curvature if curvature is None else curvature
-        of_rows = before.n_rows, before.n_outputs, self.displacement, curvature
-        posterior = laplace(self.evaluation, self.problem.common_line, penalty, *of_rows)
-        return replace(self, problem=self.problem.with_penalty(penalty), posterior=posterior)
+        curvature = self.posterior.curvature if curvature is None else curvature
+        there = self.solved_with(penalty)
+        posterior = laplace(there.problem, there.solved, self.displacement, curvature)
+        return replace(there, posterior=posterior)
+
+    def solved_with(self, penalty):
+        """The same point, with the consequents alone at other weights."""
+        problem = self.problem.with_penalty(penalty)
+        return replace(self, problem=problem, solved=problem.solved_again(self.evaluation))
 
     @property
     def penalty(self):
         """The weights found."""
         return self.posterior.penalty
-
-    @cached_property
-    def solved(self):
-        """The evaluation, solved again at the weights found."""
-        return self.problem.solved_again(self.evaluation)
 
     @property
     def disagreement(self):
@@ -258,7 +257,7 @@ def _most_agreement(tuned: Tuned, most: float) -> float:
         middle = float(np.sqrt(low * high))
         penalty = replace(tuned.penalty, agreement=middle)
         # The consequents of another penalty take no pass over the rows but for their error.
-        raised = replace(tuned, problem=tuned.problem.with_penalty(penalty))
+        raised = tuned.solved_with(penalty)
         low, high = (middle, high) if raised.expected_error <= most else (low, middle)
     return low
 

@@ -57,8 +57,7 @@ def test_what_rules_err_one_by_one(two_rules):
 
 def with_agreement(tuned, agreement):
     """The same with consequents alone of another agreement."""
-    penalty = replace(tuned.penalty, agreement=agreement)
-    return replace(tuned, problem=tuned.problem.with_penalty(penalty))
+    return tuned.solved_with(replace(tuned.penalty, agreement=agreement))
 
 
 class TestAgreement:
