@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import blocks
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
+from skanfis.antecedent import GridAntecedent
 from skanfis.learning import data as rows
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
@@ -30,7 +30,7 @@ def dead_rule(rng):
     """Four rules, one of them fifty deviations away from all data."""
     theta = Gaussian.from_center_and_width(rng.normal(size=(4, 2)), np.ones((4, 2)))
     theta[0, 1] = 50.0
-    return RuleTableAntecedent.of_own_terms(Gaussian, np.arange(2), theta)
+    return oracles.own_terms(Gaussian, np.arange(2), theta)
 
 
 def dead_term(rng):
@@ -44,7 +44,7 @@ def duplicated_rule(rng):
     """Four rules, two of them the same."""
     theta = Bell.from_center_and_width(rng.normal(size=(4, 2)), rng.uniform(0.5, 1.5, (4, 2)))
     theta[:, 3] = theta[:, 1]
-    return RuleTableAntecedent.of_own_terms(Bell, np.arange(2), theta)
+    return oracles.own_terms(Bell, np.arange(2), theta)
 
 
 CASES = {

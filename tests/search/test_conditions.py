@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import RuleTableAntecedent
 from skanfis.consequent import basis
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE
@@ -57,7 +56,7 @@ def test_the_condition_that_a_rule_does_not_have_goes(rng):
     centers = np.array([[-1.0, 0.0], [1.0, -1.0], [1.0, 1.0]])
     theta = np.stack([centers, np.full((3, 2), -0.5)])
     theta[1, 0, 1] = 1.0
-    rules = RuleTableAntecedent.of_own_terms(Gaussian, [0, 1], theta)
+    rules = oracles.own_terms(Gaussian, [0, 1], theta)
     firing = rules.without_terms([1]).strengths(X.T)
     values = np.array([[0.0, 1.0, 0.0], [2.0, 0.0, 1.0], [-2.0, 1.0, 1.0]]) @ basis(X.T)
     y = np.sum(firing * values, axis=0) + 0.1 * rng.normal(size=500)
