@@ -82,14 +82,15 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     """A start from rules that are given, with the weights that are not given found on the rows."""
     sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
-    premise = Premise.of(antecedent, *sample.inputs.box)
+    low, high = sample.inputs.box
+    premise = Premise.of(antecedent, low, high)
     turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)
     best = tune(problem, premise, free, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
     if is_bounded and has_rows and problem.n_columns <= MANY_COLUMNS:
-        unbounded = Premise.of(antecedent, *sample.inputs.box, is_unbounded=True)
+        unbounded = Premise.of(antecedent, low, high, is_unbounded=True)
         freed = tune_unbounded(problem, unbounded, free)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best = freed

@@ -62,14 +62,14 @@ class Tuned:
     premise: Premise
     free: Sequence[str]  # weights that are found, of ``evidence.FREE``
     evaluation: Evaluation
-    solved: Evaluation  # the same, solved again at the weights found
+    solved: Any  # the evaluation, solved again at the weights found
     displacement: np.ndarray
     posterior: Laplace
 
     @classmethod
-    def start(cls, problem: SeparableProblem, premise: Premise, free):
-        """Where premises have not moved, and weights are those of the problem's penalty."""
-        x = np.zeros(premise.size)
+    def start(cls, problem: SeparableProblem, premise: Premise, free, x=None):
+        """Where premises have not moved, or at x, with the weights of the problem's penalty."""
+        x = np.zeros(premise.size) if x is None else x
         evaluation = problem.evaluate(premise.parameters(x))
         posterior = laplace(problem, evaluation, x)
         return cls(problem, premise, free, evaluation, evaluation, x, posterior)

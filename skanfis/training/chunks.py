@@ -63,7 +63,8 @@ class RowSums:
         antecedent, own, n_inputs = base.antecedent, consequent_inputs, X.shape[1]
         n_rules, n_basis = antecedent.n_rules, 1 + own.size
         design = DesignMoments(antecedent.share_counts, n_basis)
-        sums = [np.zeros(design.shape), np.zeros((n_rules * n_basis, y.shape[1])), 0.0]
+        slopes = np.zeros((n_rules * n_basis, y.shape[1]))
+        sums = [np.zeros(design.shape), slopes, np.zeros(y.shape[1])]
         centers, distinct = base.rule_centers[:, own], np.empty(0)
         rules = RuleRows.none(n_rules, n_inputs, own.size)
         n_values = 4 * (n_rules + antecedent.n_terms + n_inputs) + sum(design.shape)
@@ -73,7 +74,7 @@ class RowSums:
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
             # In any units of the target: by its digits and its exponent.
             marks = fingerprint(np.vstack([numbers, *np.frexp(rows.y[part].T)]))
-            distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(sums[1])]
+            distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(slopes)]
             every = basis(Z)
             block = RuleRows.of(raw, every, strengths, weight, numbers, own, centers)
             rules = rules.plus(block, rows.inputs)
