@@ -25,6 +25,8 @@ from .data import StandardisedData, fingerprint, place_in_sample
 MANY_ROWS, SAMPLE_ROWS = 100_000, 20_000
 # So many turns of the wheel per unit of the place; times a power of two nothing is rounded.
 _TURNS = 8192.0
+# More are drawn than are wanted, so that enough come: the standard deviation is below one percent.
+_MARGIN = 1.25
 
 
 def is_many(rows):
@@ -35,27 +37,28 @@ def is_many(rows):
 def with_sample(rows, most=None):
     """Return the same rows with a ``sample`` of them, on the same scales."""
     most = SAMPLE_ROWS if most is None else most
-    drawn = rows.reduce(partial(_draw, most=most), partial(_smallest, most=most))
+    # The second limit is for rows that repeat each other, of which the first brings too few.
+    for limit in (_MARGIN * most / rows.n_rows, 1.0):
+        drawn = rows.reduce(partial(_draw, most=most, limit=limit), partial(_smallest, most=most))
+        if len(drawn[0]) == most:
+            break
     X, y, weight, _, _, *labels = drawn
     groups = [group_numbers(own, len(X)) for own in labels]
     sample = StandardisedData(X, y, weight, rows.inputs, rows.targets, *groups)
     return replace(rows, sample=sample)
 
 
-def _draw(rows, most):
-    """Of some rows in memory, those of the smallest numbers.
+def _draw(rows, most, limit):
+    """Of some rows in memory, those of the smallest numbers, below ``limit``.
 
     A list of raw X, y, weights, fingerprints and numbers, and groups where the rows have some.
     """
-    limit = 1.0
-    found = [_of_block(rows, slice(0, 0), limit)]
+    found, n_found = [_of_block(rows, slice(0, 0), limit)], 0
     for part in row_blocks(rows.n_rows, BLOCK_ROWS):
         found.append(_of_block(rows, part, limit))
-        if sum(len(own[0]) for own in found) > 2 * most:
-            found = [_smallest(*found, most=most)]
-            numbers = found[0][4]
-            # Beyond the last of those that are enough no other row is one of them.
-            limit = numbers[-1] if len(numbers) == most else 1.0
+        n_found += len(found[-1][0])
+        if n_found > 2 * most:
+            found, n_found = [_smallest(*found, most=most)], most
     return _smallest(*found, most=most)
 
 
@@ -76,7 +79,7 @@ def _of_block(rows, part, limit):
     Z, target, weight = rows.read(part)
     prints = fingerprint(np.concatenate([Z, target]))
     numbers = (_TURNS * place_in_sample(Z, target)) % 1.0
-    kept = np.flatnonzero(numbers <= limit)
+    kept = np.flatnonzero(numbers < limit)
     return [
         np.asarray(rows.X[part], dtype=float)[kept],
         np.asarray(rows.y[part], dtype=float)[kept],
