@@ -106,7 +106,7 @@ def _premises(problem, premise, evaluation):
     # No eigenvalue is negative but for what rounding leaves of large numbers, as beside a row so
     # far off that a rule is its own. What neither data nor stiffness tell from that is held.
     told = np.maximum(values, stiffness) > -values[0]
-    values = np.maximum(values[told], 0.0)
+    values = np.maximum(values[told], premise.size * np.finfo(float).eps * values[-1])
     inverse = vectors[:, told].T / np.sqrt(values + stiffness)[:, None]
     premises = inverse @ jacobian.T
     cross = np.stack([premises @ half.T for half in raw.cross])
