@@ -159,7 +159,8 @@ def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), 
     assert normal is not None
     matrix, factor, solved = normal.penalty, normal.factor, normal.coefficients
     # Of one constant there is no penalty at all, but for the shift: any size will do.
-    size = np.trace(matrix) / matrix.shape[0] - factor.shift or 1.0
+    size = np.trace(matrix) / matrix.shape[0]
+    size = size if size > 2.0 * factor.shift else 1.0
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), normal.free)
     paid = line.weights(penalty)
