@@ -21,8 +21,8 @@ def row_blocks(n_rows, length) -> list[slice]:
 
 
 def add_each(one, other):
-    """Sums of two results over rows, one by one."""
-    return [a + b for a, b in zip(one, other, strict=True)]
+    """Sums of two results over rows, one by one; of no rows there are none."""
+    return [a + b for a, b in zip(one, other, strict=True)] if one and other else one or other
 
 
 def fitting_rows(n_values) -> int:

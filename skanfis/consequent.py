@@ -46,6 +46,11 @@ def rule_outputs(coefficients, strengths, basis_rows):
     return weighted, weighted.sum(axis=0)
 
 
+def outputs_of_rules(by_output, strengths, basis_rows):
+    """Every output, (n_outputs, n_rows); coefficients (n_outputs, n_rules, n_basis)."""
+    return np.stack([rule_outputs(one, strengths, basis_rows)[1] for one in by_output])
+
+
 def in_user_units(coefficients, inputs, targets, slopes, order, common=(), masses=None):
     """Consequents about the inputs' means, from those on [1, z_slopes] of standardised data.
 

@@ -26,7 +26,7 @@ import numpy as np
 from ._validation import rows_by_name
 from .antecedent import Antecedent, RuleTableAntecedent, by_group, strongest_rules
 from .blocks import BLOCK_BYTES, FEWEST_ROWS
-from .consequent import rule_outputs
+from .consequent import outputs_of_rules, rule_outputs
 from .naming import default_output_names, default_term_names
 from .policies import (
     FARTHEST,
@@ -438,9 +438,8 @@ class TSKModel:
 
     def _outputs(self, Z):
         strengths, basis_rows = self.antecedent.strengths(Z), self.basis(Z)
-        by_rule = self.coefficients.transpose(2, 0, 1)
-        outputs = [rule_outputs(one, strengths, basis_rows)[1] for one in by_rule]
-        return self._hold(np.stack(outputs))
+        by_output = self.coefficients.transpose(2, 0, 1)
+        return self._hold(outputs_of_rules(by_output, strengths, basis_rows))
 
     def _outputs_linear(self, Z):
         """Value and slope of the nearest point in the box."""

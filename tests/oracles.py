@@ -380,6 +380,12 @@ def random_grid(rng, families, counts, inputs=None):
     return GridAntecedent.build(list(families), list(inputs), thetas)
 
 
+def own_terms(family, inputs, theta):
+    """Scattered rules of one family; theta (n_parameters, n_rules, n_premise_inputs)."""
+    terms = {int(j): theta[:, :, k] for k, j in enumerate(inputs)}
+    return RuleTableAntecedent.of_own_terms(dict.fromkeys(terms, family), terms)
+
+
 def random_scattered(rng, family, n_rules, inputs):
     """Rules anywhere within reach of standardised data."""
     inputs = np.asarray(inputs)
@@ -388,7 +394,7 @@ def random_scattered(rng, family, n_rules, inputs):
     theta[1:] += 0.2 * rng.normal(size=theta[1:].shape)
     # One of the rules looks at fewer inputs.
     theta[:, 0, 1:2] = np.nan
-    return RuleTableAntecedent.of_own_terms(family, inputs, theta)
+    return own_terms(family, inputs, theta)
 
 
 def random_table(rng, n_rules=5, inputs=3, families=(Gaussian, Bell, Gaussian)):

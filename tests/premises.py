@@ -23,7 +23,7 @@ def scattered(family, n_rules, inputs, is_listed=True):
     g, inputs = np.random.default_rng(2), np.array(inputs)
     centers = g.uniform(LOW[inputs], HIGH[inputs], (n_rules, inputs.size))
     theta = family.from_center_and_width(centers, g.uniform(0.5, 1.5, centers.shape))
-    own = RuleTableAntecedent.of_own_terms(family, inputs, theta)
+    own = oracles.own_terms(family, inputs, theta)
     if not is_listed:
         return own
     # With a rule that has terms of the others, those of each input are in order.

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from skanfis.antecedent import RuleTableAntecedent, TreeAntecedent
+from skanfis.antecedent import TreeAntecedent
 from skanfis.antecedent.tree import CRISP
 from skanfis.membership import Bell, Gaussian
 from skanfis.naming import default_term_names, given_term_names
@@ -29,7 +29,7 @@ def model(antecedent, box=BOX, two_valued=(False, False, False)):
 def scattered(centers, width=1.0, family=Gaussian):
     centers = np.array(centers, dtype=float)
     theta = family.from_center_and_width(centers, np.full(centers.shape, width))
-    return RuleTableAntecedent.of_own_terms(family, np.arange(centers.shape[1]), theta)
+    return oracles.own_terms(family, np.arange(centers.shape[1]), theta)
 
 
 @pytest.mark.parametrize(

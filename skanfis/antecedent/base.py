@@ -15,6 +15,7 @@ its own membership when its input's are normalised; scattered rules: the rule's 
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import groupby
 from typing import ClassVar
 
@@ -75,6 +76,14 @@ def strongest_rules(strengths):
     """The strongest rule of every row of (n_rules, n_rows); of equally strong ones the first."""
     # Strengths that differ by rounding errors only are equal.
     return (strengths >= (1.0 - 1e-9) * strengths.max(axis=0)).argmax(axis=0)
+
+
+def combinations(parts):
+    """Products of one row of each part, all combinations, the last part's row fastest."""
+    found, *others = parts
+    for other in others:
+        found = (found[:, None, :] * other).reshape(-1, found.shape[1])
+    return found
 
 
 def softmax_in_place(log_values):
@@ -243,9 +252,17 @@ class Antecedent(ABC):
     def normalise(self, log_mu):
         """Strengths w and term shares nu from log mu, which is overwritten."""
 
-    @abstractmethod
+    @cached_property
+    def _contains(self):
+        """1 where rule r has term t, shape (n_rules, n_terms)."""
+        table, contains = self.rule_terms, np.zeros((self.n_rules, self.n_terms))
+        rules, places = np.nonzero(table >= 0)
+        contains[rules, table[rules, places]] = 1.0
+        return contains
+
     def sum_over_rules(self, values):
         """Of every term, the sum of values (n_rules, n_rows) over the rules that contain it."""
+        return self._contains.T @ values
 
     def term_sensitivity(self, rule_outputs, output, shares):
         """The derivative of the output by every term's log mu, shape (n_terms, n_rows).

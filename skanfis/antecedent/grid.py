@@ -1,28 +1,12 @@
 """Grid partition: a rule for every combination of terms."""
 
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from itertools import accumulate, pairwise
 from math import prod
 
 import numpy as np
 
-from .base import Antecedent, groups_of, softmax_in_place
-
-
-def _grid_rule_terms(counts):
-    """The terms of every rule of a full grid, shape (n_rules, n_inputs with terms)."""
-    combinations = np.indices(counts).reshape(len(counts), prod(counts)).T
-    return combinations + np.cumsum([0, *counts[:-1]])
-
-
-@lru_cache(maxsize=16)
-def _grid_indicator(counts):
-    """1 where term t is part of rule r, shape (n_terms, n_rules)."""
-    rule_terms = _grid_rule_terms(counts)
-    indicator = np.zeros((sum(counts), rule_terms.shape[0]))
-    indicator[rule_terms.T, np.arange(rule_terms.shape[0])] = 1.0
-    return indicator
+from .base import Antecedent, combinations, groups_of, softmax_in_place
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +61,8 @@ class GridAntecedent(Antecedent):
 
     @property
     def rule_terms(self):
-        return _grid_rule_terms(self.counts)
+        places = np.indices(self.counts).reshape(len(self.counts), self.n_rules).T
+        return places + np.cumsum([0, *self.counts[:-1]])
 
     def factors(self, Z):
         return self.strengths_and_shares(Z)[1]
@@ -94,13 +79,7 @@ class GridAntecedent(Antecedent):
         else:
             for share in shares:
                 softmax_in_place(share)
-        strengths = shares[0]
-        for share in shares[1:]:
-            strengths = (strengths[:, None, :] * share).reshape(-1, n_rows)
-        return strengths, log_mu
-
-    def sum_over_rules(self, values):
-        return _grid_indicator(self.counts).astype(values.dtype, copy=False) @ values
+        return combinations(shares), log_mu
 
     def term_sensitivity(self, rule_outputs, output, shares):
         # A term's share is the sum of its rules' strengths: no need to form those products.

@@ -1,12 +1,11 @@
 """Rules listed one by one: scattered, with terms of their own, or over terms that they share."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ..membership import PRODUCTS, SIDES
-from .base import Antecedent, TermGroup, groups_of, softmax_in_place
+from .base import Antecedent, groups_of, softmax_in_place
 
 
 def _one_term(terms):
@@ -34,15 +33,22 @@ class RuleTableAntecedent(Antecedent):
     table: np.ndarray
 
     @classmethod
-    def of_own_terms(cls, family, inputs, theta):
-        """Scattered rules: each with terms of its own, of one family.
+    def of_own_terms(cls, families, terms):
+        """Scattered rules: each with terms of its own.
 
-        Of theta, (n_parameters, n_rules, n_premise_inputs), NaN is no term.
+        ``terms`` are parameters (n_parameters, n_rules) by input, of which NaN is no term;
+        ``families`` are by input too.
         """
-        has_term = np.isfinite(theta[0])
-        table = np.where(has_term, np.cumsum(has_term).reshape(has_term.shape) - 1, -1)
-        on = np.broadcast_to(inputs, has_term.shape)[has_term]
-        return cls((TermGroup(family, on, theta[:, has_term]),), table)
+        every = list(dict.fromkeys(families[j] for j in terms))
+        inputs = sorted(terms, key=lambda j: every.index(families[j]))
+        has_term = np.isfinite([terms[j][0] for j in inputs]).T
+        # Rule by rule, but terms of one family together.
+        of_family = ([families[j] is family for j in inputs] for family in every)
+        places = np.concatenate([np.argwhere(has_term & is_own) for is_own in of_family])
+        table = np.full(has_term.shape, -1)
+        table[tuple(places.T)] = np.arange(len(places))
+        named = ((inputs[k], r) for r, k in places)
+        return cls(groups_of((j, families[j], terms[j][:, r]) for j, r in named), table)
 
     @property
     def is_ordered(self):
@@ -55,14 +61,6 @@ class RuleTableAntecedent(Antecedent):
     @property
     def rule_terms(self):
         return self.table
-
-    @cached_property
-    def _contains(self):
-        """1 where rule r has term t, shape (n_rules, n_terms)."""
-        contains = np.zeros((self.n_rules, self.n_terms))
-        rules, places = np.nonzero(self.table >= 0)
-        contains[rules, self.table[rules, places]] = 1.0
-        return contains
 
     def with_one_term_each(self, input_names):
         """The same rules, each with one term of an input at the most; of what each term is made.
@@ -96,6 +94,3 @@ class RuleTableAntecedent(Antecedent):
         strengths = self._contains @ log_mu
         softmax_in_place(strengths)
         return strengths, strengths
-
-    def sum_over_rules(self, values):
-        return self._contains.T @ values

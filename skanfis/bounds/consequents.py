@@ -77,12 +77,13 @@ class Consequents:
         normal = self.free.normal
         change, weighed = local - normal.coefficients, normal.gram + normal.penalty
         cost = self.free.cost + 0.5 * float(np.sum(change * (weighed @ change)))
-        error = 2.0 * cost - float(np.sum(local * (normal.penalty @ local)))
+        slope = normal.penalty @ normal.coefficients
+        more = np.sum(change * (normal.gram @ change - 2.0 * slope), axis=0)
         return replace(
             self.free,
             cost=cost,
             coefficients=self.problem.local.to_global(local),
-            mean_squared_error=max(error, 0.0),
+            mean_squares=np.maximum(self.free.mean_squares + more, 0.0),
             normal=replace(normal, coefficients=local),
         )
 

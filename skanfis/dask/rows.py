@@ -225,6 +225,11 @@ class ClusterRows:
     targets: Scale
     sample: StandardisedData | None = None
 
+    @property
+    def effective_weight(self):
+        """Rows by weight."""
+        return max(self.total_weight, self.total_weight**2 / self.squared_weight)
+
     def reduce(self, of_rows, merge):
         """What ``of_rows`` makes of the rows of every partition, merged two by two."""
         scales = {"inputs": self.inputs, "targets": self.targets}

@@ -64,12 +64,11 @@ def _sums(rows, antecedent, blocks, sets):
     """Sums over rows of the products of the functions of each block."""
     totals = [np.zeros(2 * [(1 + len(j)) * len(own)]) for j, own in zip(blocks, sets, strict=True)]
     n_values = antecedent.n_rules + 3 * antecedent.n_terms + 4 * max(map(len, sets))
-    for part in row_blocks(rows.n_rows, fitting_rows(n_values)):
-        Z, _, weight = rows.read(part)
+    for _, Z, _, weight in rows.blocks(fitting_rows(n_values)):
         factors = antecedent.factors(Z)
         for inputs, own, total in zip(blocks, sets, totals, strict=True):
             found = _functions(factors, own, Z[list(inputs)])
-            total += (found if weight is None else found * weight) @ found.T
+            total += (found * weight) @ found.T
     return totals
 
 
@@ -110,8 +109,8 @@ def _beside(rows, antecedent):
     """Of every term the values next above and below its place, (2, n_terms), the first negative."""
     inputs, places = antecedent.term_inputs, antecedent.term_places[:, None]
     found = np.full((2, inputs.size), -np.inf)
-    for part in row_blocks(rows.n_rows, fitting_rows(4 * inputs.size + 1)):
-        Z = rows.read(part)[0][inputs]
+    for _, every, _, _ in rows.blocks(fitting_rows(4 * inputs.size + 1)):
+        Z = every[inputs]
         is_above = places < Z
         ends = np.where(is_above, -Z, -np.inf), np.where(is_above, -np.inf, Z)
         found = np.maximum(found, np.max(ends, axis=2))

@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ndtr
 
-from ..consequent import NormalFactor
 from ..posterior import MOST_PARAMETERS, Posterior, parameter_units
 from .objective import Evaluation, SeparableProblem
 from .premise import Premise
@@ -44,14 +43,13 @@ def posterior_of(
     noise = np.sqrt(_mean_squares(problem, evaluation, robust))
     premises = np.zeros((0, n_parameters))
     cross = np.zeros((problem.n_outputs, 0, len(half)))
-    n_varying = max(int(np.count_nonzero(~rows.targets.is_constant)), 1)
     n_determined = 0.0
     if premise is not None and premise.size:
         premises, cross, n_determined = _premises(problem, premise, evaluation)
     # Where rows leave no freedom, the noise is that of one.
-    freedom = max(n_rows - n_effective - n_determined / n_varying, 1.0)
+    freedom = max(n_rows - n_effective - n_determined / problem.n_varying, 1.0)
     noise *= np.sqrt(n_rows / freedom)
-    shared = np.sqrt(np.sum(noise**2) / n_varying)
+    shared = np.sqrt(np.sum(noise**2) / problem.n_varying)
     # L^-1 T' is the factor of consequents on [1, z], T the local basis.
     half = np.ascontiguousarray(problem.local.to_global(half.T).T)
     blocks = half.reshape(len(half), -1, problem.n_basis)
@@ -83,12 +81,11 @@ def _mean_squares(problem, evaluation, robust):
     standard normal r.
     """
     if robust is None:
-        return problem.mean_squares(evaluation)
+        return evaluation.mean_squares
     weights, c = robust
     total, total_weight = np.zeros(problem.n_outputs), 0.0
     for part, residual, weight in problem.residuals(evaluation):
         left = weights[part]
-        weight = np.ones(residual.shape[1]) if weight is None else weight
         # The rows' weights have Huber's in them already.
         total += residual**2 @ (weight * left)
         total_weight += np.sum(weight / left)
@@ -104,26 +101,13 @@ def _premises(problem, premise, evaluation):
     """
     x = premise.displacement(evaluation.antecedent.parameters)
     raw = problem.curvature(evaluation)
-    identity = np.eye(premise.size)
-    jacobian = premise.jacobian(x)
-    hessian = jacobian.T @ raw.gauss_newton @ jacobian
-    stiffness = problem.penalty.stiffness
-    try:
-        inverse = NormalFactor(hessian + stiffness * identity).half_solve(identity)
-    except FloatingPointError:
-        inverse = _positive_part(hessian, stiffness)
-    n_determined = len(inverse) - stiffness * float(np.sum(inverse**2))
+    jacobian, stiffness = premise.jacobian(x), problem.penalty.stiffness
+    values, vectors = np.linalg.eigh(jacobian.T @ raw.gauss_newton @ jacobian)
+    # No eigenvalue is negative but for what rounding leaves of large numbers, as beside a row so
+    # far off that a rule is its own. What neither data nor stiffness tell from that is held.
+    told = np.maximum(values, stiffness) > -values[0]
+    values = np.maximum(values[told], premise.size * np.finfo(float).eps * values[-1])
+    inverse = vectors[:, told].T / np.sqrt(values + stiffness)[:, None]
     premises = inverse @ jacobian.T
     cross = np.stack([premises @ half.T for half in raw.cross])
-    return premises, cross, n_determined
-
-
-def _positive_part(hessian, stiffness):
-    """R^-1 of the directions in which a Gauss-Newton matrix is more than rounding.
-
-    It has no negative eigenvalue but for what rounding leaves of large numbers, as beside a row so
-    far off that a rule is its own. Directions of no more than the most negative one are held.
-    """
-    values, vectors = np.linalg.eigh(0.5 * (hessian + hessian.T))
-    told = values > -values[0]
-    return vectors[:, told].T / np.sqrt(values[told] + stiffness)[:, None]
+    return premises, cross, float(np.sum(values / (values + stiffness)))

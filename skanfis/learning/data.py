@@ -7,10 +7,11 @@ and larger than memory.
 """
 
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
-from ..blocks import BLOCK_ROWS, row_blocks
+from ..blocks import BLOCK_ROWS, add_each, row_blocks
 from ..policies import ROUNDING
 
 # Blocks per unit of parallel work. It depends on nothing, so that sums are taken in the same order
@@ -81,6 +82,7 @@ def column_statistics(values, sample_weight=None):
     Differences are summed, from the first row and then from the mean: columns far from the origin
     lose no digits. A constant column has scale one.
     """
+    weight = np.ones(len(values)) if sample_weight is None else sample_weight
     minimum, maximum = np.full((2, values.shape[1]), [[np.inf], [-np.inf]])
     origin = _columns(values, slice(1))
     total, first, second = 0.0, np.zeros(values.shape[1]), np.zeros(values.shape[1])
@@ -88,15 +90,15 @@ def column_statistics(values, sample_weight=None):
         block = _columns(values, part)
         np.minimum(minimum, block.min(axis=1), out=minimum)
         np.maximum(maximum, block.max(axis=1), out=maximum)
-        total += float(block.shape[1] if sample_weight is None else sample_weight[part].sum())
-        first += _sum(block - origin, sample_weight, part)
+        total += float(weight[part].sum())
+        first += (block - origin) @ weight[part]
     mean = origin + (first / total)[:, None]
     constant = never_changes(minimum, maximum)
     # In parts of the range: else squares of what varies by next to nothing would vanish, unseen.
     span = np.where(constant, 1.0, maximum - minimum)
     for part in row_blocks(values.shape[0], BLOCK_ROWS):
         deviations = (_columns(values, part) - mean) / span[:, None]
-        second += _sum(deviations**2, sample_weight, part)
+        second += deviations**2 @ weight[part]
     scale = span * np.sqrt(second / total)
     return Scale(
         np.where(constant, minimum, mean[:, 0]),
@@ -114,10 +116,6 @@ def never_changes(minimum, maximum):
 def _columns(values, part):
     """Some rows as columns of their own, which sums run along."""
     return np.array(values[part].T, dtype=float, order="C")
-
-
-def _sum(block, sample_weight, part):
-    return block.sum(axis=1) if sample_weight is None else block @ sample_weight[part]
 
 
 def check_scales(inputs, targets, input_names, output_names):
@@ -183,6 +181,19 @@ class StandardisedData:
         """Their sum."""
         return float(np.sum(self.weights))
 
+    @property
+    def effective_weight(self):
+        """Rows by weight: their sum, or as many as their spread leaves, whichever are more.
+
+        A whole weight is so many copies of a row. Weights that are less than whole cannot be
+        copies; then the size of an unweighted sample of the same precision stands for it,
+        W^2 / sum s^2 (Kish 1965), where that is more.
+        """
+        # By the largest: squares of tiny weights would vanish.
+        largest = float(np.max(self.weights))
+        share = self.weights / largest
+        return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
+
     def chunks(self, block_rows):
         """Units of parallel work: lists of slices of at most ``block_rows`` rows."""
         blocks = row_blocks(self.n_rows, block_rows)
@@ -197,16 +208,9 @@ class StandardisedData:
         """
 
         def of_chunk(chunk):
-            sums = [np.zeros(shape, order="F") for shape in one_pass.shapes]
-            for part in chunk:
-                one_pass(*self.read(part), sums)
-            return sums
+            return reduce(add_each, (one_pass(*self.read(part)) for part in chunk))
 
-        totals = [np.zeros(shape, order="F") for shape in one_pass.shapes]
-        for sums in map_ordered(of_chunk, self.chunks(block_rows)):
-            for total, one in zip(totals, sums, strict=True):
-                total += one
-        return totals
+        return reduce(add_each, map_ordered(of_chunk, self.chunks(block_rows)), [])
 
     def reduce(self, of_rows, merge):
         """What ``of_rows`` makes of the rows; where they are in parts, merged two by two."""
@@ -221,11 +225,17 @@ class StandardisedData:
     def numbers(self, of_block):
         """One number for every row, which a function makes of Z and the target of a block."""
         numbers = np.empty(self.n_rows)
-        for part in row_blocks(self.n_rows, BLOCK_ROWS):
-            numbers[part] = of_block(*self.read(part)[:2])
+        for part, Z, target, _ in self.blocks():
+            numbers[part] = of_block(Z, target)
         return numbers
 
+    def blocks(self, block_rows=BLOCK_ROWS):
+        """Blocks of at most so many rows, in order: slice, and what is read of it."""
+        for part in row_blocks(self.n_rows, block_rows):
+            yield part, *self.read(part)
+
     def read(self, part):
-        """Z, standardised target, and weights or None, of one block."""
-        weight = None if self.sample_weight is None else self.sample_weight[part]
-        return self.inputs.apply(self.X[part].T), self.targets.apply(self.y[part].T), weight
+        """Z, standardised target, and weights, of one block."""
+        Z, target = self.inputs.apply(self.X[part].T), self.targets.apply(self.y[part].T)
+        weight = np.ones(Z.shape[1]) if self.sample_weight is None else self.sample_weight[part]
+        return Z, target, weight

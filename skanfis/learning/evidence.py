@@ -25,7 +25,7 @@ import numpy as np
 from scipy.special import wrightomega
 
 from ..consequent import NormalFactor
-from .objective import Evaluation
+from .objective import Evaluation, SeparableProblem
 from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
 
 # The weights that the evidence can find.
@@ -153,41 +153,25 @@ class Laplace:
         return self.curvature.size - float(self.trace_after[_STIFFNESS])
 
 
-def laplace(
-    evaluation: Evaluation,
-    line: CommonLine,
-    penalty: Penalty,
-    n_rows: float,
-    n_outputs: int,
-    displacement=(),
-    curvature=(),
-):
-    """The posterior at fixed premises, for a penalty of any weights.
-
-    The ``evaluation`` is at weights of its own; ``n_outputs`` are those that vary: a constant one
-    says nothing about the noise of another.
-    """
-    normal = evaluation.normal
+def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), curvature=()):
+    """The posterior at fixed premises; the ``evaluation`` is solved with the problem's penalty."""
+    normal, line, penalty = evaluation.normal, problem.common_line, problem.penalty
     assert normal is not None
-    matrix = penalty.agreement * normal.disagreement
-    matrix += line.pull(penalty)
-    # Of one constant there is no penalty at all: any size will do.
-    size = np.trace(matrix) / matrix.shape[0] or 1.0
-    # ``matrix`` takes on the factor's shift.
-    free = line.own.free(penalty)
-    own, _, error = normal.with_penalty(matrix, evaluation.mean_squared_error, free)
-    factor, solved = own.factor, own.coefficients
+    matrix, factor, solved = normal.penalty, normal.factor, normal.coefficients
+    # Of one constant there is no penalty at all, but for the shift: any size will do.
+    size = np.trace(matrix) / matrix.shape[0]
+    size = size if size > 2.0 * factor.shift else 1.0
     # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
-    prior = NormalFactor(matrix + size * np.outer(line.height, line.height), free)
+    prior = NormalFactor(matrix + size * np.outer(line.height, line.height), normal.free)
     paid = line.weights(penalty)
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
     paid[_STIFFNESS] *= np.dot(displacement, displacement)
     paid[_OTHERS] *= line.squares(solved)
     return Laplace(
         penalty,
-        n_rows,
-        max(error + float(np.vdot(solved, matrix @ solved) + paid[_STIFFNESS]), _LEAST_ERROR),
-        n_outputs,
+        problem.n_rows,
+        max(2.0 * evaluation.cost + float(paid[_STIFFNESS]), _LEAST_ERROR),
+        problem.n_varying,
         factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(line.n_rules),
         paid,
         normal.disagreement,

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..antecedent import Antecedent, strongest_rules
 from ..antecedent.base import TOLD_APART
-from ..blocks import add_each, fitting_rows, row_blocks
+from ..blocks import add_each, fitting_rows
 from ..consequent import basis
 from ..support import RuleSupport
 from .data import StandardisedData, fingerprint
@@ -43,28 +43,27 @@ def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients:
     ``firing`` is the :class:`RuleFiring` of the same rows, with distinct inputs counted up to
     ``n_coefficients``.
     """
-    n_rules, n_inputs = antecedent.n_rules, firing.second.shape[1] - 1
-    known = np.flatnonzero(firing.n_distinct)
-    center, factor = np.zeros((n_rules, n_inputs)), np.zeros((n_rules, n_inputs, n_inputs))
-    center[known], factor[known] = places(firing.second[known])
+    center, factor = places(firing.second, firing.n_distinct > 0)
     radius = rows.reduce(
         partial(_radii, antecedent=antecedent, center=center, factor=factor), np.maximum
     )
     return RuleSupport(firing.n_distinct / n_coefficients, center, factor, radius)
 
 
-def places(second):
+def places(second, is_known):
     """Means of the rows of rules, and lower triangular W, W' W the inverse of their covariances.
 
-    ``second`` are sums of s w_r [1, z] [1, z]'; covariances are thickened.
+    ``second`` are sums of s w_r [1, z] [1, z]'; covariances are thickened. Both are zero for rules
+    that are not known.
     """
-    moments = second / np.maximum(second[:, :1, :1], np.finfo(float).tiny)
+    known = np.asarray(is_known)[:, None, None]
+    moments = known * second / np.maximum(second[:, :1, :1], np.finfo(float).tiny)
     center = moments[:, 0, 1:].copy()
     covariance = moments[:, 1:, 1:] - center[:, :, None] * center[:, None, :]
     # Rows on a line or a surface (two thermometers on one gyro) keep some thickness, and the
     # distance stays finite off it.
     covariance += TOLD_APART**2 * np.eye(center.shape[1])
-    return center, np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
+    return center, known * np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def _sums(rows, antecedent, enough):
@@ -73,8 +72,7 @@ def _sums(rows, antecedent, enough):
     overlap, strongest, peak = np.zeros((n_rules, n_rules)), np.zeros(n_rules), np.zeros(n_rules)
     products = np.zeros((n_rules, n_basis * (n_basis + 1) // 2))
     distinct = [np.empty(0)] * n_rules
-    for part in _blocks(rows, antecedent):
-        Z, _, weight = rows.read(part)
+    for _, Z, _, weight in _blocks(rows, antecedent):
         strengths = antecedent.strengths(Z)
         best, numbers = strongest_rules(strengths), fingerprint(Z)
         for r in np.unique(best):
@@ -82,7 +80,7 @@ def _sums(rows, antecedent, enough):
                 distinct[r] = np.union1d(distinct[r], numbers[best == r])[:enough]
         strongest += np.bincount(best, weights=weight, minlength=n_rules)
         np.maximum(peak, strengths.max(axis=1), out=peak)
-        weighted = strengths if weight is None else strengths * weight
+        weighted = strengths * weight
         overlap += weighted @ strengths.T
         basis_rows = basis(Z)
         products += weighted @ pairs(basis_rows, basis_rows).T
@@ -107,8 +105,7 @@ def _radii(rows, antecedent, center, factor):
     forms = (affine.transpose(0, 2, 1) @ affine)[:, *upper]
     forms[:, upper[0] != upper[1]] *= 2.0
     radius, every = np.zeros(n_rules), np.arange(n_rules)
-    for part in _blocks(rows, antecedent):
-        Z, _, _ = rows.read(part)
+    for _, Z, _, _ in _blocks(rows, antecedent):
         strengths = antecedent.strengths(Z)
         fires = strengths >= FIRES * strengths.max(axis=0)
         basis_rows = basis(Z)
@@ -122,7 +119,7 @@ def _radii(rows, antecedent, center, factor):
 
 
 def _blocks(rows, antecedent):
-    """Slices of rows whose memberships and strengths take a bounded number of bytes."""
+    """Blocks of rows whose memberships and strengths take a bounded number of bytes."""
     n_basis = 1 + rows.X.shape[1]
     n_values = 3 * (antecedent.n_rules + antecedent.n_terms) + n_basis * (n_basis + 9) // 2
-    return row_blocks(rows.n_rows, fitting_rows(n_values))
+    return rows.blocks(fitting_rows(n_values))

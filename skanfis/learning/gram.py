@@ -20,7 +20,8 @@ from functools import cache
 from math import prod
 
 import numpy as np
-from scipy.linalg import blas
+
+from ..antecedent.base import combinations
 
 
 def pairs(rows, others):
@@ -43,16 +44,8 @@ def pair_index(n):
     return np.maximum(index, index.T)
 
 
-def _products(groups, n_rows):
-    """Products of one row of each group, all combinations, the last group's row fastest."""
-    result = np.ones((1, n_rows)) if not groups else groups[0]
-    for group in groups[1:]:
-        result = (result[:, None, :] * group).reshape(-1, n_rows)
-    return result
-
-
 class DesignMoments:
-    """Accumulates the moments of one design over blocks of rows.
+    """The moments of one design, which add up over blocks of rows.
 
     ``counts`` are the shares per factor of the rule base, none of a single rule; ``n_basis`` basis
     functions belong to a rule.
@@ -69,22 +62,21 @@ class DesignMoments:
 
     @property
     def shape(self):
-        """Shape of the sums, which are in Fortran order."""
+        """Shape of the moments."""
         return self._rows(self._split)
 
-    def accumulate(self, sums, shares, basis_rows, weighted_basis):
-        """Add a block of rows: shares (n_shares, n_rows); basis functions, plain and weighted."""
+    def of(self, shares, basis_rows, weighted_basis):
+        """Of a block of rows: shares (n_shares, n_rows); basis functions, plain and weighted."""
         # Behind the last factor there is nothing.
         factors = np.split(shares, np.cumsum(self._lengths[:-1]))[:-1]
         groups = [*(pairs(own, own) for own in factors), pairs(weighted_basis, basis_rows)]
-        n_rows = basis_rows.shape[1]
-        left = _products(groups[: self._split], n_rows)
-        right = _products(groups[self._split :], n_rows)
-        blas.dgemm(1.0, left.T, right.T, beta=1.0, c=sums, trans_a=1, overwrite_c=1)
+        left, right = groups[: self._split], groups[self._split :]
+        # On the left there may be none: the basis begins with 1.
+        return combinations(left or [basis_rows[:1]]) @ combinations(right).T
 
-    def gram(self, sums):
-        """Phi' S Phi out of the sums, (n_columns, n_columns)."""
-        moments = np.ascontiguousarray(sums).reshape(self._sizes)
+    def gram(self, moments):
+        """Phi' S Phi out of the moments of all rows, (n_columns, n_columns)."""
+        moments = moments.reshape(self._sizes)
         n_columns, axes = prod(self._lengths), range(0, 2 * len(self._lengths), 2)
         # From the last on, so that pairs in front are still one axis each.
         for axis, length in reversed([*enumerate(self._lengths)]):

@@ -28,8 +28,8 @@ from functools import cached_property
 import numpy as np
 
 from ..antecedent import Antecedent
-from ..blocks import BLOCK_BYTES, fitting_rows, row_blocks
-from ..consequent import LocalBasis, NormalFactor, rule_masses, rule_outputs
+from ..blocks import BLOCK_BYTES, fitting_rows
+from ..consequent import LocalBasis, NormalFactor, outputs_of_rules, rule_masses
 from .data import StandardisedData
 from .gram import DesignMoments
 from .passes import Design, FirstPass, JointPass, SecondPass, own_parameters
@@ -47,8 +47,13 @@ class Evaluation:
     cost: float
     coefficients: np.ndarray  # on [1, z], (n_columns, n_outputs)
     masses: np.ndarray  # part of the weight on which each rule fires
-    mean_squared_error: float  # of the standardised target, weighted, summed over outputs
+    mean_squares: np.ndarray  # of the residual of every standardised output, weighted
     normal: "NormalEquations | None"  # None where the coefficients were given, not solved for
+
+    @property
+    def mean_squared_error(self):
+        """Of the standardised target, summed over outputs."""
+        return float(self.mean_squares.sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,28 +65,25 @@ class NormalEquations:
     penalty: np.ndarray  # P
     factor: NormalFactor  # of Phi' S Phi / W + P
     coefficients: np.ndarray  # local, (n_columns, n_outputs)
-    free: np.ndarray | None  # what these are made of, see ``OwnSlopes.free``
+    free: np.ndarray | None  # what these are made of, see ``CommonLine.free``
 
-    def with_penalty(self, penalty, error, free):
-        """The same with another penalty, the change of the coefficients, and the new squared error.
+    def with_penalty(self, penalty, squares, free):
+        """The same with another penalty, the change of the coefficients, and the new mean squares.
 
-        ``error`` is the one of here. No pass over the rows is taken; the factor's shift is added to
-        ``penalty`` itself.
+        ``squares`` are those of here. No pass over the rows is taken; the factor's shift is added
+        to ``penalty`` itself.
         """
         factor = NormalFactor(self.gram + penalty, free)
         penalty.flat[:: penalty.shape[0] + 1] += factor.shift
         # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 and u_0 those of here.
-        slope = self.penalty @ self.coefficients
-        if free is self.free:
-            change = factor.solve(slope - penalty @ self.coefficients)
-        else:
-            # From coefficients that were free to be anything.
-            assert self.free is None
-            change = factor.solve(self.gram @ self.coefficients + slope) - self.coefficients
-        error += float(np.vdot(change, self.gram @ change - 2.0 * slope))
-        solved = self.coefficients + change
+        before, slope = self.coefficients, self.penalty @ self.coefficients
+        # From coefficients that are of the form that is asked for.
+        start = before if free is None else free @ (free.T @ before)
+        solved = start + factor.solve(slope + self.gram @ (before - start) - penalty @ start)
+        change = solved - before
+        squares = squares + np.sum(change * (self.gram @ change - 2.0 * slope), axis=0)
         normal = replace(self, penalty=penalty, factor=factor, coefficients=solved, free=free)
-        return normal, change, max(error, 0.0)
+        return normal, change, np.maximum(squares, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +120,6 @@ class SeparableProblem:
         self.n_outputs = rows.y.shape[1]
         self._design = Design(
             self.consequent_inputs,
-            self.n_basis,
             DesignMoments(antecedent.share_counts, self.n_basis),
             own_parameters(antecedent),
         )
@@ -128,7 +129,7 @@ class SeparableProblem:
             + 6 * antecedent.parameters.size
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
-        self._weight = rows.total_weight
+        self._weight, self.n_rows = rows.total_weight, rows.effective_weight
         # glibc hands back what is freed beyond limits that grow with the largest piece freed so
         # far; without one of this size, every block gets its arrays page by page again, and a pass
         # takes up to twice as long. Nothing is written to it.
@@ -144,13 +145,17 @@ class SeparableProblem:
     def _extent(self, antecedent):
         """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
         farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))
-        for part in self._blocks():
-            Z, _, _ = self.rows.read(part)
+        for _, Z, _, _ in self._blocks():
             root = np.sqrt(antecedent.strengths(Z))
             for j, z in enumerate(self._design.basis(Z)[1:]):
                 distance = root * np.abs(z - self.local.center[:, j, None])
                 np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
         return np.maximum(farthest, 1.0)
+
+    @property
+    def n_varying(self):
+        """Outputs that vary, one at least: a constant one says nothing of the noise of others."""
+        return max(int(np.count_nonzero(~self.rows.targets.is_constant)), 1)
 
     def with_penalty(self, penalty):
         """Return the same problem with another penalty; no pass over the rows."""
@@ -168,6 +173,7 @@ class SeparableProblem:
         """
         other = copy.copy(self)
         other.rows, other._weight, other.on_sample = rows, rows.total_weight, self
+        other.n_rows = rows.effective_weight
         other._sums_at_start = None
         return other
 
@@ -180,7 +186,7 @@ class SeparableProblem:
         return self.common_line.pull(self.penalty)
 
     def _blocks(self):
-        return row_blocks(self.rows.n_rows, self._block_rows)
+        return self.rows.blocks(self._block_rows)
 
     def _sum(self, one_pass):
         """Means over the weight of what a pass sums."""
@@ -204,38 +210,39 @@ class SeparableProblem:
         masses = rule_masses(gram, antecedent.n_rules)
         disagreement, gram = disagreement_matrix(gram, antecedent.n_rules, self.local)
         penalty = self.penalty_matrix(disagreement)
-        free = self.common_line.own.free(self.penalty)
+        free = self.common_line.free(self.penalty)
         factor = NormalFactor(gram + penalty, free)
         penalty.flat[:: self.n_columns + 1] += factor.shift
         reference_local = self.local.to_local(reference)
         pull = penalty @ reference_local
         slope = self.local.transform_rows(slope.copy()) - pull
         change = factor.solve(slope)
-        cost = 0.5 * float(square.sum() + np.vdot(reference_local, pull) - np.vdot(slope, change))
+        costs = square + np.sum(reference_local * pull, axis=0) - np.sum(slope * change, axis=0)
         solved = reference_local + change
+        paid = np.sum(solved * (penalty @ solved), axis=0)
         return Evaluation(
             antecedent,
-            cost,
+            0.5 * float(costs.sum()),
             reference + self.local.to_global(change),
             masses,
-            max(2.0 * cost - float(np.vdot(solved, penalty @ solved)), 0.0),
+            np.maximum(costs - paid, 0.0),
             NormalEquations(gram, disagreement, penalty, factor, solved, free),
         )
 
     def solved_again(self, evaluation):
         """An evaluation of the same rows under this penalty; no pass over them."""
         before = evaluation.normal
-        normal, change, error = before.with_penalty(
+        normal, change, squares = before.with_penalty(
             self.penalty_matrix(before.disagreement),
-            evaluation.mean_squared_error,
-            self.common_line.own.free(self.penalty),
+            evaluation.mean_squares,
+            self.common_line.free(self.penalty),
         )
         paid = float(np.vdot(normal.coefficients, normal.penalty @ normal.coefficients))
         return replace(
             evaluation,
-            cost=0.5 * (error + paid),
+            cost=0.5 * (float(squares.sum()) + paid),
             coefficients=evaluation.coefficients + self.local.to_global(change),
-            mean_squared_error=error,
+            mean_squares=squares,
             normal=normal,
         )
 
@@ -273,52 +280,36 @@ class SeparableProblem:
         local = self.local.to_local(coefficients)
         pull = self._pull @ local
         cost = 0.5 * (square.sum() + self.penalty.agreement * apart.sum() + np.sum(local * pull))
-        evaluation = Evaluation(antecedent, cost, coefficients, masses, float(square.sum()), None)
+        evaluation = Evaluation(antecedent, cost, coefficients, masses, square, None)
         return evaluation, -premises, self._by_global(pull) - slope
 
     def residuals(self, evaluation):
-        """Blocks of rows in order: slice, residual of the standardised target, weights or None."""
+        """Blocks of rows in order: slice, residual of the standardised target, weights."""
         for part, _, _, residual, weight in self._fired(evaluation):
             yield part, residual, weight
 
     def _fired(self, evaluation):
         """The same with strengths of the rules and functions of the basis, after the slice."""
-        by_rule = self._design.by_rule(evaluation.coefficients)
-        for part in self._blocks():
-            Z, residual, weight = self.rows.read(part)
+        by_output = self._design.by_output(evaluation.coefficients)
+        for part, Z, target, weight in self._blocks():
             strengths, basis_rows = evaluation.antecedent.strengths(Z), self._design.basis(Z)
-            for k in range(self.n_outputs):
-                residual[k] -= rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
+            residual = target - outputs_of_rules(by_output, strengths, basis_rows)
             yield part, strengths, basis_rows, residual, weight
 
-    def mean_squares(self, evaluation):
-        """Mean square of the residual of every standardised output, (n_outputs,)."""
-        if self.n_outputs == 1:
-            return np.array([evaluation.mean_squared_error])
-        if self.on_sample is not None:
-            # How the outputs share it shows on the sample; all of it is known of all rows.
-            found = self.on_sample.mean_squares(evaluation)
-            return found * (evaluation.mean_squared_error / max(found.sum(), np.finfo(float).tiny))
-        total = np.zeros(self.n_outputs)
-        for _, residual, weight in self.residuals(evaluation):
-            total += (residual**2).sum(axis=1) if weight is None else residual**2 @ weight
-        return total / self._weight
-
-    def leave_one_out_error(self, evaluation, n_rows):
+    def leave_one_out_error(self, evaluation):
         """Mean squared error of leaving out each row, at fixed premises (Allen 1974).
 
-        The mean of (r_i / (1 - h_i))^2, h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. The weights are
-        those of so many rows: of a row that stands for several, one is left out.
+        The mean of (r_i / (1 - h_i))^2, h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. Of a
+        row that stands for several, one is left out.
         """
-        total, unit = 0.0, self._weight / n_rows
+        total, unit = 0.0, self._weight / self.n_rows
         # L^-1 T': what is changed is a matrix of few rows, and not the design.
         root = self.local.to_global(evaluation.normal.factor.root.T).T
         for _, strengths, basis_rows, residual, weight in self._fired(evaluation):
             half = root @ (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)
             leverage = np.einsum("ij,ij->j", half, half)
             residual /= np.maximum(1.0 - unit * (leverage / self._weight), _SMALLEST_FREEDOM)
-            squares = np.sum(residual**2, axis=0)
-            total += squares.sum() if weight is None else weight @ squares
+            total += weight @ np.sum(residual**2, axis=0)
         return float(total / self._weight)
 
     def _by_global(self, local):

@@ -1,9 +1,8 @@
 r"""What one pass adds up over the rows, a block at a time: the sums behind ``objective``.
 
-A pass is a function of a block, Z (n_inputs, n_rows), target (n_outputs, n_rows) and weights or
-None, that adds to its sums, arrays of the pass's ``shapes``. It holds the point at which it is
-taken and nothing of the rows: it can be sent to where the rows are (``StandardisedData.sum``),
-and only the sums come back.
+A pass is a function of a block, Z (n_inputs, n_rows), target (n_outputs, n_rows) and weights, that
+returns its sums, a list of arrays. It holds the point at which it is taken and nothing of the rows:
+it can be sent to where the rows are (``StandardisedData.sum``), and only the sums come back.
 """
 
 from dataclasses import dataclass
@@ -11,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..antecedent import Antecedent, by_parameter
-from ..consequent import basis, rule_outputs
+from ..consequent import basis, outputs_of_rules, rule_outputs
 from .gram import DesignMoments
 from .ordered_terms import terms_of
 
@@ -23,7 +22,6 @@ class Design:
     """The columns of the design: its basis functions, and what its Gram matrix is made of."""
 
     consequent_inputs: np.ndarray  # that the consequents are linear in
-    n_basis: int
     moments: DesignMoments
     own_parameters: np.ndarray  # of the premises, see the function of this name
 
@@ -31,78 +29,68 @@ class Design:
         """Basis functions of the consequents at a block of rows."""
         return basis(Z[self.consequent_inputs])
 
-    def by_rule(self, coefficients):
-        """Coefficients (n_columns, n_outputs) as (n_rules, n_basis, n_outputs)."""
-        return coefficients.reshape(-1, self.n_basis, coefficients.shape[1])
+    def by_output(self, coefficients):
+        """Coefficients (n_columns, n_outputs) as (n_outputs, n_rules, n_basis)."""
+        n_basis = 1 + self.consequent_inputs.size
+        return coefficients.reshape(-1, n_basis, coefficients.shape[1]).transpose(2, 0, 1)
+
+
+def normal_sums(moments, strengths, shares, basis_rows, weight, residual):
+    """Of a block of rows: the moments of Phi' S Phi, then Phi' S r and r' S r of every output."""
+    weighted = basis_rows * weight
+    slopes = [(strengths @ (weighted * own).T).ravel() for own in residual]
+    found = moments.of(shares, basis_rows, weighted)
+    return [found, np.column_stack(slopes), residual**2 @ weight]
 
 
 @dataclass(frozen=True, eq=False)
-class FirstPass:
-    """Phi' S Phi (its moments), Phi' S r and r' S r; r is the residual of a reference."""
+class _Pass:
+    """A pass at a point: premises, and consequents."""
 
     design: Design
     antecedent: Antecedent
-    reference: np.ndarray  # coefficients on [1, z], (n_columns, n_outputs)
+    coefficients: np.ndarray  # on [1, z], (n_columns, n_outputs)
+    agreement: float = 0.0
 
-    @property
-    def shapes(self):
-        """Of the sums."""
-        return [self.design.moments.shape, self.reference.shape, self.reference.shape[1:]]
 
-    def __call__(self, Z, target, weight, sums):
-        moments, slope, square = sums
-        design, by_rule = self.design, self.design.by_rule(self.reference)
-        basis_rows = design.basis(Z)
-        weighted_basis = basis_rows if weight is None else basis_rows * weight
+class FirstPass(_Pass):
+    """Phi' S Phi (its moments), Phi' S r and r' S r, r the residual of reference coefficients."""
+
+    def __call__(self, Z, target, weight):
+        design, basis_rows = self.design, self.design.basis(Z)
         strengths, shares = self.antecedent.strengths_and_shares(Z)
-        design.moments.accumulate(moments, shares, basis_rows, weighted_basis)
-        for k in range(len(target)):
-            residual = target[k] - rule_outputs(by_rule[:, :, k], strengths, basis_rows)[1]
-            slope[:, k] += (strengths @ (weighted_basis * residual).T).ravel()
-            square[k] += weighted_basis[0] @ residual**2  # the basis begins with 1
+        by_output = design.by_output(self.coefficients)
+        residual = target - outputs_of_rules(by_output, strengths, basis_rows)
+        return normal_sums(design.moments, strengths, shares, basis_rows, weight, residual)
 
 
-@dataclass(frozen=True, eq=False)
-class SecondPass:
+class SecondPass(_Pass):
     """D' S D + lambda K, the slope, and C of every output, at coefficients that were solved for."""
 
-    design: Design
-    antecedent: Antecedent
-    coefficients: np.ndarray
-    agreement: float
-
-    @property
-    def shapes(self):
-        """Of the sums."""
-        n_raw = self.antecedent.parameters.size
-        n_columns, n_outputs = self.coefficients.shape
-        cross = [(n_raw, n_columns)] * n_outputs
-        return [(n_raw, n_raw), (n_raw,), *cross]
-
-    def __call__(self, Z, target, weight, sums):
-        square, slope, *cross = sums
-        design, antecedent, agreement = self.design, self.antecedent, self.agreement
-        by_rule = design.by_rule(self.coefficients)
-        basis_rows = design.basis(Z)
-        weighted_basis = basis_rows if weight is None else basis_rows * weight
+    def __call__(self, Z, target, weight):
+        antecedent, agreement = self.antecedent, self.agreement
+        basis_rows = self.design.basis(Z)
+        weighted_basis = basis_rows * weight
         log_mu, gradients = antecedent.log_memberships_and_mean_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
         columns = (strengths[:, None] * weighted_basis).reshape(-1, Z.shape[1])  # Phi' S
-        for k in range(len(target)):
-            by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
-            by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
+        n_raw = antecedent.parameters.size
+        square, slope, every_cross = np.zeros((n_raw, n_raw)), np.zeros(n_raw), []
+        for one, wanted in zip(self.design.by_output(self.coefficients), target, strict=True):
+            by_rule, output = rule_outputs(one, strengths, basis_rows)
+            by_term = antecedent.term_sensitivity(by_rule, output, shares)
             sensitivity = by_parameter(gradients, by_term)
-            weighted = sensitivity * weighted_basis[0]  # the basis begins with 1
+            weighted = sensitivity * weight
             square += weighted @ sensitivity.T
-            slope += weighted @ (target[k] - output)
+            slope += weighted @ (wanted - output)
             if agreement:
                 sensitivity *= 1.0 - 0.5 * agreement
-            cross[k] += sensitivity @ columns.T
+            cross = sensitivity @ columns.T
             if agreement:
-                excess = by_rule_k - strengths * output  # w_r e_r
-                self._disagree(
-                    square, slope, cross[k], excess, strengths, gradients, weighted_basis
-                )
+                excess = by_rule - strengths * output  # w_r e_r
+                self._disagree(square, slope, cross, excess, strengths, gradients, weighted_basis)
+            every_cross.append(cross)
+        return [square, slope, *every_cross]
 
     def _disagree(self, square, slope, cross, excess, strengths, gradients, weighted_basis):
         """Add the part of V: its dV, K and L.
@@ -135,54 +123,41 @@ class SecondPass:
         places = (size * own[:, :, None] + own[:, None, :]).ravel()
         whole = np.bincount(places, blocks.ravel(), size**2).reshape(size, size)
         square += whole[:n_raw, :n_raw]
-        apart = np.zeros((size, n_rules, self.design.n_basis))
+        apart = np.zeros((size, n_rules, len(weighted_basis)))
         apart[own, np.arange(n_rules)[:, None]] = of_rule @ columns.transpose(0, 2, 1)
         cross += apart[:n_raw].reshape(cross.shape)
 
 
-@dataclass(frozen=True, eq=False)
-class JointPass:
+class JointPass(_Pass):
     """Slopes by theta and beta but for A, r' S r and V (per output), and the rules' masses."""
 
-    design: Design
-    antecedent: Antecedent
-    coefficients: np.ndarray
-    agreement: float
-
-    @property
-    def shapes(self):
-        """Of the sums."""
-        by_output = self.coefficients.shape[1:]
-        n_raw, n_rules = self.antecedent.parameters.size, self.antecedent.n_rules
-        return [(n_raw,), self.coefficients.shape, by_output, by_output, (n_rules,)]
-
-    def __call__(self, Z, target, weight, sums):
-        premises, slope, square, apart, masses = sums
-        design, antecedent, agreement = self.design, self.antecedent, self.agreement
-        by_rule = design.by_rule(self.coefficients)
-        basis_rows = design.basis(Z)
+    def __call__(self, Z, target, weight):
+        antecedent, agreement = self.antecedent, self.agreement
+        basis_rows = self.design.basis(Z)
         log_mu, gradients = antecedent.log_memberships_and_mean_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
-        weight = np.ones(Z.shape[1]) if weight is None else weight
-        masses += strengths @ weight
-        for k in range(len(target)):
-            by_rule_k, output = rule_outputs(by_rule[:, :, k], strengths, basis_rows)
+        premises, slopes = np.zeros(antecedent.parameters.size), []
+        square, apart = np.zeros((2, len(target)))
+        for k, one in enumerate(self.design.by_output(self.coefficients)):
+            by_rule, output = rule_outputs(one, strengths, basis_rows)
             residual = target[k] - output
             weighted = residual * weight
-            slope[:, k] += (strengths @ (basis_rows * weighted).T).ravel()
-            square[k] += weighted @ residual
-            by_term = antecedent.term_sensitivity(by_rule_k, output, shares)
+            slope = strengths @ (basis_rows * weighted).T
+            square[k] = weighted @ residual
+            by_term = antecedent.term_sensitivity(by_rule, output, shares)
             by_term *= weighted
             if agreement:
-                excess = by_rule_k - strengths * output
+                excess = by_rule - strengths * output
                 squares = excess**2 / np.maximum(strengths, _TINY)
                 total = squares.sum(axis=0)
-                apart[k] += weight @ total
-                slope[:, k] -= agreement * ((excess * weight) @ basis_rows.T).ravel()
+                apart[k] = weight @ total
+                slope -= agreement * ((excess * weight) @ basis_rows.T)
                 change = antecedent.sum_over_rules(squares)
                 change -= antecedent.sum_over_rules(strengths) * total
                 by_term -= (0.5 * agreement) * weight * change
             premises += by_parameter(gradients, by_term).sum(axis=1)
+            slopes.append(slope.ravel())
+        return [premises, np.column_stack(slopes), square, apart, strengths @ weight]
 
 
 def own_parameters(antecedent):

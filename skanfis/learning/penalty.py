@@ -80,49 +80,6 @@ def disagreement_matrix(gram, n_rules, local: LocalBasis):
     return matrix, gram
 
 
-class OwnSlopes:
-    """Where the slopes of every rule are among the local coefficients u, and u with some held.
-
-    ``slopes`` are the inputs that the consequents are linear in, None for those that are constant;
-    ``per_unit`` (n_rules, n_basis - 1) turns a local slope into one per unit that all rules share.
-    """
-
-    def __init__(self, per_unit: np.ndarray, slopes: list[int | None]):
-        self._per_unit, self._n_basis = per_unit, 1 + len(slopes)
-        self._n_columns = len(per_unit) * self._n_basis
-        self._place = {j: k for k, j in enumerate(slopes) if j is not None}
-        self._free: dict[tuple, np.ndarray] = {}
-
-    def rows(self, j, rules):
-        """Rows that give the slopes by an input of some rules out of u, in the shared unit."""
-        found = np.zeros((rules.size, self._n_columns))
-        per_unit = self._per_unit[rules, self._place[j]]
-        found[np.arange(rules.size), self._columns(j, rules)] = per_unit
-        return found
-
-    def free(self, penalty: Penalty):
-        """Orthonormal columns that u is made of, (n_columns, n_free); None where it is any."""
-        held = penalty.common, penalty.absent
-        if not any(held):
-            return None
-        if held not in self._free:
-            columns, is_free = np.eye(self._n_columns), np.ones(self._n_columns, dtype=bool)
-            for j, rules in penalty.common:
-                # The slopes are one in the shared unit; the first column stands for all of them.
-                own = self._columns(j, rules)
-                local = 1.0 / self._per_unit[list(rules), self._place[j]]
-                columns[own[0], own] = local / np.linalg.norm(local)
-                is_free[own[1:]] = False
-            for j, rules in penalty.absent:
-                is_free[self._columns(j, rules)] = False
-            self._free[held] = np.ascontiguousarray(columns[is_free].T)
-        return self._free[held]
-
-    def _columns(self, j, rules):
-        """Places in u of the slopes by an input of some rules."""
-        return np.array(rules) * self._n_basis + 1 + self._place[j]
-
-
 class CommonLine:
     """The line that all rules share, and what the local coefficients u of all rules pay by it.
 
@@ -155,8 +112,6 @@ class CommonLine:
         along = orthonormal * scale[:, None]  # S Q
         from_line = np.diag(scale) - orthonormal @ along.T  # N
         by_part, self.components, component = departures(from_line, antecedent, slopes)
-        # N'N, what all components pay alike; made without D it is rounded less.
-        self._together = np.diag(scale**2) - along @ along.T
         to_slopes = linalg.solve_triangular(triangle, along.T)[1:]
         is_varying = np.array([j is not None for j in slopes], dtype=bool)
         self.slopes = [j for j in slopes if j is not None]
@@ -167,24 +122,45 @@ class CommonLine:
         self._part = np.concatenate([np.arange(len(self.slopes)), len(self.slopes) + component])
         parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.components)
         self.kinds = np.array([*WEIGHTS, *parts])
-        self.own = OwnSlopes(extent.mean(axis=0) / local.spread, slopes)
+        # From a local slope to one per unit that all rules share.
+        self._per_unit = extent.mean(axis=0) / local.spread
+        self._place = {j: k for k, j in enumerate(slopes) if j is not None}
         # Along which all rules rise alike: the null space of the whole penalty.
         self.height = np.zeros(n_columns)
         self.height[::n_basis] = self.n_rules**-0.5
+
+    def own_slopes(self, j, rules):
+        """Rows that give the slopes by an input of some rules out of u, in the shared unit."""
+        found = np.zeros((rules.size, self.height.size))
+        per_unit = self._per_unit[rules, self._place[j]]
+        found[np.arange(rules.size), self._columns(j, rules)] = per_unit
+        return found
+
+    def free(self, penalty: Penalty):
+        """Orthonormal columns that u is made of, (n_columns, n_free); None where it is any."""
+        if not (penalty.common or penalty.absent):
+            return None
+        columns, is_free = np.eye(self.height.size), np.ones(self.height.size, dtype=bool)
+        for j, rules in penalty.common:
+            # The slopes are one in the shared unit; the first column stands for all of them.
+            own = self._columns(j, rules)
+            local = 1.0 / self._per_unit[list(rules), self._place[j]]
+            columns[own[0], own] = local / np.linalg.norm(local)
+            is_free[own[1:]] = False
+        for j, rules in penalty.absent:
+            is_free[self._columns(j, rules)] = False
+        return np.ascontiguousarray(columns[is_free].T)
+
+    def _columns(self, j, rules):
+        """Places in u of the slopes by an input of some rules."""
+        return np.array(rules) * (self.height.size // self.n_rules) + 1 + self._place[j]
 
     def pull(self, penalty: Penalty):
         """The matrix of what departures and slopes pay, alpha_c |delta_c|^2 and rho_j b_j^2."""
         weights = self.weights(penalty)[len(WEIGHTS) :]
         rooted = np.sqrt(weights)[self._part, None] * self._rows
-        if penalty.pulls:
-            matrix = rooted.T @ rooted
-        else:
-            slopes = rooted[: len(self.slopes)]
-            matrix = penalty.alpha * self._together + slopes.T @ slopes
-        if self._to_none.size:
-            # What is constant has no slope to learn, but one that is held.
-            matrix += penalty.slope * self._to_none.T @ self._to_none
-        return matrix
+        # What is constant has no slope to learn, but one that is held.
+        return rooted.T @ rooted + penalty.slope * self._to_none.T @ self._to_none
 
     def weights(self, penalty: Penalty):
         """All weights in a row, of these ``kinds``: of ``WEIGHTS``, every slope and component."""

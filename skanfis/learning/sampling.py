@@ -43,7 +43,6 @@ def with_sample(rows, most=None):
         if len(drawn[0]) == most:
             break
     X, y, weight, _, _, *labels = drawn
-    weight = None if (weight == 1.0).all() else weight
     groups = [group_numbers(own, len(X)) for own in labels]
     sample = StandardisedData(X, y, weight, rows.inputs, rows.targets, *groups)
     return replace(rows, sample=sample)
@@ -84,7 +83,7 @@ def _of_block(rows, part, limit):
     return [
         np.asarray(rows.X[part], dtype=float)[kept],
         np.asarray(rows.y[part], dtype=float)[kept],
-        np.ones(kept.size) if weight is None else weight[kept],
+        weight[kept],
         prints[kept],
         numbers[kept],
         *([] if rows.groups is None else [rows.groups[part][kept]]),

@@ -32,11 +32,11 @@ def sparse_slopes(posterior: Laplace, coefficients, worth):
         for half in (factor.half_solve(identity) for factor in (posterior.prior, posterior.factor))
     )
     state, every, common, absent = [coefficients, after, before], np.arange(line.n_rules), [], []
-    whole = [_loss(state, line.own.rows(j, every)) for j in line.slopes]
+    whole = [_loss(state, line.own_slopes(j, every)) for j in line.slopes]
     for k in np.argsort(whole, kind="stable"):
         j, rules = line.slopes[k], every
         while rules.size > 1:
-            slopes = line.own.rows(j, rules)
+            slopes = line.own_slopes(j, rules)
             contrasts = linalg.helmert(rules.size) @ slopes
             if _loss(state, contrasts) < worth * contrasts.shape[0] * n_outputs:
                 break
@@ -45,9 +45,9 @@ def sparse_slopes(posterior: Laplace, coefficients, worth):
             state = _given(state, contrasts)
         else:
             # Of two that differ neither is the farther one: the rule that can do without it best.
-            alone = [_loss(state, line.own.rows(j, rule)) for rule in every[:, None]]
+            alone = [_loss(state, line.own_slopes(j, rule)) for rule in every[:, None]]
             rules = every[[int(np.argmin(alone))]]
-        slope = line.own.rows(j, rules[:1])
+        slope = line.own_slopes(j, rules[:1])
         if _loss(state, slope) < worth * n_outputs:
             absent.append((j, tuple(rules.tolist())))
             state = _given(state, slope)

@@ -1,14 +1,13 @@
 """Structure: what decides on the rule base that training starts from, and on nothing else."""
 
 from .request import StructureRequest, report_constant
-from .sample import effective_weight, representative_rows, weighted_quantile
+from .sample import representative_rows, weighted_quantile
 from .start import Start, check_inputs, imported_antecedent
 
 __all__ = [
     "Start",
     "StructureRequest",
     "check_inputs",
-    "effective_weight",
     "imported_antecedent",
     "report_constant",
     "representative_rows",

@@ -36,7 +36,7 @@ def clustered_antecedent(families, rows: StandardisedData, label, premise_inputs
     if found.size == 1 or inputs.size == 0:
         return GridAntecedent((), counts=())
     masses = weight * (labels == found[:, None])
-    return _scattered(families, _terms_at(families, inputs, table, masses))
+    return RuleTableAntecedent.of_own_terms(families, _terms_at(families, inputs, table, masses))
 
 
 def grown_antecedent(families, tuned, label, premise_inputs):
@@ -58,7 +58,7 @@ def grown_antecedent(families, tuned, label, premise_inputs):
         learnt[j][:] = np.nan
         learnt[j][:, has_term] = terms
     terms = {j: np.concatenate([learnt[j], added[j]], axis=1) for j in premise_inputs}
-    return _scattered(families, terms)
+    return RuleTableAntecedent.of_own_terms(families, terms)
 
 
 def _terms_at(families, inputs, table, masses):
@@ -72,16 +72,3 @@ def _terms_at(families, inputs, table, masses):
         widths = np.maximum(spread, TOLD_APART) * np.sqrt(len(inputs))
         found[j] = families[j].from_center_and_width(centers, widths)
     return found
-
-
-def _scattered(families, terms):
-    """Rules with terms of parameters (n_parameters, n_rules) by input; NaN is no term."""
-    groups, tables, n_terms = [], [], 0
-    for family in dict.fromkeys(families[j] for j in terms):
-        inputs = [j for j in terms if families[j] is family]
-        theta = np.stack([terms[j] for j in inputs], axis=2)
-        own = RuleTableAntecedent.of_own_terms(family, inputs, theta)
-        groups += own.groups
-        tables.append(np.where(own.table < 0, -1, own.table + n_terms))
-        n_terms += own.n_terms
-    return RuleTableAntecedent(tuple(groups), np.hstack(tables))

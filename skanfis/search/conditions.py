@@ -38,11 +38,9 @@ def with_fewer_conditions(tuned: Tuned) -> Tuned:
         now = found.evaluation.antecedent.without_terms(terms)
         problem = SeparableProblem(rows, start, tuned.penalty, consequent_inputs=inputs)
         premise = Premise.of(start, *rows.inputs.box)
-        evaluation = problem.evaluate(now.parameters)
-        at = premise.displacement(now.parameters)
-        found = replace(
-            found, problem=problem, premise=premise, evaluation=evaluation, displacement=at
-        )
+        there = Tuned.start(problem, premise, tuned.free, premise.displacement(now.parameters))
+        # The noise is that which all conditions have left.
+        found = replace(there, posterior=tuned.posterior)
     if found is tuned:
         return tuned
     found = turned(found, tuned.penalty)

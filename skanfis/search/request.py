@@ -19,7 +19,6 @@ from ..naming import default_term_names
 from .candidates import KINDS
 from .clusters import clustered_antecedent
 from .grid import Spacing, grid_antecedent
-from .sample import effective_weight
 from .search import StructureSearch
 from .size import check_columns_fit, check_grid_fits, check_rules_fit, term_counts
 from .start import Start, imported_antecedent, tuned_start
@@ -68,7 +67,7 @@ class StructureRequest(Plan):
         varying = self.premise_inputs[~rows.inputs.is_constant[self.premise_inputs]]
         # Premises that stay pay nothing for moving.
         weights = self.weights if self.premises_move else {"stiffness": 0.0} | self.weights
-        n_all = effective_weight(rows)
+        n_all = rows.effective_weight
         return replace(self, premise_inputs=varying, weights=weights, n_all=n_all)
 
     def _antecedent(self, rows):
@@ -87,7 +86,7 @@ class StructureRequest(Plan):
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
         """A start found on a sample, with the weights that were not given those of all rows."""
-        ratio = effective_weight(sample) / effective_weight(rows)
+        ratio = sample.effective_weight / rows.effective_weight
         penalty = scaled(start.penalty, self.free, ratio, start.agreement_is_raised)
         return replace(start, penalty=penalty)
 

@@ -1,9 +1,8 @@
 r"""How many rows there are, and which of them a search looks at.
 
-*Weight* is what a criterion counts: a whole weight is so many copies of a row. Weights that are
-less than whole cannot be copies; then the size of an unweighted sample of the same precision stands
-for it, W^2 / sum s^2 (Kish 1965), where that is more. *Distinct inputs* bound what can be told
-apart: calibration tables repeat their inputs, and each repeat is information on the noise alone.
+*Weight* is what a criterion counts (``StandardisedData.effective_weight``). *Distinct inputs* bound
+what can be told apart: calibration tables repeat their inputs, and each repeat is information on
+the noise alone.
 """
 
 import numpy as np
@@ -15,19 +14,9 @@ from ..learning.sampling import SAMPLE_ROWS
 DIGITS = 9
 
 
-def effective_weight(rows: StandardisedData):
-    """Rows by weight: their sum, or as many as their spread leaves, whichever are more."""
-    if not isinstance(rows, StandardisedData):
-        return max(rows.total_weight, rows.total_weight**2 / rows.squared_weight)
-    # By the largest: squares of tiny weights would vanish.
-    largest = float(np.max(rows.weights))
-    share = rows.weights / largest
-    return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
-
-
 def counting_weight(rows: StandardisedData):
-    """The weights of a search sample in rows, of which the sum is :func:`effective_weight`."""
-    return rows.weights * (effective_weight(rows) / rows.total_weight)
+    """The weights of a search sample in rows, of which the sum is the effective weight."""
+    return rows.weights * (rows.effective_weight / rows.total_weight)
 
 
 def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):

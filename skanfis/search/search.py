@@ -16,7 +16,7 @@ from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, judging_folds
-from .start import Start, started
+from .start import Start, described, started
 from .trials import Plan, Trials
 from .tuning import cost_of
 
@@ -133,15 +133,12 @@ class StructureSearch:
     def _report(self, found, variance):
         """Every candidate in words and numbers, best first; ``variance`` is the mean's error."""
         return [
-            {
-                "structure": one.candidate.describe(),
-                "kind": one.candidate.kind,
-                "rules": one.candidate.n_rules,
-                "n_mfs": list(one.candidate.counts) if one.candidate.is_grid else None,
-                "reading_cost": one.cost,
-                "expected_error": float(np.sqrt(one.squared_error)),
-                "rules_beat_mean": one.rules_beat_mean(variance),
-                "chosen": one is found,
-            }
+            described(
+                self.trials.tuned(one.candidate),
+                one.candidate.describe(),
+                one.squared_error,
+                variance,
+                is_chosen=one is found,
+            )
             for one in sorted(self.judged, key=lambda one: one.squared_error)
         ]

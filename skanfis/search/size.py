@@ -23,37 +23,43 @@ def n_bytes(n_rules: int, n_terms: int, n_basis: int, n_outputs: int) -> int:
     return 8 * (squares + n_terms * n_rules + 2 * n_premise * n_columns)
 
 
-def memory_limit():
-    """Bytes that training may take."""
-    return get_config()["working_memory"] * 2**20
+def _fits(needed):
+    """Whether training may take so many bytes."""
+    return needed <= get_config()["working_memory"] * 2**20
+
+
+def _check(needed, what, advice):
+    """Raise ValueError where ``what`` needs more bytes than may be."""
+    if not _fits(needed):
+        raise ValueError(
+            f"{what} would take {_count(1 + needed // 2**20)} MiB, and the limit is "
+            f"{get_config()['working_memory']:,} MiB (sklearn.set_config(working_memory=...)). "
+            f"{advice}"
+        )
 
 
 def check_columns_fit(n_inputs):
     """Raise ValueError where products of all pairs of columns need more than may be."""
-    needed = 8 * _ROWS_OF_PAIRS * (1 + n_inputs) ** 2 // 2
-    if needed > memory_limit():
-        raise ValueError(
-            f"X has {n_inputs:,} columns: products of all their pairs {_would_take(needed)} "
-            "Choose some of them first, as by make_pipeline(SelectKBest(f_regression, k=50), "
-            "ANFISRegressor())."
-        )
+    _check(
+        8 * _ROWS_OF_PAIRS * (1 + n_inputs) ** 2 // 2,
+        f"X has {n_inputs:,} columns: products of all their pairs",
+        "Choose some of them first, as by make_pipeline(SelectKBest(f_regression, k=50), "
+        "ANFISRegressor()).",
+    )
 
 
 def check_rules_fit(what, n_rules, n_terms, n_basis, n_outputs, advice):
     """Raise ValueError where training what ``what`` makes needs more memory than may be."""
+    made = f"{_count(n_rules)} rules with {_count(n_rules * n_basis)} consequent parameters"
     needed = n_bytes(n_rules, n_terms, n_basis, n_outputs)
-    if needed > memory_limit():
-        raise ValueError(
-            f"{what} {_count(n_rules)} rules with {_count(n_rules * n_basis)} consequent "
-            f"parameters; training them {_would_take(needed)} {advice}"
-        )
+    _check(needed, f"{what} {made}; training them", advice)
 
 
 def check_grid_fits(n_mfs, counts, n_basis, n_outputs):
     """The same of a grid of ``counts``, which ``n_mfs`` has asked for."""
     n_inputs = len(counts)
-    fits = n_bytes(2**n_inputs, 2 * n_inputs, 1 + n_inputs, 1) <= memory_limit()
-    hint = f"n_mfs=2 makes {2**n_inputs:,} rules; " if fits else ""
+    of_two = n_bytes(2**n_inputs, 2 * n_inputs, 1 + n_inputs, 1)
+    hint = f"n_mfs=2 makes {2**n_inputs:,} rules; " if _fits(of_two) else ""
     check_rules_fit(
         f"n_mfs={n_mfs!r} on {n_inputs} inputs makes a grid of",
         prod(counts),
@@ -63,13 +69,6 @@ def check_grid_fits(n_mfs, counts, n_basis, n_outputs):
         f"Use fewer terms: {hint}give one number per input, 1 for an input that needs no fuzzy "
         "terms; or use scattered rules, whose number does not grow with the inputs: "
         "partition=KMeans(n_clusters=...).",
-    )
-
-
-def _would_take(needed):
-    return (
-        f"would take {_count(1 + needed // 2**20)} MiB, and the limit is "
-        f"{get_config()['working_memory']:,} MiB (sklearn.set_config(working_memory=...))."
     )
 
 

@@ -19,7 +19,7 @@ from ..learning.premise import Premise
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
-from .sample import effective_weight, search_sample
+from .sample import search_sample
 from .trials import FEWEST_SEEN, Plan
 from .tuning import (
     ARRIVING,
@@ -82,16 +82,16 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     """A start from rules that are given, with the weights that are not given found on the rows."""
     sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
-    n_sample, (low, high) = effective_weight(sample), sample.inputs.box
+    low, high = sample.inputs.box
     premise = Premise.of(antecedent, low, high)
     turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)
-    best = tune(problem, premise, free, n_sample, turns, steps)
+    best = tune(problem, premise, free, turns, steps)
     # Any freedom passes through hardly more rows than there are coefficients.
     has_rows = sample.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
     if is_bounded and has_rows and problem.n_columns <= MANY_COLUMNS:
         unbounded = Premise.of(antecedent, low, high, is_unbounded=True)
-        freed = tune_unbounded(problem, unbounded, free, n_sample)
+        freed = tune_unbounded(problem, unbounded, free)
         if freed.expected_error < _LESS_ERROR * best.expected_error:
             best = freed
     room, worths = 1.0, SLOPE_WORTHS if turns else ()
@@ -102,27 +102,29 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
         most = tolerated(error, variance, simplicity)
         best = next(one for one in (*sparse[::-1], best) if one.expected_error <= most)
         room = most / best.expected_error
-    return started(best, plan, room, [_as_given(best, variance)])
-
-
-def _as_given(tuned: Tuned, variance):
-    """What there is to say of rules that were given."""
-    antecedent, n_mfs = tuned.problem.antecedent, None
     n_rules = antecedent.n_rules
+    given = "one rule as given" if n_rules == 1 else f"{n_rules} rules as given"
+    return started(best, plan, room, [described(best, given, best.expected_error, variance)])
+
+
+def described(tuned: Tuned, structure, squared_error, variance, is_chosen=True):
+    """A candidate in words and numbers; ``variance`` is the squared error of the mean."""
+    antecedent, n_mfs = tuned.problem.antecedent, None
     kind = "tree" if isinstance(antecedent, TreeAntecedent) else "scattered"
     if antecedent.grid_counts is not None:
-        kind, n_mfs = "grid" if n_rules > 1 else "one rule", [1] * tuned.problem.rows.X.shape[1]
+        kind = "grid" if antecedent.n_rules > 1 else "one rule"
+        n_mfs = [1] * tuned.problem.rows.X.shape[1]
         for j, count in zip(antecedent.inputs_with_terms, antecedent.grid_counts, strict=True):
             n_mfs[j] = count
     return {
-        "structure": "one rule as given" if n_rules == 1 else f"{n_rules} rules as given",
+        "structure": structure,
         "kind": kind,
-        "rules": n_rules,
+        "rules": antecedent.n_rules,
         "n_mfs": n_mfs,
         "reading_cost": cost_of(tuned),
-        "expected_error": float(np.sqrt(tuned.expected_error)),
-        "rules_beat_mean": bool(tuned.expected_error + tuned.disagreement <= variance),
-        "chosen": True,
+        "expected_error": float(np.sqrt(squared_error)),
+        "rules_beat_mean": bool(squared_error + tuned.disagreement <= variance),
+        "chosen": is_chosen,
     }
 
 

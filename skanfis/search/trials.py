@@ -26,7 +26,7 @@ from .conditions import with_fewer_conditions
 from .grid import Spacing
 from .judging import ENOUGH, FOLDS
 from .lasso import lasso_inputs
-from .sample import DIGITS, effective_weight, to_six_digits, unit_scale
+from .sample import DIGITS, to_six_digits, unit_scale
 from .splits import best_splits
 from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
@@ -210,11 +210,10 @@ class Trials:
         return SeparableProblem(rows, antecedent, penalty, consequent_inputs=inputs)
 
     def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE):
-        free, weight = self.plan.free, effective_weight(problem.rows)
         if turns and not self.plan.premises_move:
             turns, first_steps = 0, ARRIVING
         premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
-        return tune(problem, premise, free, weight, turns, first_steps)
+        return tune(problem, premise, self.plan.free, turns, first_steps)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
         """Of rows that were not trained on, as predict answers; summed over outputs."""

@@ -62,35 +62,34 @@ class Tuned:
     premise: Premise
     free: Sequence[str]  # weights that are found, of ``evidence.FREE``
     evaluation: Evaluation
+    solved: Any  # the evaluation, solved again at the weights found
     displacement: np.ndarray
     posterior: Laplace
 
     @classmethod
-    def start(cls, problem: SeparableProblem, premise: Premise, free, n_rows: float):
-        """Where premises have not moved, and weights are those of the problem's penalty."""
-        x = np.zeros(premise.size)
-        evaluation, line = problem.evaluate(premise.parameters(x)), problem.common_line
-        n_outputs = max(int(np.count_nonzero(~problem.rows.targets.is_constant)), 1)
-        posterior = laplace(evaluation, line, problem.penalty, n_rows, n_outputs, x)
-        return cls(problem, premise, free, evaluation, x, posterior)
+    def start(cls, problem: SeparableProblem, premise: Premise, free, x=None):
+        """Where premises have not moved, or at x, with the weights of the problem's penalty."""
+        x = np.zeros(premise.size) if x is None else x
+        evaluation = problem.evaluate(premise.parameters(x))
+        posterior = laplace(problem, evaluation, x)
+        return cls(problem, premise, free, evaluation, evaluation, x, posterior)
 
     def with_penalty(self, penalty, curvature=None):
         """The same point at other weights; ``curvature`` where it is not that of before."""
-        before = self.posterior
-        curvature = before.curvature if curvature is None else curvature
-        of_rows = before.n_rows, before.n_outputs, self.displacement, curvature
-        posterior = laplace(self.evaluation, self.problem.common_line, penalty, *of_rows)
-        return replace(self, problem=self.problem.with_penalty(penalty), posterior=posterior)
+        curvature = self.posterior.curvature if curvature is None else curvature
+        there = self.solved_with(penalty)
+        posterior = laplace(there.problem, there.solved, self.displacement, curvature)
+        return replace(there, posterior=posterior)
+
+    def solved_with(self, penalty):
+        """The same point, with the consequents alone at other weights."""
+        problem = self.problem.with_penalty(penalty)
+        return replace(self, problem=problem, solved=problem.solved_again(self.evaluation))
 
     @property
     def penalty(self):
         """The weights found."""
         return self.posterior.penalty
-
-    @cached_property
-    def solved(self):
-        """The evaluation, solved again at the weights found."""
-        return self.problem.solved_again(self.evaluation)
 
     @property
     def disagreement(self):
@@ -116,7 +115,7 @@ class Tuned:
         share = self.posterior.n_effective_premises / n_rows
         if share >= 1.0:
             return np.inf
-        left_out = self.problem.leave_one_out_error(self.solved, n_rows)
+        left_out = self.problem.leave_one_out_error(self.solved)
         return left_out * (1.0 + share) / (1.0 - share)
 
 
@@ -124,39 +123,37 @@ def tune(
     problem: SeparableProblem,
     premise: Premise,
     free,
-    n_rows: float,
     turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
 ) -> Tuned:
     """Find the ``free`` weights, of ``evidence.FREE``, and the premises that go with them.
 
     The weights start at those of the problem's penalty and take ``first_steps`` before the premises
-    move, in so many ``turns`` at most; with 0 these stay where they are. ``n_rows`` are rows by
-    weight.
+    move, in so many ``turns`` at most; with 0 these stay where they are.
     """
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
         first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
-    start = _improved(Tuned.start(problem, premise, free, n_rows), first_steps)
+    start = _improved(Tuned.start(problem, premise, free), first_steps)
     if premise.size == 0 or turns == 0:
         return start
     penalty = start.penalty
     if "stiffness" in free:
-        stiffness = start.posterior.noise_variance / (n_rows * PRIOR_DISPLACEMENT**2)
+        stiffness = start.posterior.noise_variance / (problem.n_rows * PRIOR_DISPLACEMENT**2)
         penalty = replace(penalty, stiffness=stiffness)
     return _risen(turned(start, penalty, steps), turns - 1, steps)
 
 
-def tune_unbounded(problem: SeparableProblem, premise: Premise, free, n_rows: float) -> Tuned:
+def tune_unbounded(problem: SeparableProblem, premise: Premise, free) -> Tuned:
     """The same with the premises first, and weights that may be next to nothing.
 
     What the premises of the start leave of data without noise would be taken for noise.
     """
     least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
     penalty = replace(problem.penalty, **least)
-    start = Tuned.start(problem, premise, free, n_rows).with_penalty(penalty)
+    start = Tuned.start(problem, premise, free).with_penalty(penalty)
     first = turned(start, penalty, FIRST_STEPS, _UNBOUNDED_ITERATIONS)
     return _risen(first, MOST_TURNS - 1, _STEPS)
 
@@ -260,7 +257,7 @@ def _most_agreement(tuned: Tuned, most: float) -> float:
         middle = float(np.sqrt(low * high))
         penalty = replace(tuned.penalty, agreement=middle)
         # The consequents of another penalty take no pass over the rows but for their error.
-        raised = replace(tuned, problem=tuned.problem.with_penalty(penalty))
+        raised = tuned.solved_with(penalty)
         low, high = (middle, high) if raised.expected_error <= most else (low, middle)
     return low
 

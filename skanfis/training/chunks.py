@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..blocks import fitting_rows, row_blocks
+from ..blocks import add_each, fitting_rows
 from ..consequent import LocalBasis, basis, in_user_units
 from ..learning import SolverResult
 from ..learning.covariance import posterior_of
@@ -19,6 +19,7 @@ from ..learning.data import Scale, StandardisedData, check_scales, fingerprint, 
 from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.gram import DesignMoments
 from ..learning.objective import SeparableProblem
+from ..learning.passes import normal_sums
 from ..learning.penalty import CommonLine, Penalty
 from ..learning.premise import Premise
 from ..model import TSKModel
@@ -62,28 +63,25 @@ class RowSums:
         antecedent, own, n_inputs = base.antecedent, consequent_inputs, X.shape[1]
         n_rules, n_basis = antecedent.n_rules, 1 + own.size
         design = DesignMoments(antecedent.share_counts, n_basis)
-        gram = np.zeros(design.shape, order="F")
-        slope, square = np.zeros((n_rules * n_basis, y.shape[1])), np.zeros(y.shape[1])
+        slopes = np.zeros((n_rules * n_basis, y.shape[1]))
+        sums = [np.zeros(design.shape), slopes, np.zeros(y.shape[1])]
         centers, distinct = base.rule_centers[:, own], np.empty(0)
         rules = RuleRows.none(n_rules, n_inputs, own.size)
         n_values = 4 * (n_rules + antecedent.n_terms + n_inputs) + sum(design.shape)
-        for part in row_blocks(rows.n_rows, fitting_rows(n_values)):
+        for part, Z, target, weight in rows.blocks(fitting_rows(n_values)):
             raw = np.array(rows.X[part].T, dtype=float, order="C")
-            Z, target, weight = rows.read(part)
             strengths, shares = antecedent.strengths_and_shares(raw)
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
             # In any units of the target: by its digits and its exponent.
             marks = fingerprint(np.vstack([numbers, *np.frexp(rows.y[part].T)]))
-            distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(slope)]
+            distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(slopes)]
             every = basis(Z)
             block = RuleRows.of(raw, every, strengths, weight, numbers, own, centers)
             rules = rules.plus(block, rows.inputs)
             of_slopes = every[np.append(0, 1 + own)]
-            s_of_slopes = of_slopes if weight is None else of_slopes * weight
-            design.accumulate(gram, shares, of_slopes, s_of_slopes)
-            for k, values in enumerate(target):
-                slope[:, k] += (strengths @ (s_of_slopes * values).T).ravel()
-                square[k] += s_of_slopes[0] @ values**2
+            of_block = normal_sums(design, strengths, shares, of_slopes, weight, target)
+            sums = add_each(sums, of_block)
+        moments, slope, square = sums
         return cls(
             base,
             own,
@@ -92,7 +90,7 @@ class RowSums:
             rows.n_rows,
             rows.total_weight,
             float(np.sum(rows.weights**2)),
-            design.gram(gram),
+            design.gram(moments),
             slope,
             square,
             distinct,
@@ -187,21 +185,13 @@ class _ProblemOfSums(SeparableProblem):
         self.rows = StandardisedData(none, none, None, sums.inputs, sums.targets)
         self.consequent_inputs, self.n_basis = sums.consequent_inputs, sums.n_basis
         self.n_columns, self.n_outputs = sums.slope.shape
-        self.on_sample = None
+        self.on_sample, self.n_rows = None, sums.effective_weight
         means = (sums.gram / sums.weight, sums.slope / sums.weight, sums.square / sums.weight)
-        self._sums_at_start = self._means = means
+        self._sums_at_start = means
         self.local = LocalBasis.from_gram(means[0], self.antecedent.n_rules)
         own, inputs = self.consequent_inputs, sums.inputs
         extent = np.maximum(sums.rules.extent / inputs.scale[own], 1.0)
         self.common_line = CommonLine(self.local, extent, self.antecedent, inputs.varying(own))
-
-    def mean_squares(self, evaluation):
-        """Mean squared error of every standardised output."""
-        normal, (_, slope, square) = evaluation.normal, self._means
-        solved = normal.coefficients
-        # By the residual of the normal equations; slope = (G + P) solved.
-        twice = self.local.transform_rows(slope.copy()) + normal.penalty @ solved
-        return np.maximum(square - np.sum(solved * twice, axis=0), 0.0)
 
 
 def inputs_with_slopes(model: TSKModel, inputs):
@@ -260,7 +250,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
     if free:
         premise = Premise(antecedent, none, none, none, none.astype(int), ())
-        tuned = tune(problem, premise, free, sums.effective_weight, turns=0, first_steps=ARRIVING)
+        tuned = tune(problem, premise, free, turns=0, first_steps=ARRIVING)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
     overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight

@@ -28,7 +28,7 @@ from ..learning.premise import Premise
 from ..learning.sampling import is_many, with_sample
 from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
-from ..search import Start, StructureRequest, effective_weight, report_constant
+from ..search import Start, StructureRequest, report_constant
 from .data import Fitted, SolverRun, ValidatedData
 from .freezing import as_given, extrapolation_distance, frozen_model
 from .robust import huber_weights, reweighted, robust_start, silenced, without_outliers
@@ -212,7 +212,7 @@ class _Fit:
         rows = self.rows
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
-        n_rows = effective_weight(rows)
+        n_rows = rows.effective_weight
         if weights is not None:
             # Kish's effective number of rows, by what Huber's loss leaves of the weight of each.
             share, square = (np.average(weights**k, weights=rows.weights) for k in (1, 2))

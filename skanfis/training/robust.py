@@ -22,7 +22,6 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
-from ..blocks import BLOCK_ROWS, row_blocks
 from ..learning.data import column_statistics
 from ..learning.sampling import SAMPLE_ROWS, with_sample
 from ..search import weighted_quantile
@@ -60,8 +59,7 @@ def robust_start(rows):
     if lines is None:
         return rows, weights
     sizes = np.empty(rows.n_rows)
-    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
-        Z, target, _ = rows.read(part)
+    for part, Z, target, _ in rows.blocks():
         squares = [
             ((values - center) / spread - line.predict(Z.T)) ** 2
             for values, (center, spread, line) in zip(target, lines, strict=True)

@@ -45,7 +45,7 @@ class RuleRows:
         which they have slopes, (n_rules, n_slopes).
         """
         best, top = strongest_rules(strengths), strengths.max(axis=0)
-        weighted = basis_rows if weight is None else basis_rows * weight
+        weighted = basis_rows * weight
         rule, row = np.nonzero(strengths >= FIRES * top)
         root, extent = np.sqrt(strengths), np.empty_like(centers)
         for j, x in enumerate(X[slope_inputs]):
@@ -89,8 +89,7 @@ class RuleRows:
         """The support of every rule, in the units of X."""
         counts = np.bincount(self.distinct[:, 0].astype(int), minlength=len(self.second))
         known = counts > 0
-        center, factor = places(self.second)
-        center[~known], factor[~known] = 0.0, 0.0
+        center, factor = places(self.second, known)
         radius = np.zeros(known.size)
         rules, distance = _distances(self.farthest, self.second, scale)
         np.maximum.at(radius, rules, distance)
@@ -119,6 +118,6 @@ def _outermost(far):
 def _distances(farthest, second, scale):
     """The rules of rows that were far, and Mahalanobis' distances from these rules' centres."""
     rules = farthest[:, 0].astype(int)
-    center, factor = places(second)
+    center, factor = places(second, np.ones(len(second)))
     away = (farthest[:, 1:] - scale.offset) / scale.scale - center[rules]
     return rules, np.linalg.norm(np.einsum("nij,nj->ni", factor[rules], away), axis=1)

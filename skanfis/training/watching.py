@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 from sklearn.model_selection import GroupShuffleSplit
 
-from ..blocks import BLOCK_ROWS, row_blocks
-from ..consequent import basis, rule_outputs
+from ..consequent import basis, outputs_of_rules
 from ..learning.data import StandardisedData, place_in_sample
 from ..options import EarlyStopping
 
@@ -149,12 +148,9 @@ def held_out_loss(rows: StandardisedData, consequent_inputs, evaluation):
     coefficients = evaluation.coefficients
     by_rule = coefficients.reshape(evaluation.antecedent.n_rules, -1, coefficients.shape[1])
     total = 0.0
-    for part in row_blocks(rows.n_rows, BLOCK_ROWS):
-        Z, target, weight = rows.read(part)
+    for _, Z, target, weight in rows.blocks():
         np.clip(Z, low, high, out=Z)
-        strengths = evaluation.antecedent.strengths(Z)
-        basis_rows = basis(Z[consequent_inputs])
-        for k, one in enumerate(by_rule.transpose(2, 0, 1)):
-            squares = (target[k] - rule_outputs(one, strengths, basis_rows)[1]) ** 2
-            total += squares.sum() if weight is None else weight @ squares
+        strengths, basis_rows = evaluation.antecedent.strengths(Z), basis(Z[consequent_inputs])
+        residual = target - outputs_of_rules(by_rule.transpose(2, 0, 1), strengths, basis_rows)
+        total += weight @ np.sum(residual**2, axis=0)
     return total / rows.total_weight

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import LinearConstraint, minimize
 
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
+from skanfis.antecedent import GridAntecedent
 from skanfis.bounds.certified import training_box
 from skanfis.bounds.construction import RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
@@ -38,7 +38,7 @@ def grid(rng, n_inputs):
 def scattered(rng, n_inputs):
     n_rules = rng.integers(2, 6)
     theta = rng.normal(size=(2, n_rules, n_inputs))
-    return RuleTableAntecedent.of_own_terms(Gaussian, np.arange(n_inputs), theta)
+    return oracles.own_terms(Gaussian, np.arange(n_inputs), theta)
 
 
 KINDS = {

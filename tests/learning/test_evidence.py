@@ -42,14 +42,9 @@ def rules(rng, n_rules):
 
 def laplace_at(problem, evaluation, penalty, **premises):
     """The posterior of the problem's rows, at an evaluation of it."""
-    return laplace(
-        evaluation,
-        problem.common_line,
-        penalty,
-        problem.rows.total_weight,
-        problem.n_outputs,
-        **premises,
-    )
+    other = problem.with_penalty(penalty)
+    other.n_rows = problem.rows.total_weight
+    return laplace(other, other.solved_again(evaluation), **premises)
 
 
 def problem_of(rows, antecedent, order):

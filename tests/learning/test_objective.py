@@ -11,7 +11,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import blocks
-from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
+from skanfis.antecedent import GridAntecedent
 from skanfis.learning import data as rows
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
@@ -30,7 +30,7 @@ def dead_rule(rng):
     """Four rules, one of them fifty deviations away from all data."""
     theta = Gaussian.from_center_and_width(rng.normal(size=(4, 2)), np.ones((4, 2)))
     theta[0, 1] = 50.0
-    return RuleTableAntecedent.of_own_terms(Gaussian, np.arange(2), theta)
+    return oracles.own_terms(Gaussian, np.arange(2), theta)
 
 
 def dead_term(rng):
@@ -44,7 +44,7 @@ def duplicated_rule(rng):
     """Four rules, two of them the same."""
     theta = Bell.from_center_and_width(rng.normal(size=(4, 2)), rng.uniform(0.5, 1.5, (4, 2)))
     theta[:, 3] = theta[:, 1]
-    return RuleTableAntecedent.of_own_terms(Bell, np.arange(2), theta)
+    return oracles.own_terms(Bell, np.arange(2), theta)
 
 
 CASES = {
@@ -131,7 +131,7 @@ def test_evaluation_is_that_of_the_dense_ridge_regression(case):
     assert_all_close(found.coefficients, dense.coefficients(case.point), 1e-9)
     squares = dense.weight @ (dense.y - dense.design(case.point) @ found.coefficients) ** 2
     assert_allclose(found.mean_squared_error, np.sum(squares), rtol=1e-10)
-    assert_allclose(case.problem.mean_squares(found), squares, rtol=1e-9)
+    assert_allclose(found.mean_squares, squares, rtol=1e-9)
     firing = oracles.strengths(case.problem.antecedent, case.point, dense.Z)
     assert_allclose(found.masses, firing @ dense.weight, rtol=1e-11, atol=1e-15)
 
@@ -240,11 +240,11 @@ def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs
     phi, total = dense.design(antecedent.parameters), 0.0
     held = dense.residual_matrix(antecedent.parameters)[40:]
     # The weights may be those of other numbers of rows than there are of them.
-    n_rows = 0.8 * rows.total_weight
+    n_rows = problem.n_rows = 0.8 * rows.total_weight
     for i in range(40):
         weight = dense.weight.copy()
         weight[i] -= 1.0 / n_rows  # as much as one row has
         gram = (phi.T * weight) @ phi + held.T @ held
         beta = np.linalg.solve(gram, (phi.T * weight) @ dense.y)
         total += dense.weight[i] * np.sum((dense.y[i] - phi[i] @ beta) ** 2)
-    assert_allclose(problem.leave_one_out_error(evaluation, n_rows), total, rtol=1e-8)
+    assert_allclose(problem.leave_one_out_error(evaluation), total, rtol=1e-8)

@@ -65,7 +65,7 @@ def test_what_it_takes_from_the_evidence_is_that_of_the_marginal_likelihood(rng,
     after = noise / n * np.linalg.inv(design.T @ design / n + prior)
     state = [after @ design.T @ target.T / noise, after, before]
     for j, rules in ((1, [0, 1, 2]), (0, [0, 2])):
-        contrasts = linalg.helmert(len(rules)) @ line.own.rows(j, np.array(rules))
+        contrasts = linalg.helmert(len(rules)) @ line.own_slopes(j, np.array(rules))
         across = before @ contrasts.T
         given = before - across @ np.linalg.solve(contrasts @ across, across.T)
         expected = minus_twice_log(given) - minus_twice_log(before)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import RuleTableAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
@@ -161,7 +160,7 @@ def start_of(kind, rows):
     if kind == "scattered":
         centers = np.array([[-1.0, -1.0], [1.0, -0.8], [0.0, 1.0]])
         theta = Gaussian.from_center_and_width(centers, np.ones_like(centers))
-        return RuleTableAntecedent.of_own_terms(Gaussian, np.arange(2), theta)
+        return oracles.own_terms(Gaussian, np.arange(2), theta)
     families, counts = {
         "one input": ([Gaussian], [3]),
         "grid": ([Gaussian, Gaussian], [2, 3]),

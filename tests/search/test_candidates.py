@@ -26,7 +26,7 @@ def solved(rows, antecedent):
     """Rules with their consequents, before their premises move."""
     problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     premise = Premise.of(antecedent, *rows.inputs.box)
-    return tuning.tune(problem, premise, ["slope"], rows.sample_weight.sum(), turns=0)
+    return tuning.tune(problem, premise, ["slope"], turns=0)
 
 
 @pytest.mark.parametrize("told", [[], [(0, 2)], [(0, 3), (2, 2)]])

@@ -3,7 +3,6 @@
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.antecedent import RuleTableAntecedent
 from skanfis.consequent import basis
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE
@@ -23,7 +22,7 @@ def tuned_rules(rng, n_outputs=1):
     antecedent = oracles.random_scattered(rng, Gaussian, 5, [0, 1])
     problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     premise = Premise.of(antecedent, *rows.inputs.box)
-    return tuning.tune(problem, premise, FREE, 200.0, turns=2)
+    return tuning.tune(problem, premise, FREE, turns=2)
 
 
 def test_what_a_condition_is_worth_is_the_rise_of_the_cost(rng):
@@ -57,14 +56,14 @@ def test_the_condition_that_a_rule_does_not_have_goes(rng):
     centers = np.array([[-1.0, 0.0], [1.0, -1.0], [1.0, 1.0]])
     theta = np.stack([centers, np.full((3, 2), -0.5)])
     theta[1, 0, 1] = 1.0
-    rules = RuleTableAntecedent.of_own_terms(Gaussian, [0, 1], theta)
+    rules = oracles.own_terms(Gaussian, [0, 1], theta)
     firing = rules.without_terms([1]).strengths(X.T)
     values = np.array([[0.0, 1.0, 0.0], [2.0, 0.0, 1.0], [-2.0, 1.0, 1.0]]) @ basis(X.T)
     y = np.sum(firing * values, axis=0) + 0.1 * rng.normal(size=500)
     rows = StandardisedData.of(X, y[:, None])
     start = rules.change_units(-rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale)
     problem = SeparableProblem(rows, start, tuning.FIRST_PENALTY)
-    tuned = tuning.tune(problem, Premise.of(start, *rows.inputs.box), FREE, 500.0)
+    tuned = tuning.tune(problem, Premise.of(start, *rows.inputs.box), FREE)
     found = conditions.with_fewer_conditions(tuned)
     assert_array_equal(found.evaluation.antecedent.table, [[0, -1], [1, 2], [3, 4]])
     assert found.expected_error < 1.02 * tuned.expected_error
@@ -77,7 +76,7 @@ def test_every_rule_keeps_a_condition_and_the_evidence_rises(rng):
     rows = StandardisedData.of(tuned.problem.rows.X, noise)
     problem = SeparableProblem(rows, tuned.problem.antecedent, tuned.penalty)
     premise = Premise.of(problem.antecedent, *rows.inputs.box)
-    tuned = tuning.tune(problem, premise, FREE, 200.0, turns=1)
+    tuned = tuning.tune(problem, premise, FREE, turns=1)
     found = conditions.with_fewer_conditions(tuned)
     assert found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
     assert_array_equal((found.evaluation.antecedent.table >= 0).sum(axis=1), 1)

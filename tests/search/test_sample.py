@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.learning.data import StandardisedData
 from skanfis.search import representative_rows
-from skanfis.search.sample import effective_weight, search_sample
+from skanfis.search.sample import search_sample
 
 
 def many(rng, n_rows=300):
@@ -49,11 +49,11 @@ class TestCounts:
         # Kish: of equal weights every row counts; of a half with next to none, half of them.
         X, y, times = many(rng)
         whole = StandardisedData.of(X, y, times.astype(float))
-        assert effective_weight(whole) == times.sum()
+        assert whole.effective_weight == times.sum()
         even = StandardisedData.of(X, y, np.full(300, unit))
-        assert_allclose(effective_weight(even), 300.0, rtol=1e-12)
+        assert_allclose(even.effective_weight, 300.0, rtol=1e-12)
         half = StandardisedData.of(X, y, np.where(np.arange(300) < 150, unit, 1e-9 * unit))
-        assert_allclose(effective_weight(half), 150.0, rtol=1e-6)
+        assert_allclose(half.effective_weight, 150.0, rtol=1e-6)
 
     def test_a_search_knows_the_group_of_each_of_its_rows(self, rng):
         X, y = rng.normal(size=(500, 2)), rng.normal(size=(500, 1))

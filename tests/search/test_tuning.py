@@ -35,9 +35,9 @@ def two_rules(rng):
 
 
 def test_large_models_find_nearly_the_same_in_few_turns(monkeypatch, two_rules):
-    whole = tuning.tune(*two_rules, FREE, 100.0)
+    whole = tuning.tune(*two_rules, FREE)
     monkeypatch.setattr(tuning, "MANY_COLUMNS", two_rules[0].n_columns - 1)
-    few = tuning.tune(*two_rules, FREE, 100.0)
+    few = tuning.tune(*two_rules, FREE)
     # A tenth more; one step at a time does not arrive.
     assert_allclose(few.expected_error, whole.expected_error, rtol=0.15)
     assert few.expected_error != whole.expected_error
@@ -45,7 +45,7 @@ def test_large_models_find_nearly_the_same_in_few_turns(monkeypatch, two_rules):
 
 def test_what_rules_err_one_by_one(two_rules):
     """The mean over rows of sum_r w_r (y - f_r)^2, by its definition."""
-    tuned = tuning.tune(*two_rules, FREE, 100.0, turns=1)
+    tuned = tuning.tune(*two_rules, FREE, turns=1)
     rows, evaluation = tuned.problem.rows, tuned.solved
     Z, target, _ = rows.read(slice(None))
     basis = np.vstack([np.ones_like(Z[:1]), Z])
@@ -57,14 +57,13 @@ def test_what_rules_err_one_by_one(two_rules):
 
 def with_agreement(tuned, agreement):
     """The same with consequents alone of another agreement."""
-    penalty = replace(tuned.penalty, agreement=agreement)
-    return replace(tuned, problem=tuned.problem.with_penalty(penalty))
+    return tuned.solved_with(replace(tuned.penalty, agreement=agreement))
 
 
 class TestAgreement:
     @pytest.mark.parametrize("left", [1.05, 1.2, 2.0])
     def test_it_is_raised_as_far_as_the_error_allows(self, left, rng):
-        apart = tuning.tune(*two_rules_of_a_sine(rng, 0.3), FREE, 100.0)
+        apart = tuning.tune(*two_rules_of_a_sine(rng, 0.3), FREE)
         found = tuning.with_most_agreement(apart, left)
         assert found is not apart
         assert apart.expected_error < found.expected_error <= left * apart.expected_error
@@ -79,7 +78,7 @@ class TestAgreement:
         assert tuning.with_most_agreement(apart, 1.0) is apart
 
     def test_consequents_alone_are_followed_to_the_limit(self, two_rules):
-        apart = tuning.tune(*two_rules, FREE, 100.0)
+        apart = tuning.tune(*two_rules, FREE)
         most = 1.1 * apart.expected_error
         agreement = tuning._most_agreement(apart, most)
         assert apart.penalty.agreement < agreement < 1.0

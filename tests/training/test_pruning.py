@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis import ANFISRegressor
-from skanfis.antecedent import RuleTableAntecedent
 from skanfis.learning.firing import RuleFiring
 from skanfis.membership import Gaussian
 from skanfis.training.pruning import redundant_rules
@@ -16,7 +15,7 @@ from .. import oracles
 def scattered(centers, width=0.5):
     centers = np.array(centers, dtype=float)
     theta = Gaussian.from_center_and_width(centers, np.full(centers.shape, width))
-    return RuleTableAntecedent.of_own_terms(Gaussian, np.arange(centers.shape[1]), theta)
+    return oracles.own_terms(Gaussian, np.arange(centers.shape[1]), theta)
 
 
 def statistics(rows, antecedent):
