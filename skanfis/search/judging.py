@@ -41,19 +41,16 @@ def folds(rows: StandardisedData):
     """Positions of the other rows and of its own, of every fold; whole groups, if there are any."""
     found = n_groups(rows)
     if found > 1:
-        return _group_folds(rows, found if found <= FEW_GROUPS else FOLDS)
+        n_folds = found if found <= FEW_GROUPS else FOLDS
+        return list(GroupKFold(n_folds).split(rows.X, groups=rows.groups))
     every, n_folds = np.arange(rows.n_rows), min(FOLDS, rows.n_rows)
     return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
 
 
-def _group_folds(rows, n_folds):
-    return list(GroupKFold(n_folds).split(rows.X, groups=rows.groups))
-
-
 def judging_folds(rows: StandardisedData):
-    """Positions to grow on and positions to judge on, of every fold that is needed; if it is half.
+    """Positions to grow on and positions to judge on, of every fold that is needed.
 
-    Half of many rows is enough to grow on, too.
+    Then whether there are so many rows that half of them, the fold, are enough to grow on for good.
     """
     n_rows, every = rows.n_rows, np.arange(rows.n_rows)
     if n_rows == 1:
