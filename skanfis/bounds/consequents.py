@@ -72,20 +72,12 @@ class Consequents:
             output_names=tuple(map(str, range(targets.scale.size))),
         )
 
-    def evaluation(self, local):
-        """The evaluation of the free fit, with these consequents in place of its own."""
+    def loss(self, local):
+        """The mean squared training error, of the standardised target, with these consequents."""
         normal = self.free.normal
-        change, weighed = local - normal.coefficients, normal.gram + normal.penalty
-        cost = self.free.cost + 0.5 * float(np.sum(change * (weighed @ change)))
-        slope = normal.penalty @ normal.coefficients
+        change, slope = local - normal.coefficients, normal.penalty @ normal.coefficients
         more = np.sum(change * (normal.gram @ change - 2.0 * slope), axis=0)
-        return replace(
-            self.free,
-            cost=cost,
-            coefficients=self.problem.local.to_global(local),
-            mean_squares=np.maximum(self.free.mean_squares + more, 0.0),
-            normal=replace(normal, coefficients=local),
-        )
+        return float(np.maximum(self.free.mean_squares + more, 0.0).sum())
 
     def is_certified(self, local, is_line):
         """Whether all constraints are kept, by the order of the rules."""

@@ -34,7 +34,6 @@ class Kept:
     """Consequents that keep all constraints, for certain, and the free ones of these premises."""
 
     free: Evaluation
-    evaluation: Evaluation  # with the constraints
     coefficients: np.ndarray  # in the user's units
     points: np.ndarray  # in the range, at which values are known
 
@@ -50,14 +49,12 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     free = at_equal_widths(problem, evaluation, constraints)
     found = Consequents(model, free, problem, constraints)
     local, is_line = _in_order(found)
-    ended, drawn = found.evaluation(local), float(is_line)
-    held, before = found.model(local, is_line), float(evaluation.mean_squared_error)
-    if ended.mean_squared_error > _COSTLY * before:
+    held, drawn = found.model(local, is_line), float(is_line)
+    before, after = evaluation.mean_squared_error, found.loss(local)
+    if after > _COSTLY * before:
         nearer, way = found.nearest_proven(local)
-        ended_nearer = found.evaluation(nearer)
-        if ended_nearer.mean_squared_error < ended.mean_squared_error:
-            held, ended, drawn = found.model(nearer), ended_nearer, way
-    after = float(ended.mean_squared_error)
+        if found.loss(nearer) < after:
+            held, drawn, after = found.model(nearer), way, found.loss(nearer)
     raised = after / max(before, _OF_MARGINS)  # of exact data the free fit may have no error
     report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
     if rows is not None:
@@ -80,7 +77,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         # Beyond, a tangent is known, which is more than a value: it is not counted.
         points = points[model.in_bounds(points)]
     points = np.clip(points, model.minimum, model.maximum)
-    return Kept(free, ended, held.coefficients, points), report
+    return Kept(free, held.coefficients, points), report
 
 
 def _check_points(model, constraints):

@@ -254,6 +254,5 @@ class _Fit:
                 target=target.within(constraints.lower, constraints.upper, constraints.values),
                 posterior=posterior and posterior.given(model, kept.points),
             ),
-            result=replace(run.result, evaluation=kept.evaluation),
             constraints=report,
         )
