@@ -156,23 +156,22 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
     normal, targets, slopes = evaluation.normal, problem.rows.targets, problem.consequent_inputs
     box = [end[slopes] for end in problem.rows.inputs.box]
     antecedent, factor, start = evaluation.antecedent, normal.factor, normal.coefficients
-    to_local = np.eye(problem.n_columns)
-    to_rules = problem.local.to_global(to_local)
+    to_rules = problem.local.to_global(np.eye(problem.n_columns))
     if is_line:
-        lines = np.tile(np.eye(problem.n_basis), (antecedent.n_rules, 1))
-        to_local = problem.local.to_local(lines)
+        every = problem.local.to_local(np.tile(np.eye(problem.n_basis), (antecedent.n_rules, 1)))
         matrix = normal.gram + normal.penalty
-        factor = NormalFactor(to_local.T @ matrix @ to_local)
-        start = factor.solve(to_local.T @ (matrix @ start))
-        antecedent, to_rules = ONE_RULE, np.eye(problem.n_basis)
-        equal = equal @ to_local
+        factor = NormalFactor(matrix, np.linalg.qr(every)[0])
+        antecedent, start, to_rules = (
+            ONE_RULE,
+            factor.solve(matrix @ start),
+            to_rules[: problem.n_basis],
+        )
     local = np.empty_like(normal.coefficients)
     limits = (np.stack([constraints.lower, constraints.upper]) - targets.offset) / targets.scale
     for k, signs in enumerate(constraints.signs):
         order = RuleOrder.of(antecedent, signs, limits[:, k], slopes)
         if order is None:
             raise InfeasibleError
-        local[:, k] = to_local @ nearest_in_order(
-            order, factor, start[:, k], to_rules, box, equal, equal_to[:, k]
-        )
+        equalities = equal, equal_to[:, k]
+        local[:, k] = nearest_in_order(order, factor, start[:, k], to_rules, box, *equalities)
     return local
