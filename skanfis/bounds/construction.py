@@ -49,6 +49,9 @@ class _Pairs(NamedTuple):
     least: Any = 0.0  # the right-hand side of the inequality
 
 
+_NO_PAIRS = _Pairs(np.empty(0, dtype=int), np.empty(0, dtype=int))
+
+
 @dataclass(frozen=True, eq=False)
 class RuleOrder:
     """What the rules of one output must keep on all of a box; ``signs`` are those of slopes."""
@@ -57,13 +60,15 @@ class RuleOrder:
     signs: np.ndarray
 
     @classmethod
-    def of(cls, antecedent: Antecedent, signs, limits, slope_inputs):
-        """None where no order is known that is enough; consequents slope by ``slope_inputs``."""
+    def of(cls, antecedent: Antecedent, signs, limits, slope_inputs, reference):
+        """None where no order is known that is enough.
+
+        Consequents slope by ``slope_inputs``, and are of these less their ``reference``.
+        """
         every = np.arange(antecedent.n_rules)
-        nothing = np.full(every.size, -1)
-        found = [_Pairs(every[:0], every[:0])]
+        nothing, found = np.full(every.size, -1), [_NO_PAIRS]
         for j in np.flatnonzero(signs):
-            pairs = _pairs_along(antecedent, j)
+            pairs = _pairs_along(antecedent, j, reference[j])
             if pairs is None:
                 return None
             if signs[j] < 0:
@@ -77,11 +82,6 @@ class RuleOrder:
         if np.isfinite(limits[1]):
             found.append(_Pairs(nothing, every, least=-limits[1]))
         return cls(_joined(found), signs[slope_inputs])
-
-    def about(self, reference):
-        """The same for inputs [1, x] less a reference [0, x0]."""
-        middle = self.pairs.middle - reference[self.pairs.column]
-        return replace(self, pairs=self.pairs._replace(middle=middle))
 
     def margins(self, rules, low, high):
         """By how much every inequality holds for rules a + b x on a box, and the rounding of that.
@@ -129,9 +129,9 @@ def is_in_order(model: TSKModel, output, signs, limits=(-np.inf, np.inf)):
     if (rules == rules[0]).all():
         antecedent, rules = ONE_RULE, rules[:1]
     inputs = np.arange(rules.shape[1] - 1)
-    order = RuleOrder.of(antecedent, signs, limits, inputs)
+    order = RuleOrder.of(antecedent, signs, limits, inputs, model.reference)
     ends = ((end - model.reference)[inputs] for end in (model.minimum, model.maximum))
-    return order is not None and order.about(np.append(0.0, model.reference)).holds(rules, *ends)
+    return order is not None and order.holds(rules, *ends)
 
 
 def _joined(parts):
@@ -139,21 +139,18 @@ def _joined(parts):
     return _Pairs(*map(np.concatenate, zip(*every, strict=True)))
 
 
-def _pairs_along(antecedent, j):
+def _pairs_along(antecedent, j, origin):
     """What must be in order for predictions to rise with x_j; None where no order is enough."""
     if isinstance(antecedent, TreeAntecedent):
-        return _pairs_of_tree(antecedent, j)
+        return _pairs_of_tree(antecedent, j, origin)
     has_own = np.append(antecedent.term_inputs == j, False)[antecedent.rule_terms]
     lines, shared = np.arange(antecedent.n_rules)[None], 0.0
     if not has_own.any():
-        return _Pairs(lines[0, :0], lines[0, :0])
+        return _NO_PAIRS
     # One term each, of one width: else no order of the rules is known to be enough.
-    groups = [group for group in antecedent.groups if (group.inputs == j).any()]
-    is_gaussian = all(group.family is Gaussian for group in groups)
-    if not is_gaussian or (has_own.sum(axis=1) != 1).any():
-        return None
-    widths = np.concatenate([group.theta[1, group.inputs == j] for group in groups])
-    if np.ptp(widths) > 0.0:
+    kinds = {(family, theta[1]) for i, family, theta in antecedent.terms if i == j}
+    (family, log_width), *others = kinds
+    if family is not Gaussian or others or (has_own.sum(axis=1) != 1).any():
         return None
     if antecedent.grid_counts is not None:
         axis = antecedent.inputs_with_terms.index(j)
@@ -164,21 +161,21 @@ def _pairs_along(antecedent, j):
     above, below = np.hstack([_all_pairs(line, line) for line in lines])
     is_above = centers[above] > centers[below]
     above, below = above[is_above], below[is_above]
-    width = np.exp(2.0 * widths[0]) / (centers[above] - centers[below])
-    middle = 0.5 * (centers[above] + centers[below])
+    width = np.exp(2.0 * log_width) / (centers[above] - centers[below])
+    middle = 0.5 * ((centers[above] - origin) + (centers[below] - origin))
     return _Pairs(above, below, middle=middle, width=width, own=1.0, curved=shared)
 
 
-def _pairs_of_tree(antecedent, j):
+def _pairs_of_tree(antecedent, j, origin):
     paths, cuts = [dict(path) for path in antecedent.paths], antecedent.groups[0]
     nodes = np.flatnonzero(cuts.inputs == j)
     n_cuts = np.array([sum(node in path for node in nodes) for path in paths])
-    found = [_Pairs(nodes[:0], nodes[:0])]
+    found = [_NO_PAIRS]
     for node in nodes:
         is_above = np.array([path.get(node, np.nan) for path in paths])
         above, below = _all_pairs(*(np.flatnonzero(is_above == side) for side in (1.0, 0.0)))
         part = 1.0 / np.maximum(n_cuts[above], n_cuts[below])
-        cut, width = cuts.theta[0, node], np.exp(cuts.theta[1, node])
+        cut, width = cuts.theta[0, node] - origin, np.exp(cuts.theta[1, node])
         found.append(_Pairs(above, below, middle=cut, width=width, own=part, curved=part))
     return _joined(found)
 

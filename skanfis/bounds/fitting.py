@@ -161,15 +161,12 @@ def _nearest(problem, evaluation, constraints, equal, equal_to, is_line):
         every = problem.local.to_local(np.tile(np.eye(problem.n_basis), (antecedent.n_rules, 1)))
         matrix = normal.gram + normal.penalty
         factor = NormalFactor(matrix, np.linalg.qr(every)[0])
-        antecedent, start, to_rules = (
-            ONE_RULE,
-            factor.solve(matrix @ start),
-            to_rules[: problem.n_basis],
-        )
-    local = np.empty_like(normal.coefficients)
+        antecedent, start = ONE_RULE, factor.solve(matrix @ start)
+        to_rules = to_rules[: problem.n_basis]
+    local, about = np.empty_like(normal.coefficients), np.zeros(problem.rows.inputs.scale.size)
     limits = (np.stack([constraints.lower, constraints.upper]) - targets.offset) / targets.scale
     for k, signs in enumerate(constraints.signs):
-        order = RuleOrder.of(antecedent, signs, limits[:, k], slopes)
+        order = RuleOrder.of(antecedent, signs, limits[:, k], slopes, about)
         if order is None:
             raise InfeasibleError
         equalities = equal, equal_to[:, k]

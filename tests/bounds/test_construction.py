@@ -21,7 +21,7 @@ from skanfis.model import TSKModel
 
 from .. import oracles
 
-FREE = (-np.inf, np.inf)
+FREE, ORIGIN = (-np.inf, np.inf), np.zeros(2)
 
 
 def tree(rng, n_inputs):
@@ -100,7 +100,7 @@ def test_what_is_in_order_rises(kind):
         antecedent = with_equal_widths(KINDS[kind](rng, 2), np.flatnonzero(signs))
         problem = problem_of(antecedent, rng, order)
         evaluation = problem.evaluate(antecedent.parameters)
-        held = RuleOrder.of(antecedent, signs, FREE, problem.consequent_inputs)
+        held = RuleOrder.of(antecedent, signs, FREE, problem.consequent_inputs, ORIGIN)
         model = kept(problem, evaluation, held)
         assert is_in_order(model, 0, signs)
         scale, low, high = problem.rows.targets.scale[0], model.minimum, model.maximum
@@ -131,7 +131,9 @@ def test_slopes_that_are_none_stay_none_in_order(kind, rng):
         penalty = Penalty(alpha=1e-3, slope=1e-3, absent=((0, rules),))
         problem = problem_of(antecedent, rng).with_penalty(penalty)
         evaluation = problem.evaluate(antecedent.parameters)
-        model = kept(problem, evaluation, RuleOrder.of(antecedent, signs, FREE, np.arange(2)))
+        model = kept(
+            problem, evaluation, RuleOrder.of(antecedent, signs, FREE, np.arange(2), ORIGIN)
+        )
         assert is_in_order(model, 0, signs)
         slopes = model.coefficients[:, 1, 0]
         assert not slopes[list(rules)].any()
@@ -143,7 +145,7 @@ def test_the_least_change_that_is_in_order(rng):
     antecedent = with_equal_widths(grid(rng, 2), [0])
     problem = problem_of(antecedent, rng)
     evaluation = problem.evaluate(antecedent.parameters)
-    held = RuleOrder.of(antecedent, np.array([1, 0]), FREE, problem.consequent_inputs)
+    held = RuleOrder.of(antecedent, np.array([1, 0]), FREE, problem.consequent_inputs, ORIGIN)
     box, normal = problem.rows.inputs.box, evaluation.normal
     to_rules, start = problem.local.to_global(np.eye(problem.n_columns)), normal.coefficients[:, 0]
     found = in_order(problem, evaluation, held)
@@ -188,5 +190,5 @@ def test_the_least_change_that_is_in_order(rng):
 )
 def test_where_no_order_is_known_there_is_none(antecedent):
     slopes = np.array([0])
-    assert RuleOrder.of(antecedent, np.array([1]), FREE, slopes) is None
-    assert RuleOrder.of(antecedent, np.array([0]), FREE, slopes).pairs.above.size == 0
+    assert RuleOrder.of(antecedent, np.array([1]), FREE, slopes, ORIGIN) is None
+    assert RuleOrder.of(antecedent, np.array([0]), FREE, slopes, ORIGIN).pairs.above.size == 0
