@@ -56,8 +56,11 @@ def ranges(group: TermGroup, low, high):
     """The :class:`TermRanges` of a group of terms over boxes (n_inputs, n_boxes)."""
     family, theta = group.family, group.theta
     lo, hi = low[group.inputs], high[group.inputs]
-    off = np.abs(theta[0][:, None]) + _plateau(group)
-    reach = ROUNDINGS * EPS * (np.maximum(np.abs(lo), np.abs(hi)) + off)
+    off = np.abs(theta[0])
+    # A shoulder is off by no more than the x at which flanks are felt; a sigmoid is felt anywhere.
+    if family in (SigmoidDifference, *_PRODUCTS):
+        off = off + np.exp(theta[1])
+    reach = ROUNDINGS * EPS * (np.maximum(np.abs(lo), np.abs(hi)) + off[:, None])
     lo, hi = lo - reach, hi + reach
     at_lo, by_lo = family.log_value_and_gradient(lo, theta)
     at_hi, by_hi = family.log_value_and_gradient(hi, theta)
@@ -76,15 +79,6 @@ def ranges(group: TermGroup, low, high):
     return TermRanges(log_mu, slope, np.broadcast_to(curve, slope.shape), error)
 
 
-def _plateau(group):
-    """The distance from each term's place to its shoulders, (n_terms, 1); else zero."""
-    if group.family in (Trapezoidal, PiShaped, TwoSidedGaussian):
-        return 0.5 * np.exp(group.theta[3])[:, None]
-    if group.family in (SigmoidDifference, *_PRODUCTS):
-        return np.exp(group.theta[1])[:, None]
-    return 0.0
-
-
 def _slope_by_sides(group, lo, hi):
     """Range of the slope from that of its size on each flank, t flank lengths off the shoulder."""
     family, theta = group.family, group.theta[:, :, None]
@@ -93,9 +87,10 @@ def _slope_by_sides(group, lo, hi):
         flanks = {family.side: widths[0]}
     else:
         flanks = {-1.0: widths[0], 1.0: widths[0] if family is Bell else widths[1]}
+    half = 0.5 * widths[2] if family in (Trapezoidal, PiShaped) else 0.0
     found = np.zeros((2, *lo.shape))
     for side, flank in flanks.items():
-        begin = theta[0] + side * _plateau(group)
+        begin = theta[0] + side * half
         t = np.sort([side * (lo - begin) / flank, side * (hi - begin) / flank], axis=0)
         t = np.maximum(t, 0.0)
         sizes = _fall_of_bell(theta, *t) if family is Bell else _fall(family, *t)
