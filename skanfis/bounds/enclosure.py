@@ -5,7 +5,7 @@ D are the slopes of log-strengths less their mean, c their curvatures; phi is an
 rules share; h is the way that is followed out of range. Bounds allow for rounding.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from math import prod
 
@@ -16,7 +16,6 @@ from ..policies import FARTHEST_ROW, SILENT
 from .terms import (
     EPS,
     ROUNDINGS,
-    Shares,
     enclosed,
     mean_range,
     product,
@@ -34,21 +33,33 @@ def reach_of(model):
     return min(model.max_extrapolation, FARTHEST_ROW) * model.spread
 
 
-@dataclass(frozen=True, eq=False)
 class _Parts:
     """What one batch of boxes is made of; ranges have both ends along their first axis."""
 
-    box: np.ndarray  # the part in the range, (2, n_inputs, n_boxes)
-    way: np.ndarray  # range of h, likewise
-    half: np.ndarray  # half the widths of the boxes in the range, (n_inputs, n_boxes)
-    shares: list[Shares]
-    middle: np.ndarray  # f at the middle of the box, of shape (*counts, n_boxes)
-    value: np.ndarray  # range of f
-    departure: dict[int, np.ndarray]  # range of D, broadcast to the shape of f
-    curvature: dict[int, np.ndarray]  # range of d^2 log w / dx_j^2, likewise
-    known: dict = field(default_factory=dict)  # a cache
-    slack: np.ndarray | None = None  # (n_boxes,), what values are off by
-    slope_slack: np.ndarray | None = None  # (n_inputs, n_boxes)
+    def __init__(self, rules: "Enclosure", low, high):
+        model, ends = rules.model, np.stack([low, high])
+        box = np.clip(ends, model.minimum[:, None], model.maximum[:, None])
+        middle, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0]) * (1.0 + 4.0 * EPS)
+        terms = term_ranges(model.antecedent, *box)
+        at_middle = term_ranges(model.antecedent, middle, middle)
+        # The part in the range, (2, n_inputs, n_boxes), half its widths, and the range of h.
+        self.box, self.half = box, half
+        self.way = np.clip(ends - box, -rules.reach[:, None], rules.reach[:, None])
+        self.shares = [
+            enclosed(one, place - len(rules.counts) - 1, terms, at_middle, half)
+            for place, one in enumerate(rules.factors)
+        ]
+        # Ranges of D and of d^2 log w / dx_j^2, which broadcast to the shape of f.
+        self.departure = {j: ends for one in self.shares for j, ends in one.departure.items()}
+        self.curvature = {j: ends for one in self.shares for j, ends in one.curvature.items()}
+        self.strength = prod(one.high for one in self.shares)  # the largest of every rule
+        # f at the middle of the box, of shape (*counts, n_boxes), and its range.
+        centre = rules.height + rules.slopes @ (middle - model.reference[:, None])
+        radius = np.abs(rules.slopes) @ half
+        self.middle = rules.shaped(centre)
+        self.value = rules.shaped(np.stack([centre - radius, centre + radius]))
+        self.known: dict = {}  # what has been computed of them
+        self.slack, self.slope_slack = rules.slacks(self)
 
 
 class Enclosure:
@@ -92,7 +103,7 @@ class Enclosure:
         Then how much of the bound is due to the width along each input, (n_inputs, n_boxes).
         """
         with np.errstate(all="ignore"):
-            parts = self._parts(low, high)
+            parts = _Parts(self, low, high)
             natural = self._natural(parts)[1]
             slopes = np.stack([self._slope(parts, low, high, i) for i in range(len(low))], axis=1)
             points, rise = _best_centres(slopes, low, high)
@@ -105,11 +116,11 @@ class Enclosure:
     def slope(self, low, high, j):
         """As :meth:`values`, of the slope by input j; of a jump, values are one-sided limits."""
         with np.errstate(all="ignore"):
-            parts = self._parts(low, high)
+            parts = _Parts(self, low, high)
             natural = self._slope(parts, low, high, j)[1]
             bends = np.stack([self._mixed(parts, i, j) for i in range(len(low))], axis=1)
             points, rise = _best_centres(bends, low, high)
-            least, most = self._slope(self._parts(points, points), points, points, j)
+            least, most = self._slope(_Parts(self, points, points), points, points, j)
             # Beyond the range the tangent's own slope changes by what is not enclosed here.
             inside = (low >= self.model.minimum[:, None]) & (high <= self.model.maximum[:, None])
             by_bends = np.where(inside.all(axis=0), most + rise, np.inf)
@@ -128,41 +139,17 @@ class Enclosure:
 
     def _gain_of_slope(self, parts, j):
         """About how much of the range of dP/dx_j goes with each input's width, (n_inputs, n)."""
-        strength, gain = self._largest_strengths(parts), np.zeros_like(parts.half)
-        tangent = size(self._tangent(parts, j))
+        gain, tangent = np.zeros_like(parts.half), parts.strength * size(self._tangent(parts, j))
         for i, ends in parts.departure.items():
-            gain[i] += (strength * size(ends) * tangent).sum(axis=self.axes)
+            gain[i] = (size(ends) * tangent).sum(axis=self.axes)
         return gain
 
-    def _largest_strengths(self, parts):
-        return prod(one.high for one in parts.shares)
-
-    def _parts(self, low, high):
-        model, ends = self.model, np.stack([low, high])
-        box = np.clip(ends, model.minimum[:, None], model.maximum[:, None])
-        way = np.clip(ends - box, -self.reach[:, None], self.reach[:, None])
-        middle, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0]) * (1.0 + 4.0 * EPS)
-        terms = term_ranges(model.antecedent, *box)
-        at_middle = term_ranges(model.antecedent, middle, middle)
-        shares = [
-            enclosed(one, place - len(self.counts) - 1, terms, at_middle, half)
-            for place, one in enumerate(self.factors)
-        ]
-        departure = {j: ends for one in shares for j, ends in one.departure.items()}
-        curvature = {j: ends for one in shares for j, ends in one.curvature.items()}
-        centre = self.height + self.slopes @ (middle - model.reference[:, None])
-        radius = np.abs(self.slopes) @ half
-        value = self._shaped(np.stack([centre - radius, centre + radius]))
-        parts = _Parts(box, way, half, shares, self._shaped(centre), value, departure, curvature)
-        slack, slope_slack = self._slacks(parts)
-        return replace(parts, slack=slack, slope_slack=slope_slack)
-
-    def _slacks(self, parts):
+    def slacks(self, parts):
         """Largest rounding errors of values, (n_boxes,), and of slopes, (n_inputs, n_boxes)."""
         far_off = size(parts.box) + np.abs(self.model.reference)[:, None]
         largest = (np.abs(self.height) + np.abs(self.slopes) @ far_off).max(axis=0)
         part = EPS * (ROUNDINGS + self.model.n_rules + self.model.n_inputs)
-        strength = self._largest_strengths(parts)
+        strength = parts.strength
         # What the errors of the strengths move the output by, rule by rule.
         moved = np.zeros(parts.middle.shape)
         for place, one in enumerate(parts.shares):
@@ -178,13 +165,13 @@ class Enclosure:
         beyond = np.where(ahead > 0.0, ahead * slopes, 0.0).sum(axis=0)
         return moved.sum(axis=self.axes) + part * largest + beyond, slopes
 
-    def _shaped(self, by_rule):
+    def shaped(self, by_rule):
         """Values by rule along the axes of all factors."""
         return by_rule.reshape(*by_rule.shape[:-2], *self.counts, by_rule.shape[-1])
 
     def _tangent(self, parts, j):
         """Range of b_j + D_j (f - phi) by rule."""
-        own = self._shaped(self.slopes[:, j, None])
+        own = self.shaped(self.slopes[:, j, None])
         if j not in parts.departure:
             return np.stack([own, own])
         return own + product(parts.departure[j], self._centred(parts, self.place[j]))
@@ -194,7 +181,7 @@ class Enclosure:
         if places not in parts.known:
             middle, radius = self._less_means(parts, parts.middle, places), 0.0
             for i in np.flatnonzero(self.slopes.any(axis=0)):
-                own = self._less_means(parts, self._shaped(self.slopes[:, i, None]), places)
+                own = self._less_means(parts, self.shaped(self.slopes[:, i, None]), places)
                 radius = radius + np.abs(own) * parts.half[i]
             parts.known[places] = np.stack([middle - radius, middle + radius])
         return parts.known[places]
@@ -225,7 +212,7 @@ class Enclosure:
             return parts
         if ("there", g) not in parts.known:
             there = np.where(np.isnan(at[g])[:, None], parts.box, at[g][:, None])
-            parts.known["there", g] = self._parts(*there)
+            parts.known["there", g] = _Parts(self, *there)
         return parts.known["there", g]
 
     def _steepness(self, parts, j):
@@ -250,14 +237,13 @@ class Enclosure:
         furthest = first - self.reach[i], last + self.reach[i]
         is_below = (low[i] < first) & (high[i] >= furthest[0])
         is_above = (high[i] > last) & (low[i] <= furthest[1])
-        down, up = np.full(inside.shape[1:], np.inf), np.full(inside.shape[1:], -np.inf)
-        for is_there, ends in (
+        pieces = (
             ((low[i] <= last) & (high[i] >= first), inside),
             (is_below | is_above, beyond),
             ((low[i] < furthest[0]) | (high[i] > furthest[1]), np.zeros((2, 1))),
-        ):
-            down = np.where(is_there, np.minimum(down, ends[0]), down)
-            up = np.where(is_there, np.maximum(up, ends[1]), up)
+        )
+        down = np.min([np.where(there, ends, np.inf)[0] for there, ends in pieces], axis=0)
+        up = np.max([np.where(there, ends, -np.inf)[1] for there, ends in pieces], axis=0)
         # What is not known has no bounds.
         return np.where(np.isnan([down, up]), [[-np.inf], [np.inf]], [down, up])
 
@@ -266,7 +252,7 @@ class Enclosure:
         found = np.zeros_like(parts.value)
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:
-                own = self._shaped(self.slopes[:, other, None])
+                own = self.shaped(self.slopes[:, other, None])
                 own = self._less_means(parts, own, [self.place[one]])
                 found = found + product(parts.departure[one], (own, own))
         if i in parts.departure and j in parts.departure:
