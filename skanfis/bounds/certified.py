@@ -21,8 +21,6 @@ from .terms import size
 
 # Points that are tried first: so many all over the box, and its corners if inputs are this few.
 _POINTS, _MOST_INPUTS_OF_CORNERS = 1024, 8
-# Part of a range: a strip so wide stands for all beyond the policy's reach, where slopes are zero.
-_STRIP = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -208,7 +206,7 @@ def monotonicity(
     """
     model, box = _checked(model, box, 0.0, max_boxes)
     (j,) = feature_indices([feature], model.input_names, "feature")
-    low, high = varying_part(box, model, _STRIP)
+    low, high = varying_part(box, model, of_slopes=True)
     is_in_range = (low >= model.minimum).all() and (high <= model.maximum).all()
     # Order in the range is order beyond it too where the value is held there, or the tangent does
     # not change with other inputs.
@@ -233,7 +231,7 @@ def training_box(model):
 
 def _enclosed(model, box, j, scale, tol, max_boxes):
     """Bounds of outputs, or of their slopes by input j; ``tol`` is in units of ``scale(ends)``."""
-    low, high = varying_part(box, model, 0.0 if j is None else _STRIP)
+    low, high = varying_part(box, model, of_slopes=j is not None)
     X, found = spread_points(low, high).T, []
     for k in range(model.n_outputs):
         sides = [Enclosure(model, k, sign).evaluate(j) for sign in (-1.0, 1.0)]
@@ -301,33 +299,29 @@ def read_box(box, model: TSKModel):
     return found
 
 
-def varying_part(box, model: TSKModel, strip=0.0):
-    """Lows and highs of the part of a box in which predictions change, and of a ``strip`` more."""
-    low, high = box.T.copy()
-    if model.out_of_bounds in SILENT:
-        low, high = np.maximum(low, model.minimum), np.minimum(high, model.maximum)
-        for name, start, stop, ends in zip(model.input_names, low, high, box, strict=True):
-            if start > stop:
-                raise ValueError(
-                    f"box has ({ends[0]:g}, {ends[1]:g}) for {name!r}, outside the range of the "
-                    f"training data: with out_of_bounds={model.out_of_bounds!r} the model predicts "
-                    "nothing there. Give a box that meets the range, or another policy."
-                )
-        return low, high
-    reach = reach_of(model)
-    if model.out_of_bounds == "linear" and np.isinf(model.max_extrapolation):
-        for name, ends in zip(model.input_names, box, strict=True):
-            if not np.isfinite(ends).all():
-                raise ValueError(
-                    f"box has ({ends[0]:g}, {ends[1]:g}) for {name!r}, and the model goes on along "
-                    "its tangent without end (max_extrapolation=inf): nothing bounds it. Give "
-                    "finite ends, or a finite max_extrapolation."
-                )
-    # The way beyond is computed, and held, in floats: a few units in the last place more reach it.
+def varying_part(box, model: TSKModel, of_slopes):
+    """Lows and highs of the part of a box in which predictions change, and next to nothing more."""
+    reach, is_silent = reach_of(model), model.out_of_bounds in SILENT
+    is_endless = model.out_of_bounds == "linear" and np.isinf(model.max_extrapolation)
+    # The way beyond is computed, and held, in floats: a few units in the last place more reach its
+    # end, from which on slopes are zero.
     rounding = 8.0 * np.finfo(float).eps * (np.abs(model.minimum) + np.abs(model.maximum) + reach)
-    more = np.where(reach > 0.0, rounding, 0.0) + strip * (model.maximum - model.minimum)
-    edges = model.minimum - reach - more, model.maximum + reach + more
-    return np.clip(low, *edges), np.clip(high, *edges)
+    more = np.where((reach > 0.0) | (of_slopes and not is_silent), reach + rounding, 0.0)
+    edges = np.stack([model.minimum - more, model.maximum + more])
+    for name, (start, stop), (low, high) in zip(model.input_names, box, edges.T, strict=True):
+        if is_silent and (start > high or stop < low):
+            raise ValueError(
+                f"box has ({start:g}, {stop:g}) for {name!r}, outside the range of the training "
+                f"data: with out_of_bounds={model.out_of_bounds!r} the model predicts nothing "
+                "there. Give a box that meets the range, or another policy."
+            )
+        if is_endless and not np.isfinite([start, stop]).all():
+            raise ValueError(
+                f"box has ({start:g}, {stop:g}) for {name!r}, and the model goes on along its "
+                "tangent without end (max_extrapolation=inf): nothing bounds it. Give finite ends, "
+                "or a finite max_extrapolation."
+            )
+    return np.clip(box.T, *edges)
 
 
 def spread_points(low, high):
