@@ -244,17 +244,17 @@ def _enclosed(model, box, j, scale, tol, max_boxes):
             least = max(tolerance, 8.0 * float(bound[top] - attained[top]))
             first = points[:, top], float(attained[top])
             found.append(largest(evaluate, low, high, least, max_boxes, training_box(model), first))
-    below, above = found[::2], found[1::2]
+    bound, attained, point, n_boxes, converged = map(np.array, zip(*found, strict=True))
     return Bounds(
-        lower=np.array([-one.bound for one in below]),
-        upper=np.array([one.bound for one in above]),
-        lowest=np.array([-one.attained for one in below]),
-        highest=np.array([one.attained for one in above]),
-        at_lowest=np.array([one.point for one in below]),
-        at_highest=np.array([one.point for one in above]),
+        lower=-bound[::2],
+        upper=bound[1::2],
+        lowest=-attained[::2],
+        highest=attained[1::2],
+        at_lowest=point[::2],
+        at_highest=point[1::2],
         box=box,
-        n_boxes=sum(one.n_boxes for one in found),
-        converged=all(one.converged for one in found),
+        n_boxes=int(n_boxes.sum()),
+        converged=bool(converged.all()),
         input_names=model.input_names,
         output_names=model.output_names,
     )

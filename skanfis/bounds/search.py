@@ -1,7 +1,6 @@
 """Branch and bound over boxes, many at once."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -10,8 +9,7 @@ import numpy as np
 _BATCH, _FEWEST = 1024, 64
 
 
-@dataclass(frozen=True)
-class Found:
+class Found(NamedTuple):
     """The largest value over a box: between ``attained``, at ``point``, and ``bound``."""
 
     bound: float
@@ -64,7 +62,7 @@ class _Boxes(NamedTuple):
 
 
 def largest(
-    evaluate: Callable, low, high, tolerance, max_boxes, cuts, first=None, until=None
+    evaluate: Callable, low, high, tolerance, max_boxes, cuts, first=None, until=-np.inf
 ) -> Found:
     """Enclose the largest value that a function takes on a box.
 
@@ -83,12 +81,11 @@ def largest(
         found = _Boxes(lows, highs, bound, gain)
         if waiting is not None:
             found = _Boxes(*(np.concatenate(both, -1) for both in zip(waiting, found, strict=True)))
-        enough = best + tolerance if until is None else max(best + tolerance, until)
+        enough = max(best + tolerance, until)
         done = (found.bound <= enough) | found.is_point
         discarded = max(discarded, np.max(found.bound[done], initial=-np.inf))
         waiting = found.of(~done)
-        is_decided = until is not None and best > until
-        if waiting.bound.size == 0 or n_boxes >= max_boxes or is_decided:
+        if waiting.bound.size == 0 or n_boxes >= max_boxes or -np.inf < until < best:
             break
         order = np.argsort(-waiting.bound, kind="stable")
         lows, highs = waiting.of(order[:_BATCH]).parts(cuts)
