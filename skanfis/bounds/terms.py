@@ -37,7 +37,7 @@ EPS = float(np.finfo(float).eps)
 ROUNDINGS = 32.0
 _SIDES, _PRODUCTS = tuple(SIDES.values()), tuple(PRODUCTS.values())
 _ONE_SIDED = (SShaped, ZShaped)
-_BY_SIDES = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
+_TURNING = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
 # Where the logarithm of a floored flank is steepest, to the last bit: of the straight one as the
 # foot is reached; of two parabolas where 2 s^2 is about as large as the floor, s = 1 - t.
 _STEEPEST = {LinearProfile: np.nextafter(1.0, 0.0), SplineProfile: 1.0 - 5.506937986e-6}
@@ -64,11 +64,10 @@ def ranges(group: TermGroup, low, high):
     lo, hi = lo - reach, hi + reach
     at_lo, by_lo = family.log_value_and_gradient(lo, theta)
     at_hi, by_hi = family.log_value_and_gradient(hi, theta)
-    if family in _BY_SIDES:
-        slope = _slope_by_sides(group, lo, hi)
-    else:
-        # Memberships depend on x - location: the slope is minus the derivative by the location.
-        slope = np.stack([-by_hi[0], -by_lo[0]])
+    # Memberships depend on x - location: the slope is minus the derivative by the location.
+    slope = np.sort([-by_hi[0], -by_lo[0]], axis=0)
+    if family in _TURNING:
+        slope = _with_turns(group, lo, hi, slope)
     rising, falling = np.maximum(slope[1], 0.0), np.maximum(-slope[0], 0.0)
     top = np.minimum(at_lo + rising * (hi - lo), at_hi + falling * (hi - lo))
     top = np.minimum(top, 0.0)
@@ -79,47 +78,36 @@ def ranges(group: TermGroup, low, high):
     return TermRanges(log_mu, slope, np.broadcast_to(curve, slope.shape), error)
 
 
-def _slope_by_sides(group, lo, hi):
-    """Range of the slope from that of its size on each flank, t flank lengths off the shoulder."""
+def _with_turns(group, lo, hi, slope):
+    """Range of slopes that turn between the ends: at these, and where they turn, a flank each.
+
+    Of a bell they do where |d log mu / dt| = 2b t^(2b - 1) / (1 + t^(2b)) has its peak, t flank
+    lengths off the shoulder; with 2b < 1 it is at the centre, and has no bound. With a foot they do
+    where a flank is steepest, and at t = 1, from where on it falls as a Gaussian does.
+    """
     family, theta = group.family, group.theta[:, :, None]
     widths = np.exp(theta[1:])
     if family in _ONE_SIDED:
         flanks = {family.side: widths[0]}
     else:
         flanks = {-1.0: widths[0], 1.0: widths[0] if family is Bell else widths[1]}
+    if family is Bell:
+        double = 2.0 * np.exp(theta[2])
+        over = np.maximum(double - 1.0, 0.0)
+        with np.errstate(divide="ignore"):
+            turns = [(over ** (1.0 / double), over ** (1.0 - 1.0 / double))]
+    else:
+        top = _STEEPEST[family.profile]
+        # The top may lie between floats.
+        turns = [(top, -(1.0 + 1e-3) * family.profile.log_value_and_slope(top)[1]), (1.0, 1.0)]
     half = 0.5 * widths[2] if family in (Trapezoidal, PiShaped) else 0.0
-    found = np.zeros((2, *lo.shape))
     for side, flank in flanks.items():
-        begin = theta[0] + side * half
-        t = np.sort([side * (lo - begin) / flank, side * (hi - begin) / flank], axis=0)
-        t = np.maximum(t, 0.0)
-        sizes = _fall_of_bell(theta, *t) if family is Bell else _fall(family, *t)
-        # One side falls at a time: of the other one, zero is among its sizes.
-        found += np.sort([-side * one / flank for one in sizes], axis=0)
-    return found
-
-
-def _fall_of_bell(theta, near, far):
-    """Range of |d log mu / dt| = 2b t^(2b - 1) / (1 + t^(2b)), with one peak; zero at t = 0."""
-    double = 2.0 * np.exp(theta[2])
-    # Below 2b = 1 it is at the centre, and has no bound.
-    peak = np.maximum(double - 1.0, 0.0) ** (1.0 / double)
-    t = np.array([near, np.clip(peak, near, far), far])
-    small, large = np.minimum(t, 1.0), np.maximum(t, 1.0)
-    with np.errstate(divide="ignore"):
-        sizes = double * small ** (double - 1.0) / (large * (1.0 + (small / large) ** double))
-    least, most = sizes.min(axis=0), sizes.max(axis=0)
-    return np.where(near > 0.0, least, 0.0), np.where(far > 0.0, most, 0.0)
-
-
-def _fall(family, near, far):
-    """Range of -d log mu / dt of a profile with a foot: it falls from its top to t = 1 alone."""
-    top = _STEEPEST[family.profile]
-    turns = np.array([0.0, top, 1.0, np.inf])[:, None, None]
-    sizes = -family.profile.log_value_and_slope(np.clip(turns, near, far))[1]
-    # The top may lie between floats.
-    more = np.where((near <= top) & (top <= far), 1.0 + 1e-3, 1.0)
-    return sizes.min(axis=0), sizes.max(axis=0) * more
+        for t, size_there in turns:
+            place, there = theta[0] + side * (half + t * flank), -side * size_there / flank
+            is_met = (lo <= place) & (place <= hi)
+            least, most = np.minimum(slope[0], there), np.maximum(slope[1], there)
+            slope = np.where(is_met, [least, most], slope)
+    return slope
 
 
 def _curvature(group, lo, hi):
