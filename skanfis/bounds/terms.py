@@ -117,11 +117,9 @@ def _curvature(group, lo, hi):
     families but sigmoids it is the range wherever x is.
     """
     family, theta = group.family, group.theta[:, :, None]
-    per_width, nothing = np.exp(-theta[1:]), np.full(theta[0].shape, np.nan)
-    if family is Gaussian:
-        return -(per_width[0] ** 2), -(per_width[0] ** 2)
-    if family is TwoSidedGaussian:
-        return -(per_width[:2].max(axis=0) ** 2), 0.0
+    if family in (Gaussian, TwoSidedGaussian):
+        curve = -np.exp(-2.0 * theta[1:3].min(axis=0))
+        return curve, curve if family is Gaussian else 0.0
     if family in (SigmoidDifference, *_PRODUCTS, *_SIDES):
         cuts = [(theta[0], theta[1])]
         if family not in _SIDES:
@@ -137,9 +135,9 @@ def _curvature(group, lo, hi):
     if family is Bell:
         # With p = t^(2b) it is -(2b / w^2) p^(1 - 1/b) (2b - 1 - p) / (1 + p)^2.
         b = np.exp(theta[2])
-        most = np.where(b >= 1.0, 2.0 * b * (2.0 * b - 1.0) * per_width[0] ** 2, np.nan)
+        most = np.where(b >= 1.0, 2.0 * b * (2.0 * b - 1.0) * np.exp(-2.0 * theta[1]), np.nan)
         return -most, most
-    return nothing, nothing
+    return np.full((2, *theta[0].shape), np.nan)
 
 
 def _along(factor, by_term):
