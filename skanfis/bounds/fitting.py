@@ -6,7 +6,7 @@ goes back towards the free one as far as branch and bound can prove that all are
 """
 
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from .._validation import warn_user
 from ..antecedent import TreeAntecedent
 from ..consequent import NormalFactor
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
-from ..learning.objective import Evaluation
 from ..model import TSKModel
 from ..policies import SILENT
 from .consequents import Consequents
@@ -29,20 +28,12 @@ _COSTLY, _WORTH_A_WARNING = 1.02**2, 1.1**2
 _OF_MARGINS = 1e-8  # variances of the target that margins alone may cost
 
 
-@dataclass(frozen=True, eq=False)
-class Kept:
-    """Consequents that keep all constraints, for certain, and the free ones of these premises."""
-
-    free: Evaluation
-    coefficients: np.ndarray  # in the user's units
-    points: np.ndarray  # in the range, at which values are known
-
-
 def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, rows):
-    """The consequents nearest to those of an evaluation that keep all constraints; and a report.
+    """The consequents nearest to those of an evaluation that keep all constraints, for certain.
 
-    ``model`` is in the user's units. With ``rows``, X, y and their numbers, a warning names those
-    that contradict a constraint.
+    With them, in the user's units as ``model`` is, come the evaluation of the free ones at these
+    premises, the points in the range at which values are known, and a report. With ``rows``, X, y
+    and their numbers, a warning names those that contradict a constraint.
     """
     _check_points(model, constraints)
     # The best at premises for which there is an order.
@@ -77,7 +68,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         # Beyond, a tangent is known, which is more than a value: it is not counted.
         points = points[model.in_bounds(points)]
     points = np.clip(points, model.minimum, model.maximum)
-    return Kept(free, held.coefficients, points), report
+    return held.coefficients, free, points, report
 
 
 def _check_points(model, constraints):

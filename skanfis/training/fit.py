@@ -241,18 +241,19 @@ class _Fit:
         # Rows on a cluster have no numbers.
         is_here = isinstance(self.data, ValidatedData)
         rows = self.data.numbered(self.trained_on) if is_here else None
-        kept, report = constrained(fitted.model, evaluation, run.problem, constraints, rows)
-        if kept.free is not evaluation:
-            moved = replace(run.result, evaluation=kept.free)
+        given = fitted.model, evaluation, run.problem, constraints, rows
+        coefficients, free, points, report = constrained(*given)
+        if free is not evaluation:
+            moved = replace(run.result, evaluation=free)
             fitted = self.frozen(replace(run, result=moved), weights)
-        model = replace(fitted.model, coefficients=kept.coefficients)
+        model = replace(fitted.model, coefficients=coefficients)
         target, posterior = model.target, model.posterior
         return replace(
             fitted,
             model=replace(
                 model,
                 target=target.within(constraints.lower, constraints.upper, constraints.values),
-                posterior=posterior and posterior.given(model, kept.points),
+                posterior=posterior and posterior.given(model, points),
             ),
             constraints=report,
         )
