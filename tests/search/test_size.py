@@ -11,12 +11,6 @@ from skanfis.exceptions import ConstantInputWarning
 from ..memory import traced
 
 
-def test_limit_is_that_of_scikit_learn(rng):
-    X, y = rng.normal(size=(500, 3)), rng.normal(size=500)
-    with config_context(working_memory=0.05), pytest.raises(ValueError, match=r"limit is 0\.05"):
-        ANFISRegressor(n_mfs=2).fit(X, y)
-
-
 @pytest.mark.parametrize("order", [0, 1])
 def test_clusters_that_are_too_many_are_refused_before_memory_is_asked_for(rng, order):
     X, y = rng.normal(size=(400, 4)), rng.normal(size=400)
