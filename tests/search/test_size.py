@@ -17,7 +17,8 @@ def test_clusters_that_are_too_many_are_refused_before_memory_is_asked_for(rng, 
     clusterer = KMeans(200, n_init=1, max_iter=2, random_state=0)
     n_columns = 200 * (5 if order else 1)
     limit = 8 * n_columns**2 / 2**20  # one of the matrices that training takes
-    refused = pytest.raises(ValueError, match=f"200 rules with {n_columns:,} conseq.*Use fewer")
+    told = f"200 rules with {n_columns:,} conseq.*limit is {limit:,} MiB .*Use fewer"
+    refused = pytest.raises(ValueError, match=told)
     with traced() as peak, config_context(working_memory=limit), refused:
         ANFISRegressor(partition=clusterer, order=order).fit(X, y)
     # Clustering itself takes distances of all rows to all centres.
