@@ -14,8 +14,6 @@ import sys
 import traceback
 from pathlib import Path
 
-import numpy as np
-
 
 def in_a_fresh_process(folder):
     """Run this file in a process of its own."""
@@ -35,19 +33,8 @@ def in_a_fresh_process(folder):
     return json.loads(done.stdout)
 
 
-def modules_for_measuring():
-    from skanfis import ANFISRegressor
-    from skanfis.inspection.readability import readability_of_rows
-
-    X = np.linspace(0, 1, 30)[:, None]
-    before = set(sys.modules)
-    model = ANFISRegressor(n_mfs=2, solver="lse").fit(X, X[:, 0]).model_
-    str(readability_of_rows(model, X, X))
-    return sorted(set(sys.modules) - before)
-
-
 def digests():
-    """First thing fitted but for the line above, in reverse order."""
+    """First thing fitted, in reverse order."""
     sys.path.insert(0, str(Path(__file__).parent))
     import test_reproducibility
 
@@ -89,7 +76,6 @@ def pyplot_of_pictures():
 
 
 STEPS = [
-    modules_for_measuring,
     digests,
     matplotlib_of_the_command,
     backend_that_does_not_exist,

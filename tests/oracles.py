@@ -386,6 +386,13 @@ def own_terms(family, inputs, theta):
     return RuleTableAntecedent.of_own_terms(dict.fromkeys(terms, family), terms)
 
 
+def scattered_of_one_width(family, centers, width):
+    """Rules of one family at centers (n_rules, n_inputs)."""
+    centers = np.array(centers, dtype=float)
+    theta = family.from_center_and_width(centers, np.full(centers.shape, width))
+    return own_terms(family, np.arange(centers.shape[1]), theta)
+
+
 def random_scattered(rng, family, n_rules, inputs):
     """Rules anywhere within reach of standardised data."""
     inputs = np.asarray(inputs)

@@ -26,12 +26,6 @@ def model(antecedent, box=BOX, two_valued=(False, False, False)):
     return SimpleNamespace(antecedent=antecedent, input_names=INPUTS, **box)
 
 
-def scattered(centers, width=1.0, family=Gaussian):
-    centers = np.array(centers, dtype=float)
-    theta = family.from_center_and_width(centers, np.full(centers.shape, width))
-    return oracles.own_terms(family, np.arange(centers.shape[1]), theta)
-
-
 @pytest.mark.parametrize(
     ("counts", "names"),
     [
@@ -53,16 +47,16 @@ def test_two_terms_of_an_input_that_is_0_or_1_are_called_so():
 @pytest.mark.parametrize(
     ("places", "names"),
     [
-        ([2213.4, -3.0], ["2210", "-3"]),
+        # Their digits: test_digits.py.
         ([21.34, -0.0123456, 0.0], ["21.3", "-0.0123", "0"]),
-        ([1e12, 3e-7], ["1000000000000", "3e-07"]),
-        # As many digits as tell them apart; those that differ by rounding have none.
         ([1e9 + 1, 1e9 + 2], ["1000000001", "1000000002"]),
+        # Those that differ by rounding have one name, and a number.
         ([1.0, 1.0 + 1e-15, -1e-16], ["1", "1 (2)", "0"]),
     ],
 )
 def test_other_terms_are_named_by_where_they_stand(places, names):
-    found = default_term_names(model(scattered(np.transpose([places]), family=Bell)))
+    rules = oracles.scattered_of_one_width(Bell, np.transpose([places]), 1.0)
+    found = default_term_names(model(rules))
     assert found == tuple(f"near {name}" for name in names)
 
 
@@ -79,8 +73,8 @@ def test_other_terms_are_named_by_where_they_stand(places, names):
     ],
 )
 def test_gaussian_terms_of_a_rule_say_how_far_they_reach(places, width, names):
-    rules = model(scattered(np.transpose([places]), width))
-    assert default_term_names(rules) == tuple(f"near {name}" for name in names)
+    rules = oracles.scattered_of_one_width(Gaussian, np.transpose([places]), width)
+    assert default_term_names(model(rules)) == tuple(f"near {name}" for name in names)
 
 
 def test_given_names_replace_the_default():

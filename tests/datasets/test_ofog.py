@@ -18,7 +18,6 @@ RANDOM = [
     *("bias_repeatability", "bias_instability", "rate_random_walk", "angle_random_walk"),
     "quantisation",
 ]
-PARTS = SYSTEMATIC + RANDOM
 
 
 @pytest.fixture(scope="module")

@@ -126,7 +126,7 @@ def test_json_gives_the_same_compensator(log, compensator, parameters, tmp_path)
     assert codes[0] == codes[1]
 
 
-def test_a_rate_that_is_not_finite_is_none(log, compensator):
+def test_a_rate_that_is_not_finite_is_none(log):
     class Infinite:
         def predict(self, X):
             return np.full(len(X), np.inf)
@@ -211,7 +211,7 @@ def physics_json(log, tmp_path_factory):
     return path.read_text()
 
 
-def test_what_could_not_be_read_is_not_written(log, compensator, tmp_path):
+def test_what_could_not_be_read_is_not_written(compensator, tmp_path):
     path = tmp_path / "never.json"
     for estimator in (LinearRegression(), ResidualRegressor(LinearRegression(), quick(1))):
         estimator.fit(np.random.default_rng(0).random((30, 4)), np.arange(30.0))

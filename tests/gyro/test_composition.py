@@ -24,7 +24,7 @@ def data():
     return log[["output", "temperature", "time"]], log["rate"].to_numpy()
 
 
-def test_the_second_learns_what_the_first_leaves(rng):
+def test_the_second_learns_what_the_first_leaves():
     """A line and a parabola orthogonal to it: each part finds its own."""
     x = np.linspace(-1.0, 1.0, 41)[:, None]
     y = 3.0 * x[:, 0] + 2.0 * (x[:, 0] ** 2 - np.mean(x**2))

@@ -6,9 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.compose import TransformedTargetRegressor, make_column_transformer
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import MinMaxScaler, OneHotEncoder
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.preprocessing import MinMaxScaler
 
 from skanfis.export import fold
 from skanfis.inspection import EffectsDisplay, MembershipDisplay, ResponseSurfaceDisplay
@@ -16,9 +15,9 @@ from skanfis.inspection.labels import as_label, printable
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
+from .encoded import encoded
 
 plt = pytest.importorskip("matplotlib.pyplot")
-Bbox = pytest.importorskip("matplotlib.transforms").Bbox
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 # One of every kind, of both orders and both numbers of outputs.
 EACH = pytest.mark.parametrize(
@@ -200,9 +199,7 @@ def test_a_category_is_held_at_one_level(drop, held, told, ones, rng):
     X["day"] = rng.choice(["Fri", "Sat", "Sun"], 200, p=[0.2, 0.6, 0.2])
     X["wet"] = rng.choice(["no", "yes"], 200, p=[0.8, 0.2])
     y = X["heat"] * (X["day"] == "Sat") + X["hour"] + (X["wet"] == "yes")
-    encoder = OneHotEncoder(drop=drop, sparse_output=False)
-    encoder = make_column_transformer((encoder, ["day", "wet"]), remainder="passthrough")
-    pipe = make_pipeline(encoder, quick(n_mfs=1)).fit(X, y)
+    pipe = encoded(["day", "wet"], quick(n_mfs=1), drop=drop).fit(X, y)
     ones = ones | ({"wet_no"} if drop is None else set())
     display = ResponseSurfaceDisplay.from_estimator(pipe, features=["heat", "hour"], held=held)
     assert display.held == told

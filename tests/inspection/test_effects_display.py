@@ -7,19 +7,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.compose import make_column_transformer
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import OneHotEncoder
 
 from skanfis.inspection import EffectsDisplay, effects
 
 from ..export.rule_bases import MODELS, build, rows_of
 from ..quick import quick
+from .encoded import encoded
 from .test_anova import TREE
 from .test_displays import drawn
 from .test_effects import categories
 
-plt = pytest.importorskip("matplotlib.pyplot")
+pytest.importorskip("matplotlib.pyplot")
 KINDS = {
     "grid": MODELS["grid, order 1, 2 outputs"],
     "tree": build(TREE, 1, 2),
@@ -89,10 +87,8 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
 def test_a_category_is_drawn_by_its_levels(drop, levels):
     X, y = categories()
     X, y = (one[X["fibre"].isin(list(levels))] for one in (X, y))
-    encoder = OneHotEncoder(sparse_output=False, drop=drop)
-    encoder = make_column_transformer((encoder, ["fibre"]), remainder="passthrough")
     counts = [2] + [1] * (len(levels) - (drop is not None))
-    model = make_pipeline(encoder, quick(n_mfs=counts)).fit(X, y)
+    model = encoded(["fibre"], quick(n_mfs=counts), drop=drop).fit(X, y)
     for table in (X, None):
         display = drawn(EffectsDisplay.from_estimator(model, table))
         curve = next(one for one in display.curves if one["input"] == "fibre")
@@ -112,11 +108,8 @@ def test_labels_of_many_levels_stand_apart(rng):
     levels = ["minivan", "subcompact", "pickup", "2seater", "suv", "midsize"]
     X = pd.DataFrame({"class": rng.choice(levels, 200), "power": rng.normal(size=200)})
     y = X["power"] * (X["class"] == "suv") + 0.1 * rng.normal(size=200)
-    encoder = OneHotEncoder(sparse_output=False)
-    encoder = make_column_transformer((encoder, ["class"]), remainder="passthrough")
-    model = make_pipeline(encoder, quick(partition="tree", max_rules=2)).fit(X, y)
+    model = encoded(["class"], quick(partition="tree", max_rules=2)).fit(X, y)
     display = drawn(EffectsDisplay.from_estimator(model, X))
-    display.figure_.canvas.draw()
     sides = [
         labels
         for axes in display.axes_

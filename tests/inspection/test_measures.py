@@ -15,7 +15,6 @@ from ..export.rule_bases import EVERY_PAIR, MODELS, build, rows_of
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 ONE = MODELS["one rule, order 1, 1 outputs"]
-A_TABLE = MODELS["rule table, order 1, 2 outputs"]
 
 
 def data_of(model, n_rows=40):

@@ -126,13 +126,6 @@ def test_rules_that_go_different_ways_beyond_chance(rng):
     assert not [one for one in unsure.findings if "ways" in one]
 
 
-def assert_same(found, expected, rtol=1e-9):
-    # Digits go by powers of ten of the units: what is printed is another model.
-    key = "strongest_alone"
-    assert_allclose(found.summary[key], expected.summary[key], rtol=rtol)
-    assert_allclose(found.rules["alone"], expected.rules["alone"], rtol=rtol)
-
-
 def test_errors_name_the_row_and_the_column(monkeypatch):
     X = rows_of(A_GRID, 1.0)
     monkeypatch.setattr(measures, "LARGE_BLOCK_ROWS", 10)

@@ -10,7 +10,7 @@ from skanfis.inspection import StructureDisplay
 
 from ..quick import quick
 
-plt = pytest.importorskip("matplotlib.pyplot")
+pytest.importorskip("matplotlib.pyplot")
 
 
 @pytest.fixture(scope="module")

@@ -6,19 +6,16 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from sklearn.compose import make_column_transformer
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import OneHotEncoder
 
 from skanfis.inspection import explain, readability, rules_table
 
 from ..export.every_model import FEWEST
 from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, rows_of
 from ..quick import quick
+from .encoded import encoded
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = MODELS["grid, order 1, 1 outputs"]
-A_TABLE = MODELS["rule table, order 1, 2 outputs"]
 
 
 def sums(table, model):
@@ -92,9 +89,7 @@ def test_what_is_wrong_is_refused():
 def test_rules_of_a_category_are_explained_in_its_words(rng):
     X = pd.DataFrame({"fibre": rng.choice(["PM", "SM"], 200), "rate": rng.normal(size=200)})
     y = np.where(X["fibre"] == "PM", np.abs(X["rate"]), 3.0)
-    encoder = OneHotEncoder(drop="if_binary", sparse_output=False)
-    encoder = make_column_transformer((encoder, ["fibre"]), remainder="passthrough")
-    pipe = make_pipeline(encoder, quick(n_mfs=[2, 2])).fit(X, y)
+    pipe = encoded(["fibre"], quick(n_mfs=[2, 2]), drop="if_binary").fit(X, y)
     asked = set(explain(pipe, X[:20])["if"])
     assert any("fibre is PM" in premise for premise in asked)
     assert any("fibre is SM" in premise for premise in asked)

@@ -8,7 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from sklearn.compose import TransformedTargetRegressor, make_column_transformer
+from sklearn.base import clone
+from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import OneHotEncoder, StandardScaler
 
@@ -22,6 +23,7 @@ from skanfis.inspection.text import percent
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, rows_of
 from ..outline import Outline
+from .encoded import encoded
 from .reader import read_text
 
 ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
@@ -208,8 +210,8 @@ def test_a_rule_by_hand():
 def test_a_level_of_a_category_is_called_by_its_column(rng):
     X = pd.DataFrame({"rate": rng.normal(size=400), "fibre": rng.choice(["PM", "SM", "HB"], 400)})
     y = 2 * X["rate"] * (X["fibre"] == "PM") + (X["fibre"] == "SM") + 0.1 * rng.normal(size=400)
-    encoder = make_column_transformer((OneHotEncoder(), ["fibre"]), remainder="passthrough")
-    pipe = make_pipeline(encoder, ANFISRegressor(partition="tree", max_rules=2)).fit(X, y)
+    model = ANFISRegressor(partition="tree", max_rules=2)
+    pipe = encoded(["fibre"], model, sparse_output=True).fit(X, y)
     told = export_text(pipe).partition("Inputs")[0]
     assert "\n  IF fibre is PM\n" in told
     assert "\n  IF fibre is not PM\n" in told
@@ -218,7 +220,7 @@ def test_a_level_of_a_category_is_called_by_its_column(rng):
     assert "fibre_" not in told
     assert "fibre is not PM" in rules_html(pipe)
     # A scaler behind the encoder leaves rests of rounding, and no other words.
-    scaled = make_pipeline(encoder, StandardScaler(), ANFISRegressor(partition="tree", max_rules=2))
+    scaled = make_pipeline(clone(pipe[0]), StandardScaler(), clone(model))
     assert export_text(scaled.fit(X, y)).partition("Inputs")[0] == told
     # A category is an input in one line.
     assert re.search(r"trained:\n  rate: \S+ to \S+\n  fibre: HB, PM, SM\nOut", export_text(pipe))
@@ -258,11 +260,10 @@ def test_a_value_is_that_of_a_level_and_others_are_told_from_it(handle_unknown, 
     X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 300), "on": rng.choice(["y", "n"], 300)})
     X["rate"] = rng.normal(size=300)
     y = 5.0 * (X["sort"] == "b") - 3.0 * (X["sort"] == "c") + 2.0 * (X["on"] == "y") + X["rate"]
-    encoder = OneHotEncoder(sparse_output=False, handle_unknown=handle_unknown)
-    encoder = make_column_transformer((encoder, ["sort", "on"]), remainder="passthrough")
     # Where alpha is given, all levels have slopes.
     model = ANFISRegressor(partition="tree", max_rules=1, alpha=0.01)
-    pipe = make_pipeline(encoder, model).fit(X, y + 0.1 * rng.normal(size=300))
+    pipe = encoded(["sort", "on"], model, handle_unknown=handle_unknown)
+    pipe.fit(X, y + 0.1 * rng.normal(size=300))
     (said,) = re.findall(r"THEN y is about ([\s\S]*?)\n\n", export_text(pipe))
     value, _, slopes = " ".join(said.split()).partition(": ")
     told = re.findall(r"([-+][\d.]+) if (sort|on) is (not )?([a-z])(?:, |$)", slopes)
@@ -284,11 +285,10 @@ def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(
 ):
     levels = rng.choice(["n", "y"], 300, p=[0.3, 0.7])
     X = pd.DataFrame({"rate": rng.normal(size=300), "on": levels})
-    encoder = OneHotEncoder(sparse_output=False, handle_unknown=handle_unknown)
-    encoder = make_column_transformer((encoder, ["on"]), remainder="passthrough")
     model = ANFISRegressor(partition="tree", max_rules=3, order=1)
     y = np.where(X["rate"] > 0.7, 9.0, np.where(X["rate"] < -0.7, -9.0, 0.0))
-    pipe = make_pipeline(encoder, model).fit(X, y + 0.1 * rng.normal(size=300))
+    pipe = encoded(["on"], model, handle_unknown=handle_unknown)
+    pipe.fit(X, y + 0.1 * rng.normal(size=300))
     # By one indicator two rules have a common slope; the third has its own by either.
     coefficients = np.zeros((3, 4, 1))
     coefficients[:, 0, 0], coefficients[1:, 2, 0] = [1.0, 5.0, 9.0], 2.0
@@ -324,9 +324,8 @@ def test_a_category_is_listed_by_its_levels(rng):
     X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 300), "on": rng.choice(["y", "n"], 300)})
     X["rate"] = rng.normal(size=300)
     y = (X["sort"] == "b") + (X["on"] == "y") * X["rate"] + 0.1 * rng.normal(size=300)
-    encoder = OneHotEncoder(drop="if_binary", sparse_output=False)
-    encoder = make_column_transformer((encoder, ["sort", "on"]), remainder="passthrough")
-    pipe = make_pipeline(encoder, ANFISRegressor(n_mfs=[1, 2, 1, 1, 1])).fit(X, y)
+    model = ANFISRegressor(n_mfs=[1, 2, 1, 1, 1])
+    pipe = encoded(["sort", "on"], model, drop="if_binary").fit(X, y)
     lines = export_text(pipe).partition("trained:\n")[2].partition("\nOut")[0].splitlines()
     # An indicator with terms of its own stays by itself; the encoder knows a level without one.
     assert lines[0] == "  sort_b: 0 to 1"
@@ -334,10 +333,9 @@ def test_a_category_is_listed_by_its_levels(rng):
     assert lines[3].startswith("  rate: ")
     assert lines[4:] == ["  sort: a, c, other", "  on: y, n"]
     # Where it takes levels that it has not seen, they are others.
-    unseen = OneHotEncoder(handle_unknown="ignore", drop="if_binary", sparse_output=False)
-    encoder = make_column_transformer((unseen, ["sort", "on"]), remainder="passthrough")
-    y += X["on"] == "y"
-    told = export_text(make_pipeline(encoder, ANFISRegressor(n_mfs=1)).fit(X, y))
+    unseen = {"handle_unknown": "ignore", "drop": "if_binary"}
+    pipe = encoded(["sort", "on"], ANFISRegressor(n_mfs=1), **unseen)
+    told = export_text(pipe.fit(X, y + (X["on"] == "y")))
     assert "\n  on: y, other\n" in told
 
 
@@ -346,10 +344,10 @@ def test_inputs_that_no_rule_names_are_one_line(rng, n_inputs):
     X = rng.normal(size=(80, n_inputs))
     fibre = pd.DataFrame({"fibre": rng.choice(["a", "b"], 80)})
     table = pd.concat([fibre, pd.DataFrame(X).add_prefix("x")], axis=1)
-    encoder = make_column_transformer((OneHotEncoder(), ["fibre"]), remainder="passthrough")
     counts = [1, 1, 2, *[1] * (n_inputs - 1)]
     model = ANFISRegressor(n_mfs=counts, consequent_features=[2, 3], agreement=0.1)
-    pipe = make_pipeline(encoder, model).fit(table, np.tanh(2.0 * X[:, 0]) + X[:, 1])
+    pipe = encoded(["fibre"], model, sparse_output=True)
+    pipe.fit(table, np.tanh(2.0 * X[:, 0]) + X[:, 1])
     told = "fibre, x2, x3" if n_inputs == 4 else "29 more inputs"
     text, names = export_text(pipe, precision=17), [f"x{j}" for j in range(n_inputs)]
     listed = text.partition("trained:\n")[2].partition("\nOut")[0].splitlines()

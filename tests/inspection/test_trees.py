@@ -6,14 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
-from sklearn.compose import make_column_transformer
-from sklearn.pipeline import make_pipeline
-from sklearn.preprocessing import OneHotEncoder
 
 from skanfis.inspection import TreeDisplay, export_text
 
 from ..export.rule_bases import MODELS, a_tree, build
 from ..quick import quick
+from .encoded import encoded
 
 plt = pytest.importorskip("matplotlib.pyplot")
 A_TREE = MODELS["tree, order 1, 2 outputs"]
@@ -66,10 +64,8 @@ def test_branches_are_as_thick_as_the_rows_that_take_them():
 def test_cuts_are_called_as_in_the_text(rng):
     X = pd.DataFrame({"price in $": rng.normal(size=400), "shelf": rng.choice(["a", "b"], 400)})
     y = np.where(X["shelf"] == "b", 3.0, np.tanh(9.0 * X["price in $"])) + rng.normal(size=400) / 9
-    encoder = make_column_transformer(
-        (OneHotEncoder(drop="if_binary", sparse_output=False), ["shelf"]), remainder="passthrough"
-    )
-    pipe = make_pipeline(encoder, quick(partition="tree", max_rules=3, order=0)).fit(X, y)
+    model = quick(partition="tree", max_rules=3, order=0)
+    pipe = encoded(["shelf"], model, drop="if_binary").fit(X, y)
     told = re.findall(r"^  IF (.*)$", export_text(pipe), flags=re.MULTILINE)
     asked = {part for premise in told for part in premise.split(" AND ")}
     assert {"shelf is b", "shelf is a"} < asked
@@ -81,10 +77,8 @@ def test_cuts_are_called_as_in_the_text(rng):
 def test_of_a_category_leaves_say_the_value_of_the_text(rng):
     X = pd.DataFrame({"sort": rng.choice(["a", "b", "c"], 400), "rate": rng.normal(size=400)})
     y = np.tanh(9.0 * X["rate"]) * 3.0 + 2.0 * (X["sort"] == "b") - 4.0 * (X["sort"] == "c")
-    encoder = OneHotEncoder(sparse_output=False)
-    encoder = make_column_transformer((encoder, ["sort"]), remainder="passthrough")
     model = quick(partition="tree", max_rules=2, alpha=0.01)
-    pipe = make_pipeline(encoder, model).fit(X, y + 0.1 * rng.normal(size=400))
+    pipe = encoded(["sort"], model).fit(X, y + 0.1 * rng.normal(size=400))
     told = re.findall(r"Rule (\d)[\s\S]*?THEN y is about ([-\d.]+)", export_text(pipe))
     assert len(told) == 2
     values = TreeDisplay.from_estimator(pipe).values

@@ -79,10 +79,9 @@ def test_same_error_after_a_handful_of_passes(few_are_many, full_passes, monkeyp
 @pytest.mark.parametrize(
     "settings", [{"solver": "hybrid", "max_iter": 3}, {"solver": "lse"}], ids=str
 )
-def test_every_way_of_training_ends_on_all_rows(few_are_many, full_passes, settings):
+def test_every_way_of_training_ends_on_all_rows(few_are_many, settings):
     settings = {"solver": VariableProjection(tol=1e-2)} | settings
     model = ANFISRegressor(n_mfs=2, **settings).fit(X, Y)
-    assert full_passes[-1] in ("FirstPass", "JointPass", "_Moments")
     residual = (Y - model.predict(X)) / Y.std()
     assert_allclose(np.mean(residual**2), model.loss_curve_[-1], rtol=1e-9)
     assert model.model_.rule_rows.sum() == pytest.approx(N_ROWS)

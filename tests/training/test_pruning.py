@@ -12,12 +12,6 @@ from skanfis.training.pruning import redundant_rules
 from .. import oracles
 
 
-def scattered(centers, width=0.5):
-    centers = np.array(centers, dtype=float)
-    theta = Gaussian.from_center_and_width(centers, np.full(centers.shape, width))
-    return oracles.own_terms(Gaussian, np.arange(centers.shape[1]), theta)
-
-
 def statistics(rows, antecedent):
     firing = RuleFiring.of(rows, antecedent, 0)
     return firing.overlap / rows.total_weight, firing.peak
@@ -25,7 +19,8 @@ def statistics(rows, antecedent):
 
 def test_rules_far_away_and_rules_alike_are_found():
     rows = oracles.bumpy_rows(np.random.default_rng(0), 300, 2)
-    antecedent = scattered([[-1, 0], [1, 0], [1, 0], [40, 40]])
+    centers = [[-1, 0], [1, 0], [1, 0], [40, 40]]
+    antecedent = oracles.scattered_of_one_width(Gaussian, centers, 0.5)
     found = redundant_rules(*statistics(rows, antecedent))
     assert [entry["rule"] for entry in found] == [2, 3]
     assert [entry["reason"] for entry in found] == ["repeats rule 1", "never fires"]
