@@ -2,9 +2,9 @@
 
 All kinds begin with one rule, a line. A grid grows by one term at a time, beside those that have
 learnt already (``trials`` knows on which input); an input that asks for no terms gets none. Of a
-tree, one leaf at a time is split (``splits``). Scattered rules are half as many again each time,
-on clusters of k-means where the residual of the others is, with terms on the inputs that smaller
-ones have asked for (``conditions`` says which of these may go).
+tree, one leaf at a time is split, or a quarter of many (``splits``). Scattered rules are half as
+many again each time, on clusters of k-means where the residual of the others is, with terms on the
+inputs that smaller ones have asked for (``conditions`` says which of these may go).
 """
 
 import warnings
@@ -81,6 +81,10 @@ class Candidate:
         counts[j] += 1
         return replace(self, counts=tuple(counts))
 
+    def with_more_splits(self, splits):
+        """The tree with these leaves split too; the last come first, which moves no other leaf."""
+        return replace(self, splits=(*self.splits, *sorted(splits, key=lambda one: -one.leaf)))
+
     def with_more_clusters(self, inputs):
         """Half as many scattered rules again, two at least, with terms on these inputs too."""
         number = max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters)))
@@ -96,9 +100,11 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
     """
     known: Any = None if smaller is None else smaller.evaluation.antecedent
     if candidate.splits:
-        *before, last = candidate.splits
-        tree = known if before else TreeAntecedent.build([], [[], []], [[]])
-        return tree.split(last.leaf, last.input, last.cut, last.log_width)
+        is_grown = isinstance(known, TreeAntecedent)
+        tree = known if is_grown else TreeAntecedent.build([], [[], []], [[]])
+        for split in candidate.splits[tree.n_nodes :]:
+            tree = tree.split(split.leaf, split.input, split.cut, split.log_width)
+        return tree
     if not candidate.n_clusters:
         return grid_antecedent(families, candidate.counts, spacing, known=known)
     n_known = 0 if known is None or known.n_rules == 1 else known.n_rules

@@ -36,7 +36,7 @@ class Split:
     log_width: float
 
 
-def best_splits(tuned: Tuned, inputs, crossed, n_most):
+def best_splits(tuned: Tuned, inputs, crossed):
     """Those that the residual asks for most, best first; one of every leaf and input.
 
     z_i are those of the inputs ``crossed``.
@@ -63,7 +63,21 @@ def best_splits(tuned: Tuned, inputs, crossed, n_most):
                 found.append((statistics[best], split))
     # Two inputs may part the rows alike: not the order of columns decides then.
     found.sort(key=lambda pair: (-to_six_digits(pair[0]), pair[1].cut))
-    return [split for _, split in found[:n_most]]
+    return [split for _, split in found]
+
+
+def together(splits, number, n_tried):
+    """So many at once, of different leaves: the best as they are, and one of the next few beside.
+
+    ``splits`` are in order; of none there is none.
+    """
+    best: dict[int, Split] = {}
+    for split in splits:
+        best.setdefault(split.leaf, split)
+    first = list(best.values())[: max(min(number, len(best)) - 1, 0)]
+    leaves = {split.leaf for split in first}
+    rest = [split for split in splits if split.leaf not in leaves]
+    return [[*first, one] for one in rest[:n_tried]]
 
 
 def _scored(column, order, sums, n_basis, variance):

@@ -27,7 +27,7 @@ from .grid import Spacing
 from .judging import ENOUGH, FOLDS
 from .lasso import lasso_inputs
 from .sample import DIGITS, to_six_digits, unit_scale
-from .splits import best_splits
+from .splits import best_splits, together
 from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters; and at least: those of which one fold is
@@ -35,10 +35,12 @@ from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune,
 _ROWS_PER_PARAMETER, FEWEST_SEEN = 40, FOLDS * ENOUGH
 # Steps of the weights that tell what a candidate promises; training goes on from there.
 _STEPS_TO_PROMISE = 1
-# Operations of a pass over a training's rows; solving for n parameters takes those of 10 n rows.
-_MOST_OPERATIONS, _ROWS_OF_SOLUTION = 1e9, 10.0
+# Operations of a pass over all the rows that a candidate needs. More rows never mean fewer rules.
+_MOST_OPERATIONS = 4e9
 # Inputs, or splits, of the largest scores (``TermScores``, ``splits``) that are tried.
 _TRIED = 4
+# Leaves of a tree for each that is split at once.
+_LEAVES_OF_ONE_SPLIT = 4
 # A score beyond this is more than chance.
 _SIGNIFICANT = 2.0
 # Terms on an input for its score: two do not see an odd curve, as of a saturation, beside a line.
@@ -136,8 +138,9 @@ class Trials:
         """What may be the next of a kind, by the residual of a candidate, ``tuned``."""
         crossed = self._crossed(candidate)
         if kind == "tree":
-            splits = best_splits(tuned, self.plan.premise_inputs, crossed, _TRIED)
-            return [replace(candidate, splits=(*candidate.splits, split)) for split in splits]
+            splits = best_splits(tuned, self.plan.premise_inputs, crossed)
+            several = together(splits, candidate.n_rules // _LEAVES_OF_ONE_SPLIT, _TRIED)
+            return [candidate.with_more_splits(some) for some in several]
         scores = TermScores(tuned, self.spacing, crossed)
         if kind == "grid":
             values = scores.of([(j, candidate.counts[j] + _TERMS - 1) for j in self.bell_inputs])
@@ -167,8 +170,7 @@ class Trials:
             return False
         if any(count > self.spacing.n_values(j) for j, count in enumerate(candidate.counts)):
             return False
-        n_rows = self.rows_for(candidate).n_rows + _ROWS_OF_SOLUTION * n
-        return n_rows * n**2 <= _MOST_OPERATIONS
+        return _ROWS_PER_PARAMETER * n**3 <= _MOST_OPERATIONS
 
     def tuned(self, candidate: Candidate) -> Tuned:
         """The end of a candidate's training."""

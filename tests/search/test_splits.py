@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from skanfis.antecedent import TreeAntecedent
 from skanfis.antecedent.tree import CRISP, LEAST_WIDTH
-from skanfis.search.splits import _scored, best_splits
+from skanfis.search.splits import Split, _scored, best_splits, together
 
 from .test_candidates import sample_of, solved
 
@@ -52,7 +52,7 @@ def test_the_statistic_is_the_formula_at_every_cut(rng, n_outputs):
                 expected.append((squares.sum() - 4 * n_outputs) / np.sqrt(8 * n_outputs))
             assert_allclose(found, expected, rtol=1e-9)
             best[leaf, j] = max(expected)
-    splits = best_splits(tuned, range(3), np.arange(3), 6)
+    splits = best_splits(tuned, range(3), np.arange(3))
     order = sorted(best, key=best.get, reverse=True)
     assert [(split.leaf, split.input) for split in splits] == order
 
@@ -64,7 +64,7 @@ def test_cuts_are_as_wide_as_half_of_the_leaf_and_crisp_between_two_values(rng):
     tuned = model_of(X, X[:, 0] ** 2 + X[:, 1] * X[:, 0], NOTHING.split(0, 0, 1.0, -3.0))
     column = tuned.problem.rows.X.T
     own = tuned.problem.rows.sample_weight * tuned.evaluation.antecedent.strengths(column)
-    for split in best_splits(tuned, range(3), np.arange(3), 6):
+    for split in best_splits(tuned, range(3), np.arange(3)):
         if split.input == 1:
             expected = min(0.5 * np.ptp(column[1]) / CRISP, 0.5 * LEAST_WIDTH)
             assert_allclose(split.cut, 0.5 * (column[1].min() + column[1].max()))
@@ -79,8 +79,8 @@ def test_of_inputs_that_part_the_rows_alike_the_order_of_columns_does_not_decide
     x = rng.uniform(-1.0, 1.0, 200)
     X, y = np.column_stack([x, x**3, np.exp(2.0 * x)]), np.abs(x)[:, None]
     order = np.array([2, 0, 1])
-    forth = best_splits(model_of(X, y), range(3), np.empty(0, dtype=int), 3)
-    back = best_splits(model_of(X[:, order], y), range(3), np.empty(0, dtype=int), 3)
+    forth = best_splits(model_of(X, y), range(3), np.empty(0, dtype=int))
+    back = best_splits(model_of(X[:, order], y), range(3), np.empty(0, dtype=int))
     assert [split.input for split in forth] == [order[split.input] for split in back]
 
 
@@ -90,8 +90,21 @@ def test_values_that_differ_by_rounding_are_one(rng):
     wobble = np.where(rng.random(200) < 0.3, np.nextafter(flag, 2.0), flag)
     y = np.where(flag, x, -x)[:, None] + (wobble > 1.0)[:, None]
     exact, found = (
-        best_splits(model_of(np.column_stack([column, x]), y), [0], np.arange(2), 1)[0]
+        best_splits(model_of(np.column_stack([column, x]), y), [0], np.arange(2))[0]
         for column in (flag, wobble)
     )
     assert_allclose(found.cut, exact.cut, atol=1e-8)
     assert_allclose(found.log_width, exact.log_width, atol=1e-8)  # crisp
+
+
+def test_of_several_at_once_each_is_of_another_leaf_and_the_last_is_tried():
+    order = (2, 0), (2, 1), (0, 1), (3, 0), (0, 0), (1, 1), (3, 1)
+    splits = [Split(leaf, j, 0.0, 0.0) for leaf, j in order]
+    found = [[(one.leaf, one.input) for one in some] for some in together(splits, 3, 2)]
+    assert found == [[(2, 0), (0, 1), (3, 0)], [(2, 0), (0, 1), (1, 1)]]
+    for number in (0, 1):
+        assert together(splits, number, 3) == [[one] for one in splits[:3]]
+    # Of no more leaves than there are, the last is tried.
+    assert together(splits, 9, 9) == [[*(splits[k] for k in (0, 2, 3)), splits[5]]]
+    assert together(splits[:2], 5, 9) == [[one] for one in splits[:2]]
+    assert together([], 2, 4) == []

@@ -125,6 +125,34 @@ class TestSequences:
         assert found[0] == (0,)
         assert found[-1] == (0, 2)
 
+    def test_of_a_tree_of_eight_leaves_two_are_split_at_once(self, rng):
+        X, y = surface(rng, 600, 2)
+        trials = trials_of(X, y)
+        sizes, one = [], trials.one_rule
+        while one.n_rules < 10:
+            smaller, one = one, trials.larger("tree", one)
+            sizes.append(one.n_rules)
+        assert sizes == [2, 3, 4, 5, 6, 7, 8, 10]
+        assert one.splits[:7] == smaller.splits
+        later, earlier = one.splits[7:]
+        assert later.leaf > earlier.leaf
+        # Two leaves share what each of the two split ones had; the others are as they were.
+        tuned = trials.tuned(smaller)
+        known = tuned.evaluation.antecedent
+        Z = tuned.problem.rows.X.T
+        tree = rule_base(one, None, [Gaussian] * 2, trials.spacing, 0, tuned)
+        parent = np.repeat(np.arange(8), np.isin(np.arange(8), [later.leaf, earlier.leaf]) + 1)
+        found = np.zeros((8, Z.shape[1]))
+        np.add.at(found, parent, tree.strengths(Z))
+        assert_allclose(found, known.strengths(Z), atol=1e-12)
+
+    def test_more_rows_never_mean_fewer_rules(self, rng):
+        X, y = surface(rng, 12_000, 8)
+        some, many = (trials_of(X[:n], y[:n]) for n in (1000, 12_000))
+        for n_clusters in (12, 18, 27):
+            candidate = Candidate((1,) * 8, n_clusters, tuple(range(8)))
+            assert some._is_small(candidate) == many._is_small(candidate) == (n_clusters < 27)
+
     @pytest.mark.parametrize("kind", ["grid", "tree", "scattered"])
     @pytest.mark.parametrize("most", [None, 4])
     def test_they_end_where_rows_or_the_bound_on_rules_do(self, rng, kind, most):
