@@ -19,8 +19,9 @@ import numpy as np
 
 from .candidates import Candidate
 
-# Of a squared error of the standardised target.
-_ROUNDING = float(np.finfo(float).eps)
+# Of a squared error of the standardised target: nobody reads rules for its sixth digit, and beside
+# an exact line they would take the rounding of numbers for a law.
+_NOTHING = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,12 +63,12 @@ class Judges:
         return float(np.average(squares, weights=self.weight))
 
     def are_less(self, squares, than) -> bool:
-        """Whether squared errors are, by more than one standard error, or rounding."""
+        """Whether squared errors are, by more than one standard error, and than nothing."""
         gain = than - squares
         mean = self.mean(gain)
         excess = np.bincount(self.group, self.weight * (gain - mean))
         error = np.sqrt(np.sum(excess**2)) / np.sum(self.weight)
-        return bool(mean > max(error, _ROUNDING))
+        return bool(mean > max(error, _NOTHING))
 
 
 def best_of(judged, judges: Judges) -> Judged:
