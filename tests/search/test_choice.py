@@ -36,6 +36,12 @@ class TestPrefer:
             assert judges.are_less(after, before) is is_preferred
         assert not judges.are_less(before, before)
 
+    def test_what_is_less_than_a_hundred_thousandth_of_the_deviation_is_nothing(self):
+        """However sure it is: beside an exact line, no rules are read for it."""
+        judges = alike(50)
+        for gain, is_preferred in ((1.01e-5, True), (0.99e-5, False)):
+            assert judges.are_less(np.zeros(50), np.full(50, gain**2)) is is_preferred
+
     def test_rows_of_one_group_are_alike_in_whatever_fold(self):
         X, y, group = np.zeros((3, 1)), np.zeros((3, 1)), np.array([7, 3, 7])
         weight = np.arange(1.0, 4.0)
