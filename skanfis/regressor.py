@@ -76,8 +76,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Given rules lose slopes, and agree, by the same. 0: the best. R2 alone always picks 0 in
         GridSearchCV (:doc:`/choosing`).
     max_rules : int, default=None
-        Most rules that the search may take; None: as many as pay, of 464 parameters at most.
-        ValueError where given rules are more.
+        Most rules that the search may take; None: as many as pay, where several have no more than
+        464 parameters, nor than there are rows. ValueError where given rules are more.
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
         Family of the membership functions, for all inputs or one each: "gaussian", "bell",
         "triangular", "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",

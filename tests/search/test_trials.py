@@ -12,6 +12,7 @@ from skanfis.membership import Gaussian
 from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
+from skanfis.search.splits import Split
 from skanfis.search.trials import _ROWS_PER_PARAMETER, FEWEST_SEEN, Trials
 from skanfis.training.settings import structure_request
 
@@ -147,11 +148,15 @@ class TestSequences:
         assert_allclose(found, known.strengths(Z), atol=1e-12)
 
     def test_more_rows_never_mean_fewer_rules(self, rng):
-        X, y = surface(rng, 12_000, 8)
-        some, many = (trials_of(X[:n], y[:n]) for n in (1000, 12_000))
-        for n_clusters in (12, 18, 27):
-            candidate = Candidate((1,) * 8, n_clusters, tuple(range(8)))
-            assert some._is_small(candidate) == many._is_small(candidate) == (n_clusters < 27)
+        """Up to 464 parameters, as the pages say, or as many as rows."""
+        X, y = surface(rng, 6000, 2)
+        for n_rows, most in ((400, 400), (1000, 464), (6000, 464)):
+            trials, sizes = trials_of(X[:n_rows], y[:n_rows]), {}
+            for n_leaves in range(2, 120):
+                tree = trials.one_rule.with_more_splits([Split(0, 0, 0.0, 0.0)] * (n_leaves - 1))
+                sizes[trials.n_parameters(tree)] = trials._is_small(tree)
+            assert all(is_small == (size <= most) for size, is_small in sizes.items())
+            assert max(sizes) > most
 
     @pytest.mark.parametrize("kind", ["grid", "tree", "scattered"])
     @pytest.mark.parametrize("most", [None, 4])
