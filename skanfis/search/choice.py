@@ -19,8 +19,8 @@ import numpy as np
 
 from .candidates import Candidate
 
-# Of a squared error of the standardised target: nobody reads rules for its sixth digit, and beside
-# an exact line they would take the rounding of numbers for a law.
+# Of the target's variance: nobody reads rules for a hundred-thousandth of its deviation, and beside
+# an exact line what they gain is rounding.
 _NOTHING = 1e-10
 
 
@@ -63,7 +63,7 @@ class Judges:
         return float(np.average(squares, weights=self.weight))
 
     def are_less(self, squares, than) -> bool:
-        """Whether squared errors are, by more than one standard error, and than nothing."""
+        """Whether squared errors are, by more than one standard error, and than next to nothing."""
         gain = than - squares
         mean = self.mean(gain)
         excess = np.bincount(self.group, self.weight * (gain - mean))

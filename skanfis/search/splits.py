@@ -1,4 +1,4 @@
-r"""Which leaf of a tree to split, on which input and where: what the residual of a model asks for.
+r"""Which leaves of a tree to split, on which inputs and where: what a model's residual asks for.
 
 Of a leaf and an input, cuts are looked at between values next to the leaf's quantiles. With p the
 part of the leaf below the cut, h one there and zero above, s w the weight of the rows times the
@@ -66,18 +66,17 @@ def best_splits(tuned: Tuned, inputs, crossed):
     return [split for _, split in found]
 
 
-def together(splits, number, n_tried):
-    """So many at once, of different leaves: the best as they are, and one of the next few beside.
+def together(splits, n_more, n_tried):
+    """Each of the next best splits, beside so many more of other leaves that are taken as they are.
 
-    ``splits`` are in order; of none there is none.
+    ``splits`` are in order; where leaves are too few, one of them is left to be tried on.
     """
     best: dict[int, Split] = {}
     for split in splits:
         best.setdefault(split.leaf, split)
-    first = list(best.values())[: max(min(number, len(best)) - 1, 0)]
-    leaves = {split.leaf for split in first}
-    rest = [split for split in splits if split.leaf not in leaves]
-    return [[*first, one] for one in rest[:n_tried]]
+    taken = dict(list(best.items())[: min(n_more, len(best) - 1)])
+    rest = [split for split in splits if split.leaf not in taken]
+    return [[*taken.values(), one] for one in rest[:n_tried]]
 
 
 def _scored(column, order, sums, n_basis, variance):

@@ -139,7 +139,8 @@ class Trials:
         crossed = self._crossed(candidate)
         if kind == "tree":
             splits = best_splits(tuned, self.plan.premise_inputs, crossed)
-            several = together(splits, candidate.n_rules // _LEAVES_OF_ONE_SPLIT, _TRIED)
+            n_more = max(candidate.n_rules // _LEAVES_OF_ONE_SPLIT - 1, 0)
+            several = together(splits, n_more, _TRIED)
             return [candidate.with_more_splits(some) for some in several]
         scores = TermScores(tuned, self.spacing, crossed)
         if kind == "grid":

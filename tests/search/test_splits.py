@@ -1,4 +1,4 @@
-"""Which leaf a tree splits, where: the statistic row by row, and planted splits found."""
+"""Which leaves a tree splits, where: the statistic row by row, and planted splits found."""
 
 import numpy as np
 import pytest
@@ -100,11 +100,10 @@ def test_values_that_differ_by_rounding_are_one(rng):
 def test_of_several_at_once_each_is_of_another_leaf_and_the_last_is_tried():
     order = (2, 0), (2, 1), (0, 1), (3, 0), (0, 0), (1, 1), (3, 1)
     splits = [Split(leaf, j, 0.0, 0.0) for leaf, j in order]
-    found = [[(one.leaf, one.input) for one in some] for some in together(splits, 3, 2)]
+    found = [[(one.leaf, one.input) for one in some] for some in together(splits, 2, 2)]
     assert found == [[(2, 0), (0, 1), (3, 0)], [(2, 0), (0, 1), (1, 1)]]
-    for number in (0, 1):
-        assert together(splits, number, 3) == [[one] for one in splits[:3]]
+    assert together(splits, 0, 3) == [[one] for one in splits[:3]]
     # Of no more leaves than there are, the last is tried.
-    assert together(splits, 9, 9) == [[*(splits[k] for k in (0, 2, 3)), splits[5]]]
-    assert together(splits[:2], 5, 9) == [[one] for one in splits[:2]]
-    assert together([], 2, 4) == []
+    assert together(splits, 8, 9) == [[*(splits[k] for k in (0, 2, 3)), splits[5]]]
+    assert together(splits[:2], 4, 9) == [[one] for one in splits[:2]]
+    assert together([], 1, 4) == []
