@@ -124,4 +124,5 @@ def _overlap(theta):
     """The most that x is below the first of two cuts times above the second."""
     # The product has its peak within some widths of one of them.
     x = (theta[0] + _AROUND[:, None] * np.exp(theta[1])).ravel()
-    return (SigmoidFalling.value(x, theta[:, :1]) * SigmoidRising.value(x, theta[:, 1:])).max()
+    below, above = (SigmoidFalling, theta[:, :1]), (SigmoidRising, theta[:, 1:])
+    return np.exp(sum(side.log_value(x, own) for side, own in (below, above)).max())

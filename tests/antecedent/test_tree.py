@@ -154,6 +154,12 @@ def test_sides_that_follow_from_others_are_left_out(cuts, widths, left):
         assert np.abs(shorter.strengths(Z) - found.strengths(Z)).max() < 0.011
 
 
+def test_cuts_any_number_of_widths_apart_are_told_from_one_another():
+    theta = np.array([[-1e4, 1e4], [0.0, 0.0]])
+    found = TreeAntecedent.build([0, 0], theta, [[(0, False), (1, False)], [(0, True)]])
+    assert found.without_implied(0.01).rule_terms[0].tolist().count(-1) == 1
+
+
 def test_what_says_no_less_is_the_same_tree():
     whole = tree(5)
     assert whole.without_implied(0.0) is whole
