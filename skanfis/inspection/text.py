@@ -216,11 +216,13 @@ def _inputs_and_rows(model):
 def _deviations(model, found, precision=PRECISION):
     """Say "y varies by 27, about the rules by 11 (standard deviation).", as far as it is known."""
     lines, target = [], model.target
-    # The noise is of a free fit: one with constraints, or a robust one, errs by more.
+    # The noise is of a free fit: one with constraints, or a robust one, errs by more. The target's
+    # scale is, of a robust one, that of rows that are not far off.
     is_known = found is not None and not found.is_of_chunk
     errors = found.measures.deviation * found.measures.errors if is_known else 0.0
     for k, name in enumerate(model.output_names if target else ()):
-        spread = 0.0 if never_changes(target.minimum[k], target.maximum[k]) else target.spread[k]
+        spread = (found.measures.deviation if is_known else target.spread)[k]
+        spread = 0.0 if never_changes(target.minimum[k], target.maximum[k]) else spread
         line = f"{name} varies by {in_digits(spread, precision)}"
         if model.posterior is not None:
             noise = np.maximum(model.posterior.noise, errors)[k]
