@@ -73,11 +73,15 @@ def as_numbers(table, what="X", *, takes_categories=True, floats="d"):
 
 
 def rows_by_name(X, names):
-    """Rows as an array: the columns of a table by their names; ValueError where it lacks any."""
+    """Rows as an array: the columns of a table by their names; ValueError where it lacks any.
+
+    Columns of which none has a name that is a str are taken in their order.
+    """
     refuse_lazy(X=X)
-    lacking = [name for name in names if name not in getattr(X, "columns", names)]
+    is_named = any(isinstance(name, str) for name in getattr(X, "columns", ()))
+    lacking = [name for name in names if is_named and name not in X.columns]
     if not lacking:
-        X = as_numbers(X[list(names)] if hasattr(X, "columns") else X, floats="df")
+        X = as_numbers(X[list(names)] if is_named else X, floats="df")
     if lacking or X.shape[1:] != (len(names),):
         what = f"lacks the column {lacking[0]!r}" if lacking else f"has the shape {X.shape}"
         raise ValueError(f"X {what}: the model takes {', '.join(map(repr, names))}.")

@@ -253,6 +253,8 @@ def test_a_table_is_read_by_its_names_and_other_shapes_are_refused(rng):
     for ask in ("predict", "in_bounds", "strengths", "coverage", "gradient", "way_out"):
         assert_array_equal(getattr(frozen, ask)(table), getattr(frozen, ask)(X))
     assert_array_equal(frozen.predict(X.tolist()), frozen.predict(X))
+    # As scikit-learn has it, numbers are no names.
+    assert_array_equal(frozen.predict(pd.DataFrame(X)), frozen.predict(X))
     name = frozen.input_names[1]
     with pytest.raises(ValueError, match=f"X lacks the column '{name}': the model takes '"):
         frozen.predict(table.drop(columns=name))
