@@ -90,8 +90,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
     monotonic_cst : array-like of shape (n_features,) or dict, default=None
         1 where the target does not fall as the feature rises, -1 where it does not rise, 0 where
-        nothing is known; or these by name; of several outputs a row for each. Certain to hold in
-        the range of the training data and beyond it (:mod:`skanfis.bounds`).
+        nothing is known; or these by name or position; of several outputs a row for each. Certain
+        to hold in the range of the training data and beyond it (:mod:`skanfis.bounds`).
     constraints : list of OutputLimits and FixedPoint, default=None
         Limits of the output, which hold for every row, and values at points; in the units of X as
         it comes here, behind any scaler. See :mod:`skanfis.bounds`.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._validation import feature_indices
+from .._validation import feature_indices, position_of
 
 
 @dataclass(frozen=True)
@@ -166,10 +166,13 @@ class Constraints:
 def _signs(given, input_names, n_outputs):
     n_inputs, told = len(input_names), f"monotonic_cst={given!r}"
     if isinstance(given, Mapping):
-        given = {str(name): sign for name, sign in given.items()}
-        if given:
-            feature_indices(list(given), input_names, "monotonic_cst")
-        given = [given.get(name, 0) for name in input_names]
+        # A column of the name "7" is meant by 7 too.
+        names = [str(name) if str(name) in input_names else name for name in given]
+        if names:
+            feature_indices(names, input_names, "monotonic_cst")
+        places = [position_of(name, input_names) for name in names]
+        by_place = dict(zip(places, given.values(), strict=True))
+        given = [by_place.get(j, 0) for j in range(n_inputs)]
     signs = np.zeros(n_inputs) if given is None else _numbers(given, told)
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):
         raise ValueError(

@@ -84,6 +84,12 @@ def test_signs_are_found_by_the_names_of_columns_that_are_numbers():
     assert_array_equal(one.predict(frame), other.predict(frame))
 
 
+def test_signs_are_found_by_position_where_columns_have_no_names():
+    estimators = [ANFISRegressor(**QUICK, monotonic_cst=given) for given in ({0: 1}, [1, 0])]
+    one, other = (estimator.fit(X, Y) for estimator in estimators)
+    assert_array_equal(one.predict(X), other.predict(X))
+
+
 def test_the_search_judges_what_is_kept(rng):
     """Of a valley told to rise: what is expected of new rows is what the held model leaves."""
     X, X_new = rng.uniform(-1.0, 1.0, (2, 300, 2))
