@@ -134,7 +134,7 @@ def _name_what_is_no_number(table, what, error):
     if not found:
         return
     name, row, value, refusal = found[0]
-    kind = "text" if isinstance(value, str) else f"a {type(value).__name__}"
+    kind = "text" if isinstance(value, str) else f"values of type {type(value).__name__}"
     where = "" if name is None else f" in column {name!r}"
     more = ", ".join(repr(other) for other, *_ in found[1:])
     also = f" So do the columns {more}." if more else ""
@@ -146,8 +146,8 @@ def _name_what_is_no_number(table, what, error):
         advice = f"A {'target' if what == 'y' else 'weight'} must be a number."
     else:
         advice = (
-            "Drop the column, or encode categories as numbers in a Pipeline before "
-            "(OneHotEncoder(drop='if_binary', sparse_output=False) of sklearn.preprocessing)."
+            "Correct the value, drop the column, or encode categories as numbers in a "
+            "Pipeline before (OneHotEncoder(drop='if_binary', sparse_output=False) of sklearn.preprocessing)."
         )
     raise (TypeError if isinstance(refusal, TypeError) else ValueError)(
         f"Input {what} holds {kind}{where}, first at row {row}: {refusal}.{also} {advice}"

@@ -116,7 +116,7 @@ REFUSED = {
     ),
     "target beyond floats": (
         {"y": pd.Series([1] * 59 + [10**400], name="error", dtype=object)},
-        ["y holds a int in column 'error', first at row 59", "too large"],
+        ["y holds values of type int in column 'error', first at row 59", "too large"],
     ),
     "missing group": ({"groups": [None] * N_ROWS}, ["groups has no value for 60 of 60 rows"]),
     "workers": ({"n_jobs": 0}, ["n_jobs == 0"]),
@@ -158,7 +158,7 @@ def test_what_fit_refuses(case):
         fit(**given)
 
 
-TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "Drop the column, or encode"]
+TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "drop the column, or encode"]
 
 
 @pytest.mark.parametrize(
@@ -167,18 +167,21 @@ TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "Drop the colum
         (LO_HI, TEXT),
         (pd.Categorical(LO_HI), TEXT),
         (pd.array(LO_HI, dtype="string"), TEXT),
-        (["1.5", "2"] * 20 + LO_HI[:20], ["text in column 'rate', first at row 40", "'lo'"]),
-        (pd.Series([[1]] * N_ROWS), ["holds a list in column 'rate', first at row 0"]),
-        (pd.Series(list(X)), ["holds a ndarray in column 'rate', first at row 0"]),
+        (["1.5", "2"] * 20 + LO_HI[:20], ["first at row 40", "'lo'", "Correct the value"]),
+        (pd.Series([[1]] * N_ROWS), ["holds values of type list in column 'rate', first at row 0"]),
+        (pd.Series(list(X)), ["holds values of type ndarray in column 'rate', first at row 0"]),
         (TIMES, ["X holds times in column 'rate' (datetime64", "number of seconds"]),
         (TIMES.tz_localize("UTC"), ["X holds times in column 'rate' (datetime64", "UTC"]),
         (TIMES.to_period(), ["X holds times in column 'rate' (period"]),
-        (TIMES.date.astype(object), ["a date in column 'rate', first at row 0", "of seconds"]),
+        (
+            TIMES.date.astype(object),
+            ["values of type date in column 'rate', first at row 0", "of seconds"],
+        ),
         (pd.Categorical(TIMES), ["X holds times in column 'rate' (datetime64", "of seconds"]),
         ([1.5, pd.NA] * 30, ["a missing value in column 'rate', first at row 1", "impute"]),
         (
             np.array([1, 10**400] * 30, dtype=object),
-            ["a int in column 'rate', first at row 1", "too large"],
+            ["values of type int in column 'rate', first at row 1", "too large"],
         ),
     ],
 )
