@@ -24,6 +24,7 @@ from .._sklearn import check_sample_weight, safe_indexing
 from .._validation import as_numbers, check_finite, group_numbers, positive_weights
 from ..exceptions import OutOfBoundsWarning
 from ..export.folding import final_step
+from ..naming import default_output_names
 
 # Least deviation, as a part of the target's range: an exact fit has none to divide by.
 _LEAST_DEVIATION = 1e-12
@@ -57,7 +58,7 @@ def checked_targets(y, sample_weight, groups):
         raise ValueError("ConformalRegressor requires y to be passed, but the target y is None.")
     targets = as_numbers(y, "y")
     by_output = targets.reshape(len(targets), -1)
-    check_finite(by_output, "y", [f"y{k}" for k in range(by_output.shape[1])])
+    check_finite(by_output, "y", default_output_names(by_output.shape[1]))
     if sample_weight is not None:
         sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
         positive_weights(sample_weight, len(targets))

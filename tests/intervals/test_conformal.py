@@ -245,7 +245,7 @@ def test_bad_input_is_refused_by_name(match, params, given):
 
 def test_levels_and_missing_numbers_are_refused_by_name():
     X, y = bent(np.random.default_rng(0), 24)
-    with pytest.raises(ValueError, match="Input y contains NaN in column 'y0', first at row 3"):
+    with pytest.raises(ValueError, match="Input y contains NaN in column 'y', first at row 3"):
         ConformalRegressor(RULES).fit(X, np.where(np.arange(24) == 3, np.nan, y))
     model = ConformalRegressor(RULES, cv=4).fit(X, y)
     with pytest.raises(ValueError, match=r"coverage=90 must be a number between 0 and 1"):
