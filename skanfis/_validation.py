@@ -146,8 +146,8 @@ def _name_what_is_no_number(table, what, error):
         advice = f"A {'target' if what == 'y' else 'weight'} must be a number."
     else:
         advice = (
-            "Correct the value, drop the column, or encode categories as numbers in a "
-            "Pipeline before (OneHotEncoder(drop='if_binary', sparse_output=False) of sklearn.preprocessing)."
+            "Correct the value, drop the column, or encode categories as numbers in a Pipeline "
+            "before: OneHotEncoder(drop='if_binary', sparse_output=False) of sklearn.preprocessing."
         )
     raise (TypeError if isinstance(refusal, TypeError) else ValueError)(
         f"Input {what} holds {kind}{where}, first at row {row}: {refusal}.{also} {advice}"
