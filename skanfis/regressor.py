@@ -11,6 +11,7 @@ from typing import Any, ClassVar, Literal, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.cluster import KMeans
 from sklearn.utils.metaestimators import available_if
 from sklearn.utils.validation import check_is_fitted, validate_data
 
@@ -40,8 +41,9 @@ from .training.chunks import RowSums, fitted_weights, inputs_with_slopes, solve
 from .training.data import NUMERIC, Fitted
 from .training.settings import given_weights, solver_of, structure_request
 
-# Parameters of which a word stands for an object's defaults.
+# Parameters that are words or objects with settings: such an object.
 _OBJECTS: dict[str, type] = {
+    "partition": KMeans,
     "solver": VariableProjection,
     "loss": Huber,
     "early_stopping": EarlyStopping,
@@ -288,10 +290,11 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             given = params.get(name, getattr(self, name, None))
             if setting and name in _OBJECTS and isinstance(given, str | bool):
                 of_word = SOLVERS.get(str(given), _OBJECTS[name])
+                module = {"solver": "skanfis.learning", "partition": "sklearn.cluster"}
                 raise ValueError(
-                    f"{key} is a setting of an object, but {name}={given!r} is a word for its "
-                    f"defaults: give {name}={of_word.__name__}(), of "
-                    f"skanfis.{'learning' if name == 'solver' else 'options'}, in its place."
+                    f"{key} is a setting of an object, but {name}={given!r} is a word: give "
+                    f"{name}={of_word.__name__}(), of {module.get(name, 'skanfis.options')}, in "
+                    "its place."
                 )
         return super().set_params(**params)
 

@@ -414,6 +414,7 @@ def test_parameter_of_the_wrong_type_or_range(parameter, value, allowed):
     [
         ({}, "solver__stiffness", "give solver=VariableProjection(), of skanfis.learning"),
         ({"solver": "hybrid"}, "solver__step_size", "solver='hybrid'.*give solver=Hybrid()"),
+        ({}, "partition__n_clusters", "give partition=KMeans(), of sklearn.cluster"),
         ({"loss": "huber"}, "loss__epsilon", "give loss=Huber(), of skanfis.options"),
         ({}, "early_stopping__tol", "early_stopping=False.*give early_stopping=EarlyStopping()"),
         ({}, "out_of_bounds__max_extrapolation", "give out_of_bounds=LinearExtrapolation()"),
