@@ -79,7 +79,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         GridSearchCV (:doc:`/choosing`).
     max_rules : int, default=None
         Most rules that the search may take; None: as many as pay, where several have no more than
-        464 parameters, nor than there are rows. ValueError where given rules are more.
+        464 parameters, nor than there are distinct rows. ValueError where given rules are more.
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
         Family of the membership functions, for all inputs or one each: "gaussian", "bell",
         "triangular", "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",
