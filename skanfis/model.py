@@ -76,8 +76,6 @@ class TSKModel:
         What coverage, deviations and limits of the outputs are computed from; None without data.
     term_names, output_names : tuple of str
         Where not given, see ``naming``.
-    rows_extrapolation : float or None
-        The L that the outermost training rows support, see ``training.freezing``.
     tangent_at : ndarray of shape (n_inputs,) or None
         Medians of the inputs that an output must rise or fall with, NaN for the others.
     levels : dict
@@ -102,7 +100,6 @@ class TSKModel:
     output_names: tuple[str, ...] = ()
     target: TargetRange | None = None
     posterior: Posterior | None = None
-    rows_extrapolation: float | None = None
     tangent_at: np.ndarray | None = None
     levels: Mapping[str, Any] = field(default_factory=dict)
 
@@ -369,25 +366,17 @@ class TSKModel:
             return self
         return replace(self, out_of_bounds=policy, max_extrapolation=float(limit))
 
-    @property
-    def told_extrapolation(self) -> float:
-        """The L that the outermost training rows support; ``max_extrapolation`` if not known."""
-        told = self.rows_extrapolation
-        return self.max_extrapolation if told is None else told
-
     @cached_property
     def _supported_extrapolation(self):
-        """The L of "auto": what the outermost rows support.
+        """The L of "auto": the target's deviation over the noise, of several outputs the least.
 
-        For a line it is at least the target's deviation over the noise: over each deviation of an
-        input, the target is taken to bend by no more than the noise.
+        Over each deviation of an input, the target is taken to bend by no more than the noise.
         """
-        told, target, posterior = self.told_extrapolation, self.target, self.posterior
-        is_told = self.rows_extrapolation not in (None, MAX_EXTRAPOLATION)
-        if self.n_rules > 1 or not is_told or target is None or posterior is None:
-            return told
+        target, posterior = self.target, self.posterior
+        if target is None or posterior is None:
+            return MAX_EXTRAPOLATION
         of_noise = target.spread / np.maximum(posterior.noise, target.spread / FARTHEST)
-        return max(float(f"{of_noise.min():.3g}"), told)
+        return float(f"{of_noise.min():.3g}")
 
     def _by_block(self, X, of_block, n_columns, n_more=0):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).

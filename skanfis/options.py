@@ -91,8 +91,8 @@ class LinearExtrapolation(BaseEstimator):
     max_extrapolation : float or "auto", default="auto"
         How far the tangent is followed beyond the range of an input, in standard deviations of that
         input; the value reached is held. 0 is "clip"; ``math.inf`` is the tangent without end.
-        "auto": as far as the outermost training rows show it to pay, half a one otherwise; a single
-        rule, a line, as far as the noise allows. See :doc:`/mathematics`.
+        "auto": so many of them as the target's deviation is times that of the noise, a hundred at
+        most; half a one where the noise is not known. See :doc:`/mathematics`.
 
     Examples
     --------

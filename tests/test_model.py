@@ -12,7 +12,7 @@ from skanfis import ANFISRegressor, model
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.export import export_json, read_json
 from skanfis.membership import Bell, Gaussian
-from skanfis.policies import TargetRange
+from skanfis.policies import MAX_EXTRAPOLATION, TargetRange
 
 from . import oracles
 from .export import rule_bases
@@ -167,12 +167,10 @@ def test_tangents_do_not_change_with_inputs_that_are_held_elsewhere(frozen, rng)
     assert_allclose(held.predict(edge), frozen.predict(nearest), atol=1e-6)
 
 
-def test_auto_is_what_the_rows_told_and_what_is_set_where_there_were_none():
+def test_auto_is_half_a_deviation_where_the_noise_is_not_known():
     far = build(grid()).with_out_of_bounds("linear", 2.0)
-    assert far.with_out_of_bounds("linear", "auto").max_extrapolation == 2.0
-    told = replace(far, rows_extrapolation=3.0)
-    assert told.n_rules > 1
-    assert told.with_out_of_bounds("linear", "auto").max_extrapolation == 3.0
+    assert far.with_out_of_bounds("linear").max_extrapolation == 2.0
+    assert far.with_out_of_bounds("linear", "auto").max_extrapolation == MAX_EXTRAPOLATION
 
 
 @ALL

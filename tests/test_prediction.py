@@ -12,7 +12,7 @@ from sklearn.base import clone
 from skanfis import ANFISRegressor
 from skanfis.exceptions import OutOfBoundsWarning
 from skanfis.options import LinearExtrapolation
-from skanfis.policies import FARTHEST, MAX_EXTRAPOLATION
+from skanfis.policies import FARTHEST
 
 from . import oracles
 from .memory import traced
@@ -42,7 +42,7 @@ def test_out_of_bounds_rows_are_reported(trained):
         rf"'time' in 1 of 4 rows .*'temperature' in 2 of 4 rows "
         rf"\(trained on \[{low:.6g}, {high:.6g}\], found \[20, 120\]\); "
         rf"'rate' in 1 of 4 rows .*Policy: out_of_bounds='linear', "
-        rf"max_extrapolation={MAX_EXTRAPOLATION}"
+        rf"max_extrapolation={trained.model_.max_extrapolation}"
     )
     with pytest.warns(OutOfBoundsWarning, match=message) as caught:
         trained.predict(OUTSIDE)
@@ -57,17 +57,14 @@ def with_policy(estimator, policy):
     return clone(estimator).set_params(out_of_bounds=policy).fit(FRAME, Y)
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("noise", [0.0, 0.1, 0.3, 3.0])
 def test_line_is_followed_for_as_many_deviations_as_the_target_has_of_the_noise(rng, noise):
-    """Or as far as the outermost rows tell, where that is farther; accounts that add up, far."""
+    """Accounts that add up, far."""
     X = rng.lognormal(sigma=1.0, size=(200, 4))
     y = X @ [1.0, 2.0, 0.5, 1.5] + noise * rng.normal(size=200)
     model = ANFISRegressor(n_mfs=1).fit(X, y)
     limit = model.model_.max_extrapolation
-    told = model.model_.rows_extrapolation
-    expected = max(y.std() / model.noise_std_, told) if noise else FARTHEST
-    assert limit == pytest.approx(expected, rel=5e-3)
-    assert (limit == told) is (noise == 0.3)
+    assert limit == pytest.approx(y.std() / model.noise_std_ if noise else FARTHEST, rel=5e-3)
     # The noise that was planted, to what 200 rows tell of it.
     assert model.noise_std_ == pytest.approx(noise, rel=0.15, abs=1e-3)
     edge = X.max(axis=0)
@@ -76,6 +73,18 @@ def test_line_is_followed_for_as_many_deviations_as_the_target_has_of_the_noise(
         held = min(expected[0, 0], y.max() + limit * y.std())
         found = model.predict(edge[None] + way * X.std(axis=0))
         assert_allclose(found, held, rtol=1e-6)
+
+
+def test_rules_are_followed_as_far_as_the_output_with_most_noise_allows(rng):
+    """Whatever policy they were fitted with."""
+    y = np.column_stack([Y, Y]) + [0.01, 0.2] * rng.normal(size=(240, 2))
+    model = quick(2, out_of_bounds=LinearExtrapolation(math.inf)).fit(FRAME, y)
+    limit = min(y.std(axis=0) / model.noise_std_)
+    assert limit == pytest.approx(y[:, 1].std() / 0.2, rel=0.2)
+    found = model.set_params(out_of_bounds="linear").predict(OUTSIDE)
+    followed = oracles.held_tangent(model.model_, OUTSIDE.to_numpy(), float(f"{limit:.3g}"))
+    margin = 0.25 * np.ptp(y, axis=0)
+    assert_allclose(found, followed.clip(y.min(axis=0) - margin, y.max(axis=0) + margin))
 
 
 def test_policy_may_be_changed_after_training(trained):

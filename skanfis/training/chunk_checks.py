@@ -138,7 +138,6 @@ def named_premises(model: TSKModel, data):
         input_names=data.input_names,
         output_names=data.output_names,
         posterior=None,
-        rows_extrapolation=model.told_extrapolation,
     )
 
 

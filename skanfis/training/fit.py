@@ -30,7 +30,7 @@ from ..model import TSKModel
 from ..options import EarlyStopping, Huber, policy_of
 from ..search import Start, StructureRequest, report_constant
 from .data import Fitted, SolverRun, ValidatedData
-from .freezing import as_given, extrapolation_distance, frozen_model
+from .freezing import as_given, frozen_model
 from .robust import huber_weights, reweighted, robust_start, silenced, without_outliers
 from .settings import solver_of
 from .watching import Callbacks, Printer, ValidationLoss, hold_out, watch_all
@@ -205,10 +205,7 @@ class _Fit:
         return model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
 
     def frozen(self, run: SolverRun, weights: np.ndarray | None) -> Fitted:
-        """The model of a run, its posterior, and how far its tangent may be followed.
-
-        ``weights`` are those of Huber's loss.
-        """
+        """The model of a run, and its posterior; ``weights`` are those of Huber's loss."""
         rows = self.rows
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
@@ -222,10 +219,7 @@ class _Fit:
         assert model.support is not None
         marginals = input_marginals(rows, run.evaluation.antecedent)
         support = replace(model.support, marginals=marginals)
-        model = replace(model, posterior=posterior, support=support)
-        told = rows if weights is None else reweighted(rows, weights)
-        distance = extrapolation_distance(model, told)
-        model = self._answering(replace(model, rows_extrapolation=distance))
+        model = self._answering(replace(model, posterior=posterior, support=support))
         if weights is not None:
             every = np.full(len(self.data.X), np.nan)
             every[self.trained_on] = weights

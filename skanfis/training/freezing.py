@@ -1,11 +1,4 @@
-r"""From where a run has ended to the frozen model, in the user's units.
-
-How far beyond the data the tangent may be followed is told by the outermost rows. Had the box ended
-at the quartiles of every input, most rows would have been beyond it. The distance is that at which
-the tangent from there errs least, if noise and error are then below a quarter of what they are at
-half a deviation; else it is a half. Distances beyond the outermost row all tell the same, and the
-least of them counts.
-"""
+"""From where a run has ended to the frozen model, in the user's units."""
 
 from dataclasses import replace
 
@@ -19,7 +12,7 @@ from ..learning.objective import Evaluation
 from ..learning.penalty import Penalty
 from ..model import TSKModel
 from ..options import policy_of
-from ..policies import FARTHEST, MAX_EXTRAPOLATION, TargetRange
+from ..policies import TargetRange
 from ..search import (
     Start,
     StructureRequest,
@@ -30,11 +23,6 @@ from ..search import (
 from .data import Fitted, ValidatedData
 from .pruning import redundant_rules
 
-_DISTANCES = (MAX_EXTRAPOLATION, 1.0, 2.0, 5.0, 20.0, FARTHEST)
-# Less of the squared error is more than chance: with a half in place of a quarter, one fit in
-# twenty is 4 % worse on rows beyond the range, with a quarter none.
-_DECISIVE = 0.25
-_QUARTILE = 0.25  # at which the box is taken to end
 # More rows tell nothing new.
 _MOST_ROWS = 2000
 
@@ -97,7 +85,6 @@ def as_given(estimator, data, model) -> Fitted:
         initial_antecedent=model.antecedent,
         input_names=data.input_names,
         output_names=data.output_names,
-        rows_extrapolation=model.told_extrapolation,
     )
     rows = data.rows()
     # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
@@ -109,37 +96,3 @@ def as_given(estimator, data, model) -> Fitted:
     result = SolverResult(None, np.full(2, loss), 0, "as_given")
     start = Start(model.antecedent, Penalty(), np.arange(model.n_inputs))
     return Fitted(model, result, start, redundant)
-
-
-def extrapolation_distance(model: TSKModel, rows: StandardisedData) -> float:
-    """L of the tangent beyond the data, in standard deviations of every input, a half or more.
-
-    ``model`` is in the user's units, ``rows`` are those that it was trained on.
-    """
-    table, weight, _ = representative_rows(rows.sample or rows, _MOST_ROWS)
-    X, y = np.hsplit(table, [model.n_inputs])
-    X = np.clip(rows.inputs.offset + rows.inputs.scale * X, model.minimum, model.maximum)
-    y = rows.targets.offset + rows.targets.scale * y
-    low, high = (
-        np.array([weighted_quantile(column, weight, _QUARTILE, side) for column in X.T])
-        for side in (1, -1)
-    )
-    nearest = np.clip(X, low, high)
-    is_beyond = (nearest != X).any(axis=1)
-    # A model too large for a posterior knows of no noise to compare with.
-    if not is_beyond.any() or model.posterior is None:
-        return MAX_EXTRAPOLATION
-    X, y, nearest, weight = X[is_beyond], y[is_beyond], nearest[is_beyond], weight[is_beyond]
-    way = (X - nearest) / model.spread
-    free = replace(model, target=None)  # outputs are not held
-    values, slopes = free.predict(nearest), free.gradient(nearest) * model.spread[:, None]
-    noise = float(np.sum((model.posterior.noise / rows.targets.scale) ** 2))
-
-    def left_by(distance):
-        told = values + np.einsum("nj,njo->no", np.clip(way, -distance, distance), slopes)
-        squares = ((told - y) / rows.targets.scale) ** 2
-        return float(np.average(squares, axis=0, weights=weight).sum()) + noise
-
-    left = [left_by(distance) for distance in _DISTANCES]
-    best = int(np.argmin(left))
-    return _DISTANCES[best] if left[best] < _DECISIVE * left[0] else MAX_EXTRAPOLATION
