@@ -103,6 +103,7 @@ class TestFits:
         assert estimator.predict(X).shape == (N_ROWS, 2)
         assert estimator.model_.order == order
 
+    @pytest.mark.theory
     def test_weight_of_two_is_the_row_twice(self, kind):
         kept = WEIGHT > 0
         model = searched(kind, max_rules=3)
@@ -131,6 +132,7 @@ class TestFits:
         if settings == {"max_iter": 0}:
             assert_array_equal(estimator.predict(X), start.predict(X))
 
+    @pytest.mark.theory
     def test_early_stopping_groups_and_losses(self, kind):
         assert_is(searched(kind, early_stopping=True, loss="huber", max_rules=4).fit(X, Y), kind)
         assert_is(searched(kind, max_rules=4).fit(X, Y, groups=np.arange(N_ROWS) // 40), kind)

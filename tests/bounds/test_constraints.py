@@ -84,6 +84,7 @@ def test_signs_are_found_by_the_names_of_columns_that_are_numbers():
     assert_array_equal(one.predict(frame), other.predict(frame))
 
 
+@pytest.mark.theory
 def test_the_search_judges_what_is_kept(rng):
     """Of a valley told to rise: what is expected of new rows is what the held model leaves."""
     X, X_new = rng.uniform(-1.0, 1.0, (2, 300, 2))
@@ -98,6 +99,7 @@ def test_the_search_judges_what_is_kept(rng):
     assert left > 0.25
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("kind", ["tree", "grid", "scattered"])
 def test_predictions_rise_beyond_the_range_too(kind):
     """It is proven, and so are steps up from anywhere; the free fit falls there."""
@@ -203,6 +205,7 @@ def test_points_are_met_by_a_line_where_the_data_ask_for_no_slopes():
     assert held.constraints_["drawn"] == 1.0
 
 
+@pytest.mark.theory
 def test_a_known_input_that_says_nothing_is_not_read():
     """It rises by not changing, as the free fit has it."""
     rng = np.random.default_rng(1)
@@ -343,6 +346,7 @@ def test_a_constant_keeps_a_limit_that_the_data_contradict():
     assert_allclose(held.predict(X), 5.0, atol=2e-3 * Y.std())
 
 
+@pytest.mark.theory
 def test_a_kind_goes_on_while_its_free_rules_gain(rng):
     # A bias of temperature and a wave of the rate: terms on both, before either pays in order.
     X, fresh = rng.uniform(size=(200, 2)), rng.uniform(0.02, 0.98, (2000, 2))

@@ -87,6 +87,7 @@ def kept(problem, evaluation, order):
     )
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_in_order_rises(kind):
     """50 random models of a kind: rows, and the proof that knows nothing of an order."""

@@ -29,6 +29,7 @@ def points_in(rng, low, high):
 
 
 # All of them, with many more rows, are gone through in benchmarks/certain.py.
+@pytest.mark.theory
 @pytest.mark.parametrize("number", range(0, len(CASES), 3))
 def test_nothing_is_beyond_the_bounds(number):
     rng = np.random.default_rng(number)

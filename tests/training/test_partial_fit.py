@@ -361,6 +361,7 @@ def test_a_constant_target_at_first_settles_nothing():
     assert model.score(X[100:], y[100:]) > 0.9
 
 
+@pytest.mark.theory
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
 def test_an_input_that_rounding_alone_changes_has_no_slope_to_leave_out(rng):
     X, y = surface(300)
