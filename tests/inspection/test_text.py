@@ -84,6 +84,7 @@ def test_what_is_printed_is_measured_and_in_full_digits_it_is_the_model(model, p
     assert_allclose(predicted(text, rows), printed.predict(rows), atol=1e-9, rtol=1e-9)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("partition", ["grid", "tree", "scattered"])
 def test_the_text_of_a_fit_errs_as_the_last_line_says(partition):
     rng = np.random.default_rng(3)

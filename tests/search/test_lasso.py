@@ -107,6 +107,7 @@ def test_a_stream_goes_on_with_the_inputs_of_its_first_chunk(rng, alpha):
     assert_allclose(model.model_.coefficients[0, 1:3, 0], 1.0, atol=0.05)
 
 
+@pytest.mark.theory
 def test_a_column_that_has_not_yet_changed_may_gain_a_slope(rng):
     X = rng.standard_normal((160, 30))
     X[:60, 1] = 0.0
