@@ -104,7 +104,9 @@ def test_rows_that_were_not_trained_on_have_no_weight():
 
 # The weights may still move in the third digit.
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")
-@pytest.mark.parametrize(("settings", "size"), [({"partition": "grid", "max_rules": 9}, 1e6), ({"n_mfs": 4}, 1e3)])
+@pytest.mark.parametrize(
+    ("settings", "size"), [({"partition": "grid", "max_rules": 9}, 1e6), ({"n_mfs": 4}, 1e3)]
+)
 def test_outliers_do_not_decide_on_the_start(settings, size, rng):
     X = rng.uniform(-1, 1, (300, 2))
     truth = np.sin(3 * X[:, 0]) * X[:, 1]
