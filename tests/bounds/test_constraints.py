@@ -84,7 +84,6 @@ def test_signs_are_found_by_the_names_of_columns_that_are_numbers():
     assert_array_equal(one.predict(frame), other.predict(frame))
 
 
-@pytest.mark.theory
 def test_the_search_judges_what_is_kept(rng):
     """Of a valley told to rise: what is expected of new rows is what the held model leaves."""
     X, X_new = rng.uniform(-1.0, 1.0, (2, 300, 2))
@@ -99,7 +98,6 @@ def test_the_search_judges_what_is_kept(rng):
     assert left > 0.25
 
 
-@pytest.mark.theory
 @pytest.mark.parametrize("kind", ["tree", "grid", "scattered"])
 def test_predictions_rise_beyond_the_range_too(kind):
     """It is proven, and so are steps up from anywhere; the free fit falls there."""
