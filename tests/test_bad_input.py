@@ -279,7 +279,7 @@ def flat(column, value=4.25):
     return with_entry(X, (slice(None), column), value)
 
 
-@pytest.mark.parametrize("settings", [{"n_mfs": [3, 2]}, {"max_rules": 3}, {"partition": KMEANS}])
+@pytest.mark.parametrize("settings", [{"n_mfs": [3, 2]}, {"max_rules": 2}, {"partition": KMEANS}])
 def test_constant_columns_cost_nothing_however_many_they_are(settings, rng):
     """They get no terms and are no slopes that a row has to pay for, in no count of parameters."""
     inputs = rng.uniform(-1.0, 1.0, (60, 2))

@@ -11,6 +11,8 @@ from sklearn import gaussian_process
 
 from skanfis import datasets
 
+from .quick import with_few_candidates
+
 plt = pytest.importorskip("matplotlib.pyplot")
 SCRIPT = Path(__file__).parents[1] / "examples" / "plot_gyro_compensation.py"
 if not SCRIPT.is_file():
@@ -20,10 +22,11 @@ pytestmark = pytest.mark.page
 
 
 def test_the_rules_do_better_on_runs_held_out_than_what_is_simpler(tmp_path, monkeypatch):
-    """Of fewer rows; they are whole runs within the temperatures of the others."""
+    """Of fewer rows and candidates; they are whole runs within the temperatures of the others."""
     every = datasets.make_ofog
     fewer = {"sampling_interval": 45.0, "n_runs": 9}
     monkeypatch.setattr(datasets, "make_ofog", lambda **options: every(**(options | fewer)))
+    with_few_candidates(monkeypatch)
     # Its kernel as it is given: what the process leaves is not asked for below.
     process = partial(gaussian_process.GaussianProcessRegressor, optimizer=None)
     monkeypatch.setattr(gaussian_process, "GaussianProcessRegressor", process)

@@ -41,6 +41,7 @@ def test_what_floats_do_not_hold_is_refused(x_scale, y_scale, message, settings)
         ANFISRegressor(**settings).fit(X * x_scale, Y * y_scale)
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("x_scale", [1e-97, 1e97])
 @pytest.mark.parametrize("y_scale", [1e-97, 1e97])
 def test_what_floats_hold_is_learnt(x_scale, y_scale):
@@ -48,6 +49,7 @@ def test_what_floats_hold_is_learnt(x_scale, y_scale):
     assert_allclose(found / y_scale, plain_predictions(), rtol=0, atol=1e-6 * np.ptp(Y))
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize(
     ("value", "settings"),
     [

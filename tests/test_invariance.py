@@ -157,7 +157,7 @@ def test_order_of_the_inputs_of_a_grid(name):
     case.assert_same(case.fit(case.X[:, order], case.y, n_mfs=n_mfs).predict(case.X[:, order]))
 
 
-@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"max_rules": 3}], ids=str)
+@pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"max_rules": 2}], ids=str)
 def test_order_of_inputs_and_outputs_where_rows_stand_for_many(settings, monkeypatch):
     # As beyond 1,000 rows, and 20,000: on 40 of 120.
     monkeypatch.setattr(start, "FEWEST_SEEN", 40)
@@ -217,7 +217,7 @@ def test_structure_that_is_chosen_by_itself(name):
     # Units, offsets, repeated rows and their order, all at once: the same choice, the same fit.
     X, y = DATA[name]()
     weight = np.random.default_rng(2).integers(1, 4, len(y))
-    model = ANFISRegressor(max_rules=4)
+    model = ANFISRegressor(max_rules=3)
     plain = clone(model).fit(X, y, weight)
     *units, unit = alternating(X.shape[1], 6)
     far = (X + 1e4 * np.ptp(X, axis=0)) * units

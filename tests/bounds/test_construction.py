@@ -87,12 +87,13 @@ def kept(problem, evaluation, order):
     )
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_in_order_rises(kind):
-    """100 random models of a kind: rows, and the proof that knows nothing of an order."""
+    """50 random models of a kind: rows, and the proof that knows nothing of an order."""
     rng = np.random.default_rng(5)
     falls = n_proven = n_asked = 0
-    for place in range(100):
+    for place in range(50):
         # One input rises or falls, or two; scattered rules may be in other orders by the other.
         signs, order = np.array([1, -1, 0])[rng.integers(0, 3, 2)], place % 2
         if not signs.all() or kind == "scattered":
@@ -118,7 +119,7 @@ def test_what_is_in_order_rises(kind):
             n_proven, n_asked = n_proven + (found.bound <= until), n_asked + 1
     # A slope that touches zero inside the range takes more boxes than these.
     assert n_proven > 0.7 * n_asked
-    assert falls > 10 or kind == "one rule"
+    assert falls > 5 or kind == "one rule"
 
 
 @pytest.mark.parametrize("kind", ["tree", "grid"])

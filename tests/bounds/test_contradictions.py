@@ -48,9 +48,10 @@ def test_a_point_out_of_range_is_held_to_what_is_answered_there(policy, rng):
         assert bool(found) == is_against
 
 
+@pytest.mark.theory
 def test_what_is_true_is_not_contradicted():
     """Draws of a saturation, which is flat for half of the range, by three terms."""
-    for seed in range(12):
+    for seed in range(8):
         rng = np.random.default_rng(seed)
         X = rng.uniform(-1.0, 1.0, (100, 2))
         y = np.minimum(X[:, 0], 0.0) + 0.3 * rng.normal(size=100)

@@ -61,7 +61,7 @@ def expected_outputs(model, X, status, std):
         pytest.param("double", "c99", slice(None), [], id="double"),
         pytest.param("float", "c99", slice(None), [], id="float", marks=pytest.mark.theory),
         # C89 differs by its exp and log alone: a part of the models is met by the sanitizers.
-        pytest.param("double", "c89", slice(1, None, 3), SANITIZE, marks=pytest.mark.theory),
+        pytest.param("double", "c89", slice(1, None, 5), SANITIZE, marks=pytest.mark.theory),
     ],
 )
 def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path):

@@ -136,6 +136,7 @@ def expected(model, X):
     return rate, status, ~unsure
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize(
     ("dtype", "limit", "std"), [("double", 1e-12, "c99"), ("float", 1e-5, "c89")]
@@ -173,6 +174,7 @@ def test_answers_as_predict(case, dtype, limit, std, tmp_path):
     np.testing.assert_array_equal(silence, nothing)
 
 
+@pytest.mark.theory
 @needs_compiler
 def test_no_rate_where_the_law_has_none(tmp_path):
     model, X = whole()

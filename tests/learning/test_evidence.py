@@ -135,6 +135,7 @@ KINDS = {
 
 
 class TestAtGivenPremises:
+    @pytest.mark.theory
     @pytest.mark.parametrize("kind", KINDS)
     @pytest.mark.parametrize("order", [0, 1])
     @pytest.mark.parametrize("n_outputs", [1, 2])

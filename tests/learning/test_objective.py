@@ -136,6 +136,7 @@ def test_evaluation_is_that_of_the_dense_ridge_regression(case):
     assert_allclose(found.masses, firing @ dense.weight, rtol=1e-11, atol=1e-15)
 
 
+@pytest.mark.theory
 def test_gradient_is_exact_far_from_the_optimum_and_gauss_newton_the_schur_complement(case):
     _, linearisation = case.at_point()
     expected = case.dense.gradient(case.point)

@@ -87,6 +87,7 @@ class TestAgreement:
         assert_allclose(tuning._most_agreement(apart, np.inf), 1.0, rtol=0.05)
 
 
+@pytest.mark.theory
 def test_premises_may_take_more_than_half_of_the_rows():
     # Few rows, and terms of many parameters.
     x = np.linspace(-1.0, 1.0, 20)

@@ -11,7 +11,7 @@ from skanfis.learning.data import StandardisedData
 
 from ..quick import quick
 
-N_ROWS, N_SAMPLE = 12_000, 3000
+N_ROWS, N_SAMPLE = 8000, 2000
 
 
 G = np.random.default_rng(0)
@@ -49,7 +49,8 @@ def test_repeated_rows_are_no_weights_that_a_clusterer_must_take(few_are_many):
     assert quick(partition=mixture).fit(X.round(1), Y.round(1)).n_rules_ == 3
 
 
-@pytest.mark.parametrize("settings", [{"n_mfs": 3}, {}])
+@pytest.mark.theory
+@pytest.mark.parametrize("settings", [{"n_mfs": 3}, {"max_rules": 4}])
 def test_weights_that_are_all_alike_are_of_no_account_below_one(few_are_many, settings):
     """However small: as many rows as there are, and not what the weights add up to."""
     plain = ANFISRegressor(**settings).fit(X, Y)

@@ -79,6 +79,7 @@ def test_lines_through_a_parabola_by_the_closed_form(parabola, n_cells):
     assert low >= 0.9 * largest
 
 
+@pytest.mark.theory
 @pytest.mark.parametrize(
     ("kind", "type_name"),
     [

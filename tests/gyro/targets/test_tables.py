@@ -29,6 +29,7 @@ def scales_of(header):
     return 2.0 ** np.array(inputs, dtype=float), 2.0 ** float(unit)
 
 
+@pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize("type_name", TYPES)
 @pytest.mark.parametrize("kind", ["table", "rate-table"])
