@@ -13,8 +13,8 @@ ROUNDING = 16.0 * np.finfo(float).eps
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # Those that answer nothing.
 SILENT = ("nan", "raise")
-# How far the tangent is followed where the noise is not known, in standard deviations of each input;
-# and at most, where there is none: no more than a row in 10,000 is that far from its mean
+# How far the tangent is followed where the noise is not known, in standard deviations of each
+# input; and at most, where there is none: no more than a row in 10,000 is that far from its mean
 # (Chebyshev).
 MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 # A row further off than so many of them counts as so far: results saturate, and overflow nowhere.
