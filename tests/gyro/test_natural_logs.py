@@ -394,3 +394,20 @@ def test_a_last_row_that_is_a_glitch_is_no_run(tmp_path, truth, last, n_rows, to
     reading = found(tmp_path / "log.csv")
     assert (len(reading.log), "run" in reading.log) == (n_rows, False)
     assert told in "; ".join(reading.notes)
+
+
+@pytest.mark.parametrize("label", ["12-034", ""])
+def test_a_gyro_s_column_that_is_no_number_is_refused_and_the_rate_not_taken(
+    tmp_path, truth, label
+):
+    """The rate would be the bias of a gyro at rest; a label that begins like a number is none."""
+    counts = [f"{1000 * value:,.0f}" for value in truth["output"]]
+    table = truth[[*PARTS, "run"]].assign(output=counts, imu_serial=label)
+    with pytest.raises(LogError, match=r"column 'counts' \(output\): '-?[0-9]+,[0-9]+' is not a"):
+        found_in(tmp_path, table.rename(columns={"output": "counts"}))
+
+
+def test_a_supply_voltage_that_never_changes_is_no_output(tmp_path, truth):
+    names = {"output": "Drehrate [°/s]", "rate": "Drehtisch"}
+    table = truth[[*PARTS, "run"]].rename(columns=names)
+    same(found_in(tmp_path, table.assign(**{"Spannung [V]": 3.3})), truth)
