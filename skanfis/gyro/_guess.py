@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ._checks import PARTS
-from ._columns import CANONICAL, declared_units, unit_in
+from ._columns import CANONICAL, convert, declared_units, unit_in
 from ._source import CLOCK, as_numbers, clock_form, dated
 from ._units import settle_units
 from .errors import LogError
@@ -46,7 +46,8 @@ _SCORES = {
 }
 _STRANGER = -0.5  # score of any other word
 _SIGNAL, _UNIT = 3.0, 0.25  # scores of a raw signal's unit, for the output; of any unit
-_FOLLOWS = 0.9  # correlation with the rate, of the axis that the table turns
+# Of the axis that the table turns: its correlation with the rate, its part of all that turns.
+_FOLLOWS = 0.9
 _OF_NO_PART = (
     "residual fit fitted error err noise random walk std sigma var variance status flag valid crc "
     "checksum seq sequence index trend delta diff acc accel accelerometer mag pressure humidity "
@@ -273,10 +274,12 @@ def _settle_axis(columns, layout):
         return
     rate = columns[layout.places["rate"]].aligned
     own = [columns[layout.places["output"]], *others]
-    table = pd.DataFrame({column.place: column.aligned for column in own})
-    follows = table.corrwith(pd.Series(rate)).abs() > _FOLLOWS
-    if follows.sum() == 1:
-        layout.places["output"] = int(follows.idxmax())
+    table = pd.DataFrame({c.place: convert(c.aligned, c.unit or CANONICAL["output"]) for c in own})
+    correlation = table.corrwith(pd.Series(rate)).abs()
+    # How much each turns: those askew by a little feel the table too.
+    turned = ((correlation * table.std()) ** 2)[correlation > _FOLLOWS]
+    if turned.max() > _FOLLOWS * turned.sum():
+        layout.places["output"] = int(turned.idxmax())
         layout.others.pop("output")
 
 

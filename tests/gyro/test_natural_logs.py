@@ -411,3 +411,14 @@ def test_a_supply_voltage_that_never_changes_is_no_output(tmp_path, truth):
     names = {"output": "Drehrate [°/s]", "rate": "Drehtisch"}
     table = truth[[*PARTS, "run"]].rename(columns=names)
     same(found_in(tmp_path, table.assign(**{"Spannung [V]": 3.3})), truth)
+
+
+def test_of_axes_that_all_feel_the_table_that_along_it_is_taken(tmp_path, truth):
+    """No gyro is mounted square: of a degree off the others follow the rate as well."""
+    table = truth[[*PARTS, "run"]].rename(columns={"output": "gyro_z"})
+    table.insert(0, "gyro_x", 0.02 * table["gyro_z"])
+    table.insert(1, "gyro_y", -0.3 * table["gyro_z"])
+    same(found_in(tmp_path, table), truth)
+    # As it stands askew, none is.
+    reading = found_in(tmp_path, table.assign(gyro_y=table["gyro_z"]))
+    assert "('gyro_y', 'gyro_z' would do too)" in reading.notes[0]
