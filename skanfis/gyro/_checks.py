@@ -25,7 +25,8 @@ _LONGEST_RUN = 31 * 86_400.0  # s
 _FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
 _LEAST_SPAN = 10.0  # degC, to learn from
 _NOISE = 5.0  # degC by which a few rows may differ
-# Fewer rows determine neither a line in every input nor the errors that it leaves.
+# Fewer rows determine neither a line in every input nor the errors that it leaves; an output that
+# stands still in so many, while the rate goes on, is stuck.
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
 LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
@@ -266,6 +267,7 @@ def _check_output_follows_rate(log, units):
             raise LogError(told, part)
     if np.array_equal(output, rate):
         raise LogError(f"equals the {RATE_COLUMN}: one of them is the wrong one.", "output")
+    _check_stuck(output, rate)
     correlation = np.corrcoef(output, rate)[0, 1]
     if abs(correlation) < _LEAST_CORRELATION:
         glitches = dict(find_glitches(log, output)) if "temperature" in log else {}
@@ -288,23 +290,39 @@ def _check_output_follows_rate(log, units):
             if 0.7 < slope * ratio**power < 1.4:
                 told = f"is the {part} in {unit}?"
     raise LogError(
-        f"changes by {slope:.4g} deg/s per deg/s of rate: {told} A raw signal with a scale factor "
-        "of its own is declared as counts.",
+        f"changes by {slope:.4g} deg/s per deg/s of rate: {told} A raw signal, whose scale factor "
+        "and sign are found, is declared as counts (units: output=counts).",
         "output",
     )
 
 
 def _check_saturation(output, rate):
     """LogError where the output stands at its largest or smallest while the rate goes on."""
-    values = np.unique(output)
+    ends = [np.flatnonzero(output == value) for value in (output.min(), output.max())]
+    _check_standing(output, rate, ends, "rows", "saturated")
+
+
+def _check_stuck(output, rate):
+    """LogError where the output stands still between its ends, row after row, as the rate goes on.
+
+    At an end it is saturated, or of a column that is not the gyro's.
+    """
+    starts = np.flatnonzero(np.diff(output, prepend=np.nan) != 0.0)
+    lengths = np.diff(starts, append=output.size)
+    is_between = (output.min() < output[starts]) & (output[starts] < output.max())
+    long = (lengths >= _FEWEST_ROWS) & is_between
+    stretches = map(np.arange, starts[long], (starts + lengths)[long])
+    _check_standing(output, rate, stretches, "rows on end", "stuck")
+
+
+def _check_standing(output, rate, places, rows, what):
     # As many rates as the resolution of the output leaves to one value, and no more than noise.
-    step = np.ptp(rate) * max(_SATURATED, 3.0 / values.size)
-    for value in values[[0, -1]]:
-        at = np.flatnonzero(output == value)
+    step = np.ptp(rate) * max(_SATURATED, 3.0 / np.unique(output).size)
+    for at in places:
         low, high = rate[at].min(), rate[at].max()
         if at.size >= _FEWEST_SATURATED and high - low > step:
-            told = f"stands at {value:.6g} in {at.size} rows, at rates from {low:.4g} to {high:.4g}"
-            reason = f"{told} deg/s: it is saturated. Leave these rows out."
+            told = f"stands at {output[at[0]]:.6g} in {at.size} {rows}, at rates from {low:.4g}"
+            reason = f"{told} to {high:.4g} deg/s: it is {what}. Leave these rows out."
             raise LogError(reason, "output", int(at[0]))
 
 

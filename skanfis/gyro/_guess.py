@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ._checks import PARTS
-from ._columns import CANONICAL, declared_units, unit_in
+from ._columns import CANONICAL, convert, declared_units, unit_in
 from ._source import CLOCK, as_numbers, clock_form, dated
 from ._units import settle_units
 from .errors import LogError
@@ -46,7 +46,8 @@ _SCORES = {
 }
 _STRANGER = -0.5  # score of any other word
 _SIGNAL, _UNIT = 3.0, 0.25  # scores of a raw signal's unit, for the output; of any unit
-_FOLLOWS = 0.9  # correlation with the rate, of the axis that the table turns
+# Of the axis that the table turns: its correlation with the rate, its part of all that turns.
+_FOLLOWS = 0.9
 _OF_NO_PART = (
     "residual fit fitted error err noise random walk std sigma var variance status flag valid crc "
     "checksum seq sequence index trend delta diff acc accel accelerometer mag pressure humidity "
@@ -159,7 +160,7 @@ def _guess(source, request, layout, first):
         _Column(place, name, sample[place], source.decimal)
         for place, name in enumerate(source.header)
     ]
-    for choose in (_by_name, _by_unit, _by_text):
+    for choose in (_by_name, _by_unit):
         for part in _QUANTITIES:
             if part not in layout.places:
                 choose(part, columns, layout)
@@ -225,14 +226,18 @@ class _Column:
             steps = np.diff(self.numbers)
             against = min(np.sum(steps < 0.0), np.sum(steps > 0.0))  # the last may come first
             return self.is_time or (self.numbers.size > 0 and against <= 0.1 * steps.size)
+        if self.numbers.size == 0:
+            # Texts that begin like numbers, and no labels: reading them will say what is wrong.
+            is_label = self.words & _OF_LABELS.union(*_LABELS.values())
+            return self.text.lstrip("+-.,\u2212")[:1].isdigit() and not (self.is_time or is_label)
         # A flag or a trend takes a few whole values.
-        is_flag = part == "temperature" and np.isin(self.numbers, (-1.0, 0.0, 1.0)).all()
-        return self.numbers.size > 0 and not is_flag
+        return part != "temperature" or not np.isin(self.numbers, (-1.0, 0.0, 1.0)).all()
 
     def score(self, part):
         """How much the name speaks for a part; zero and less where it does not."""
         score = sum(_SCORES[part].get(word, _STRANGER) for word in self.words)
-        if part == "output" and self.quantity == "signal":
+        # A supply voltage never changes.
+        if part == "output" and self.quantity == "signal" and np.unique(self.numbers).size > 1:
             score += _SIGNAL
         return score + (_UNIT if self.unit else 0.0)
 
@@ -248,8 +253,9 @@ def _by_name(part, columns, layout):
     if most <= 0.0:
         return
     best = [columns[place] for place, score in scores.items() if score == most]
-    # One truth in two units: that which needs no conversion.
-    chosen = next((c for c in best if c.unit in CANONICAL.values()), best[0])
+    # Numbers before texts; of one truth in two units that which needs no conversion.
+    best.sort(key=lambda c: (c.numbers.size == 0, c.unit not in CANONICAL.values()))
+    chosen = best[0]
     layout.places[part] = chosen.place
     layout.others[part] = [layout.header[c.place] for c in best if c is not chosen]
 
@@ -261,14 +267,6 @@ def _by_unit(part, columns, layout):
         layout.places[part] = found[0].place
 
 
-def _by_text(part, columns, layout):
-    """A column that is called so and begins like numbers: reading it will say what is wrong."""
-    for column in columns:
-        is_free = column.place not in layout.places.values() and part != "time"
-        if is_free and column.score(part) > 0.0 and column.text.lstrip("+-.,\u2212")[:1].isdigit():
-            layout.places.setdefault(part, column.place)
-
-
 def _settle_axis(columns, layout):
     """Of outputs whose names say as much, that of the axis which the table turns."""
     others = [column for column in columns if column.name in layout.others.get("output", [])]
@@ -276,10 +274,12 @@ def _settle_axis(columns, layout):
         return
     rate = columns[layout.places["rate"]].aligned
     own = [columns[layout.places["output"]], *others]
-    table = pd.DataFrame({column.place: column.aligned for column in own})
-    follows = table.corrwith(pd.Series(rate)).abs() > _FOLLOWS
-    if follows.sum() == 1:
-        layout.places["output"] = int(follows.idxmax())
+    table = pd.DataFrame({c.place: convert(c.aligned, c.unit or CANONICAL["output"]) for c in own})
+    correlation = table.corrwith(pd.Series(rate)).abs()
+    # How much each turns: those askew by a little feel the table too.
+    turned = ((correlation * table.std()) ** 2)[correlation > _FOLLOWS]
+    if turned.max() > _FOLLOWS * turned.sum():
+        layout.places["output"] = int(turned.idxmax())
         layout.others.pop("output")
 
 

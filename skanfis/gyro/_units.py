@@ -66,7 +66,7 @@ def assumed_text(values, part, layout):
     if unit in SIGNALS:
         return f"{name!r} has no unit, taken as a raw signal ({_range(values)})"
     other = {"temperature": "degF", "time": "ms"}.get(part, "rad/s")
-    other = CANONICAL[part] if unit == other else other
+    other = CANONICAL[part] if unit in (other, "deg/h") else other
     return (
         f"{name!r} has no unit, taken as {unit} ({_range(values)}; {other}? give --units "
         f"{part}={other})"

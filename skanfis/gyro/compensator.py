@@ -66,6 +66,11 @@ class GyroCompensator:
     assumed : dict of str to str, default={}
         Sentences by part on those of these units that neither a name nor an option told.
 
+    Raises
+    ------
+    ValueError
+        If ``inputs`` or ``predicts`` are none of these.
+
     Examples
     --------
     >>> from skanfis import ANFISRegressor
@@ -89,6 +94,9 @@ class GyroCompensator:
     min_coverage: float = 0.1
     units: dict[str, str] = field(default_factory=dict)
     assumed: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self):
+        _check_roles(list(self.inputs), self.predicts)
 
     def apply(self, log: pd.DataFrame) -> pd.DataFrame:
         """Compensate a log, and flag the rows in which that cannot be trusted.
@@ -216,6 +224,13 @@ def features(log, inputs, time_constant):
     return pd.DataFrame(columns, index=log.index)
 
 
+def _check_roles(inputs, predicts):
+    if not _are_of(inputs, INPUTS):
+        raise ValueError(f"inputs is {inputs!r}; it must be of {', '.join(INPUTS)}")
+    if predicts not in ("error", "rate"):
+        raise ValueError(f"predicts is {predicts!r}; it must be error or rate")
+
+
 def _settings(document):
     """Arguments of a compensator out of a file's content; ValueError where it is none."""
     if not isinstance(document, dict) or document.get("format") != _FORMAT:
@@ -225,10 +240,7 @@ def _settings(document):
     if set(document) != {"format", "version", "law", "polynomial", "columns", "model", *_KEYS}:
         raise ValueError(f"its keys are {', '.join(document)}")
     inputs, columns, unit = (document[key] for key in ("inputs", "columns", "output_unit"))
-    if not _are_of(inputs, INPUTS):
-        raise ValueError(f"inputs is {inputs!r}; it must be of {', '.join(INPUTS)}")
-    if document["predicts"] not in ("error", "rate"):
-        raise ValueError(f"predicts is {document['predicts']!r}")
+    _check_roles(inputs, document["predicts"])
     checked = {
         "inputs": tuple(inputs),
         "scale_factor": _divisor(document["scale_factor"], "scale_factor"),

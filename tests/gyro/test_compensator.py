@@ -229,3 +229,12 @@ def test_what_is_no_json_is_refused(tmp_path):
         with pytest.raises(ValueError, match="is no gyro compensator") as refused:
             GyroCompensator.read_json(path)
         assert ("it is not the JSON that" in str(refused.value)) == (len(content) == 1)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [({"predicts": "rates"}, "must be error or rate"), ({"inputs": ("temprature",)}, "inputs is")],
+)
+def test_what_it_predicts_from_what_is_checked_at_once(compensator, wrong, told):
+    with pytest.raises(ValueError, match=told):
+        replace(compensator, **wrong)

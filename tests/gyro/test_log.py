@@ -265,3 +265,14 @@ def test_sound_logs_have_no_glitches(options):
     # Digits lost, and noise of heavy tails.
     assert glitches(log.round({"temperature": 0, "output": 2})) == []
     assert glitches(log.assign(output=log["output"] + 0.05 * g.standard_t(3, len(log)))) == []
+
+
+def test_an_output_that_is_stuck_is_refused_wherever_it_stands(log):
+    """Also where the rest of the log follows the rate so well that no correlation tells it."""
+    for n_rows in (20, 90):
+        stuck = log.copy()
+        stuck.loc[40 : 39 + n_rows, "output"] = log["output"].abs().min()
+        told = rf"stands at \S+ in {n_rows} rows on end, at rates from .* deg/s: it is stuck"
+        with pytest.raises(LogError, match=told) as caught:
+            check_log(stuck)
+        assert (caught.value.column, caught.value.row) == ("output", 40)

@@ -394,3 +394,31 @@ def test_a_last_row_that_is_a_glitch_is_no_run(tmp_path, truth, last, n_rows, to
     reading = found(tmp_path / "log.csv")
     assert (len(reading.log), "run" in reading.log) == (n_rows, False)
     assert told in "; ".join(reading.notes)
+
+
+@pytest.mark.parametrize("label", ["12-034", ""])
+def test_a_gyro_s_column_that_is_no_number_is_refused_and_the_rate_not_taken(
+    tmp_path, truth, label
+):
+    """The rate would be the bias of a gyro at rest; a label that begins like a number is none."""
+    counts = [f"{1000 * value:,.0f}" for value in truth["output"]]
+    table = truth[[*PARTS, "run"]].assign(output=counts, imu_serial=label)
+    with pytest.raises(LogError, match=r"column 'counts' \(output\): '-?[0-9]+,[0-9]+' is not a"):
+        found_in(tmp_path, table.rename(columns={"output": "counts"}))
+
+
+def test_a_supply_voltage_that_never_changes_is_no_output(tmp_path, truth):
+    names = {"output": "Drehrate [°/s]", "rate": "Drehtisch"}
+    table = truth[[*PARTS, "run"]].rename(columns=names)
+    same(found_in(tmp_path, table.assign(**{"Spannung [V]": 3.3})), truth)
+
+
+def test_of_axes_that_all_feel_the_table_that_along_it_is_taken(tmp_path, truth):
+    """No gyro is mounted square: of a degree off the others follow the rate as well."""
+    table = truth[[*PARTS, "run"]].rename(columns={"output": "gyro_z"})
+    table.insert(0, "gyro_x", 0.02 * table["gyro_z"])
+    table.insert(1, "gyro_y", -0.3 * table["gyro_z"])
+    same(found_in(tmp_path, table), truth)
+    # As it stands askew, none is.
+    reading = found_in(tmp_path, table.assign(gyro_y=table["gyro_z"]))
+    assert "('gyro_y', 'gyro_z' would do too)" in reading.notes[0]

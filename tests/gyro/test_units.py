@@ -158,3 +158,10 @@ def test_a_row_or_two_and_columns_without_numbers_tell_nothing(tmp_path, rows):
     table = {"time": [1.0, 2.0], "temp": ["", ""], "gyro": [1.0, ""], "rate": [2.0, 3.0]}
     with pytest.raises((LogError, UsageError)):
         read_table(tmp_path, pd.DataFrame(table)[:rows], require=("output",))
+
+
+def test_a_bias_in_degrees_an_hour_is_asked_whether_it_is_in_degrees_a_second(tmp_path):
+    wide = np.linspace(-98.0, 99.0, 101)
+    table = pd.DataFrame({"temperature": np.linspace(-20.0, 60.0, 101), "output": wide})
+    told = read_table(tmp_path, table, ("temperature", "output")).assumed["output"]
+    assert told.endswith("taken as deg/h (-98 to 99; deg/s? give --units output=deg/s)")

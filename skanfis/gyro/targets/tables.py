@@ -86,6 +86,11 @@ class Table:
         ]
         points = np.stack(np.meshgrid(*at, indexing="ij"), axis=-1)
         values = error(points.reshape(-1, len(at))).reshape(points.shape[:-1])
+        inside = self.high - self.low - (self.counts - 1) * self.step
+        for axis, part in enumerate(self.step / inside):
+            # The last cell may end beyond the range: its line goes on from the edge.
+            last = np.moveaxis(values, axis, 0)
+            last[-1] = last[-2] + part * (last[-1] - last[-2])
         self.unit = float(self._scale_of(_MARGIN * np.abs(values).max()))
         values = np.rint(values / self.unit) if self.bits else values
         self.values = values.astype(self.dialect.dtype)

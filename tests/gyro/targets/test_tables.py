@@ -97,3 +97,21 @@ def test_the_header_says_what_goes_in_and_comes_out():
     ):
         assert text in told
     assert "#include <stdint.h>" in header
+
+
+@pytest.mark.parametrize("type_name", TYPES)
+def test_a_plane_is_a_plane_to_the_end_of_the_range(type_name):
+    # In fixed point cells are whole numbers wide, and the last of them goes beyond the range.
+    class Plane:
+        names, ends = ["temperature", "output"], np.array([(-23.0664, 61.0098), (-99.3, 101.7)])
+
+        def __call__(self, points):
+            return points.clip(*self.ends.T) @ [0.02, -0.01]
+
+    table = Table(Plane(), type_name)
+    low, high = table.piecewise.ends.T
+    points = np.random.default_rng(7).uniform(low, high, (500, 2))
+    points[:4] = [low, high, (low[0], high[1]), (high[0], low[1])]
+    # The unit that a value is rounded to, or the last bit of a float.
+    atol = table.unit if table.bits else 1e-6
+    np.testing.assert_allclose(table.piecewise(points), Plane()(points), atol=atol)
