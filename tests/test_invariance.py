@@ -157,6 +157,18 @@ def test_order_of_the_inputs_of_a_grid(name):
     case.assert_same(case.fit(case.X[:, order], case.y, n_mfs=n_mfs).predict(case.X[:, order]))
 
 
+def test_order_of_the_inputs_where_the_output_is_known_to_rise(rng):
+    X = rng.uniform(-1.0, 1.0, (200, 4))
+    y = np.sin(3.0 * X[:, 0]) + X[:, 1] * X[:, 2] + 0.1 * rng.normal(size=200)
+    order = [2, 0, 3, 1]
+    plain = ANFISRegressor([2, 2, 2, 1], monotonic_cst=[0, 1, 0, 0]).fit(X, y)
+    other = ANFISRegressor([2, 2, 1, 2], monotonic_cst=[0, 0, 0, 1]).fit(X[:, order], y)
+    # The points at which the slopes were seen to fail have a part in it.
+    assert plain.constraints_["drawn"] == 0.0
+    found = other.predict(X[:, order])
+    assert_allclose(found, plain.predict(X), rtol=0, atol=TOLERANCE * np.ptp(y))
+
+
 @pytest.mark.parametrize("settings", [{"n_mfs": 2}, {"max_rules": 2}], ids=str)
 def test_order_of_inputs_and_outputs_where_rows_stand_for_many(settings, monkeypatch):
     # As beyond 1,000 rows, and 20,000: on 40 of 120.

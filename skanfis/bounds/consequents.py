@@ -117,7 +117,10 @@ class Consequents:
         Points are the worst of a sample, then those at which branch and bound finds a violation.
         """
         normal, (equal, equal_to) = self.free.normal, self.fixed
-        sample = spread_points(self.columns.minimum, self.columns.maximum)
+        # The points differ by input: their ranges and not the order of the columns decide how.
+        order = np.lexsort(self.problem.rows.inputs.box)
+        low, high = self.columns.minimum, self.columns.maximum
+        sample = spread_points(low[order], high[order])[:, np.argsort(order)]
         # An output stays in order where not even the fixed points can be met otherwise.
         local = ordered.copy()
         nothing = np.empty((0, self.problem.n_columns)), np.empty(0)
