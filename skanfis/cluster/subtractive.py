@@ -1,4 +1,4 @@
-"""Subtractive clustering: data points that many others are near to, one after the other."""
+"""Subtractive clustering: the data points with the most others nearby, one after the other."""
 
 from numbers import Integral, Real
 from typing import ClassVar
@@ -10,7 +10,7 @@ from scipy.spatial.distance import cdist
 from .._sklearn import Interval
 from ._rows import Clusterer, distance_blocks, nearest
 
-# Potentials this near, relative to the first centre's, differ by rounding: the first of them wins.
+# Potentials that differ by less, relative to the first centre's, are tied: the first row wins.
 _TIE = 1e-9
 
 
@@ -98,10 +98,10 @@ class SubtractiveClustering(Clusterer):
         self.cluster_centers_ = rows[centers]
 
     def _highest(self, points, potential):
-        """Positions of the centres in ``points``, as they were chosen, and their potentials.
+        """Positions of the centres in ``points``, in the order of choice, and their potentials.
 
-        Neither potential nor distance grows: a point that was passed over is never accepted later,
-        so that the next centre is the highest of those that may be one (Chiu 1994).
+        The next centre is the highest point that may be one (Chiu 1994). Potential and distance
+        never grow, so a point that was passed over cannot become one later.
         """
         first, distance = potential.max(), np.full(points.shape[0], np.inf)
         centers: list[int] = []
