@@ -149,7 +149,7 @@ def gradient_bounds(
     tol : float, default=0.01
         Relative to the largest absolute slope.
     max_boxes : int, default=200_000
-        The others as in :func:`bounds`.
+        This, and the others, as in :func:`bounds`.
 
     Returns
     -------

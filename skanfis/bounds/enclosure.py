@@ -221,7 +221,7 @@ class Enclosure:
         return widened(self._mean(parts, self._tangent(parts, j)), parts.slope_slack[j])
 
     def _ways_out(self, parts):
-        """Inputs along which some box leaves the range."""
+        """Inputs along which at least one box leaves the range."""
         return np.flatnonzero(parts.way.any(axis=(0, 2)))
 
     def _slope(self, parts, low, high, i):
@@ -249,7 +249,7 @@ class Enclosure:
         return np.where(np.isnan([down, up]), [[-np.inf], [np.inf]], [down, up])
 
     def _mixed(self, parts, i, j):
-        """Range of the second derivative by two inputs, or twice by one."""
+        """Range of the second derivative by x_i and x_j, which may be the same input."""
         found = np.zeros_like(parts.value)
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:

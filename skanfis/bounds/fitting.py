@@ -46,7 +46,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         nearer, way = found.nearest_proven(local)
         if found.loss(nearer) < after:
             held, drawn, after = found.model(nearer), way, found.loss(nearer)
-    raised = after / max(before, _OF_MARGINS)  # of exact data the free fit may have no error
+    raised = after / max(before, _OF_MARGINS)  # on exact data, the free fit may have no error
     report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
     if rows is not None:
         unheld, fixed = replace(model, target=None), (constraints.points, constraints.values)

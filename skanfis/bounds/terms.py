@@ -206,7 +206,7 @@ def enclosed(factor: dict, axis: int, terms: TermRanges, at_middle: TermRanges, 
 
 
 def _by_range(logarithms, axis):
-    """Ranges of shares from those of their logarithms alone."""
+    """Ranges of shares from the ranges of their logarithms alone."""
     down, up = np.exp(logarithms - _largest(logarithms[1], axis))
     slack = (down.shape[axis] + ROUNDINGS) * EPS
     all_up, all_down = (one.sum(axis=axis, keepdims=True) for one in (up, down))
@@ -230,7 +230,7 @@ def _departures(shares, slopes):
 
 
 def _by_mean_value(departure, at_middle, shares, half):
-    """Ranges of D, narrower by d D_j / dx_i = [i = j] (c_j - E c_j) - E D_i D_j."""
+    """Ranges of D, narrowed by d D_j / dx_i = [i = j] (c_j - E c_j) - E D_i D_j."""
     found = {}
     for j, ends in departure.items():
         change = 0.0

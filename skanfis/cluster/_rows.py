@@ -65,7 +65,7 @@ class Clusterer(ClusterMixin, BaseEstimator):
         X : array-like of shape (n_samples, n_features)
         y : None
         sample_weight : array-like of shape (n_samples,), default=None
-            Zero or positive; a whole number counts as so many copies of the row.
+            Zero or positive; a whole number counts as that many copies of the row.
         """
         X = check_rows(self, X, reset=True)
         self._find_centers(*distinct_rows(X, sample_weight))

@@ -29,8 +29,8 @@ _FINGERPRINT_SEED = 20090101
 def fingerprint(columns):
     """One number per row out of columns (n_columns, n_rows): a fixed random projection.
 
-    Equal rows have equal numbers to the last bit, because the columns are added one by one; unequal
-    rows have unequal numbers, all but surely.
+    Equal rows have equal numbers to the last bit, because the columns are added one by one. Unequal
+    rows almost surely have unequal numbers.
     """
     factors = np.random.default_rng(_FINGERPRINT_SEED).standard_normal(len(columns))
     numbers = np.zeros(columns.shape[1])

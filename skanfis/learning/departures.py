@@ -6,7 +6,7 @@ split it along the axis of every input with terms; the first contrast is the mea
 varies along the axes of the inputs S, in the slope by input j, concerns S and j together. So it
 belongs to one *component*,
 
-    (j,)      how a rule's part of the output changes with input j alone,
+    (j,)      how the rules' part in the output changes with input j alone,
     (i, j)    how that change depends on input i,
     ()        the rest, which concerns three inputs and more,
 

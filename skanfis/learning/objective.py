@@ -1,6 +1,6 @@
 r"""Training as a separable least-squares problem: cost, gradient and Gauss-Newton matrix.
 
-With premise parameters theta, design Phi(theta), weights S of sum W and consequents beta,
+With premise parameters theta, design Phi(theta), row weights S of sum W, and consequents beta,
 
     F(theta) = min_beta  1/2 [ |y - Phi beta|_S^2 / W + beta' P beta ] ,   P = lambda Q(theta) + A ,
 

@@ -66,8 +66,8 @@ def mean_and_parts(weights, names):
 def disagreement_matrix(gram, n_rules, local: LocalBasis):
     """Q = B - G of the disagreement V = beta' Q beta, and G itself, in the local basis.
 
-    B is block diagonal, its block of rule r the sum over r' of the blocks G_(r, r'); ``gram`` is
-    that of the design on [1, z].
+    B is block diagonal: its block for rule r is the sum over r' of the blocks G_(r, r'). ``gram``
+    is the Gram matrix of the design on [1, z].
     """
     n_columns = gram.shape[0]
     n_basis = n_columns // n_rules

@@ -84,7 +84,7 @@ class Solver(BaseEstimator, ABC):
         Whether a run starts where the search for the penalty's weights has moved the premises, by
         variable projection. Else it starts afresh from the partition.
     stiffness : "auto" or float
-        Weight of the pull of the premises to their start, where they move.
+        Weight of the pull of the premises to their start, if they move.
 
     Examples
     --------
@@ -141,7 +141,7 @@ class Solver(BaseEstimator, ABC):
 
 
 class LeastSquares(Solver):
-    """Least squares alone: the premises stay as they start, the consequents are solved for once.
+    """Least squares alone: the premises stay at their start, the consequents are solved for once.
 
     Examples
     --------

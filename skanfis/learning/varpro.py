@@ -136,7 +136,7 @@ class VariableProjection(Solver):
     ----------
     tol : float, default=1e-3
         Stop when the relative decrease of the cost, expected and found, stays below ``tol`` twice,
-        or when the gradient says as much. Zero or positive.
+        or when the gradient implies that it would. Zero or positive.
     stiffness : "auto" or float, default="auto"
         Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
         of their displacements (in spacings of terms and logarithms of widths) is added to the cost.

@@ -39,7 +39,7 @@ class StructureRequest(Plan):
     simplicity: float  # tolerated relative rise of the error, for a model that is easier to read
 
     def start(self, rows: StandardisedData) -> Start:
-        """Where to start from, for these rows."""
+        """The start that the request leads to on these rows."""
         self._check_combination()
         check_columns_fit(len(self.names))
         if isinstance(self.n_mfs, str) and isinstance(self.partition, str):
@@ -71,7 +71,7 @@ class StructureRequest(Plan):
         return replace(self, premise_inputs=varying, weights=weights, n_all=n_all)
 
     def _antecedent(self, rows):
-        """The rules that were asked for."""
+        """The rule base that the user asked for: of a clusterer, or a grid."""
         if isinstance(self.n_mfs, str):
             label = partial(self._label, rows.y.shape[1])
             return clustered_antecedent(self.families, rows, label, self.premise_inputs)

@@ -131,7 +131,7 @@ class StructureSearch:
         return self.judges.mean(np.concatenate(squares))
 
     def _report(self, found, variance):
-        """Every candidate in words and numbers, best first; ``variance`` is the mean's error."""
+        """Every candidate in words and numbers, best first; ``variance`` is as in ``described``."""
         return [
             described(
                 self.trials.tuned(one.candidate),

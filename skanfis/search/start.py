@@ -43,7 +43,7 @@ _DIGITS = 5
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A rule base in standardised units, what its parameters pay, and where they stand already."""
+    """A rule base in standardised units, the penalty's weights, and the premises so far."""
 
     antecedent: Antecedent
     penalty: Penalty

@@ -171,7 +171,7 @@ def _risen(tuned: Tuned, turns, steps) -> Tuned:
 
 
 def turned(tuned: Tuned, penalty, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
-    """One turn from where the last one ended: premises down the cost, then weights up."""
+    """One turn from the end of the last: premises down the cost, then weights up the evidence."""
     problem, premise = tuned.problem.with_penalty(penalty), tuned.premise
     result = varpro(
         problem,

@@ -190,7 +190,7 @@ class _Fit:
         return run, weights
 
     def warn_unless_converged(self, run):
-        """Warn where the solver would have gone on."""
+        """Warn where the solver stopped before it converged."""
         estimator, result = self.estimator, run.result
         if result.converged or estimator.max_iter == 0:
             return
@@ -233,7 +233,7 @@ class _Fit:
         if evaluation.normal is None:
             # A descent does not solve for the consequents: do so first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
-        # Rows on a cluster have no numbers.
+        # Rows on a cluster of machines have no numbers.
         is_here = isinstance(self.data, ValidatedData)
         rows = self.data.numbered(self.trained_on) if is_here else None
         given = fitted.model, evaluation, run.problem, constraints, rows

@@ -87,7 +87,7 @@ def _robust_lines(rows):
         if spread == 0.0:
             return None
         linear = HuberRegressor(max_iter=_MOST_STEPS, tol=_TIGHT)
-        # A rough line will do.
+        # A rough line suffices: it need not converge.
         with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
             try:
                 linear.fit(Z.T, (values - center) / spread, sample_weight=rows.sample_weight)
