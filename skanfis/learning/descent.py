@@ -42,7 +42,7 @@ class StepSize:
     def __init__(self, size, error):
         self.size = size
         self._error = error
-        # One course per rule: a change of the error that has changed the length counts no more.
+        # A course for each change of the length, which starts afresh after that change.
         self._courses: list[deque] = [deque(maxlen=len(course)) for course, _ in _CHANGES]
 
     def follow(self, error):

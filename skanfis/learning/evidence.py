@@ -10,12 +10,12 @@ n is the number of rows by weight, m that of outputs, R that of rules; x are the
 the premises, kappa is their stiffness, H the reduced Gauss-Newton matrix by x. |P|+ leaves out the
 one direction on which no penalty acts, that in which all rules rise alike.
 
-At the largest evidence, the penalty that a weight causes, over the noise variance, equals the
-number of parameters that the data determine against it. A step multiplies each weight by the ratio
-of that number to the penalty (Fellner and Schall; Wood and Fasiolo 2017). At fixed premises it
-takes no pass over the rows, only a new solve for beta. docs/mathematics.rst has the details, and
-the priors: of the stiffness, as if nu displacements of size x0 had been seen before, and of the
-alpha_c and the rho_j, which are expected to be alike.
+At the largest evidence, n / sigma^2 times the penalty that a weight causes equals the number of
+parameters that the data determine against it. A step multiplies each weight by the ratio of that
+number to the penalty (Fellner and Schall; Wood and Fasiolo 2017). At fixed premises it takes no
+pass over the rows, only a new solve for beta. docs/mathematics.rst has the details, and the priors:
+of the stiffness, as if nu displacements of size x0 had been seen before, and of the alpha_c and the
+rho_j, which are expected to be alike.
 """
 
 from dataclasses import dataclass, replace
@@ -41,10 +41,10 @@ PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
 # 1 / s^2, s the prior's standard deviation of log alpha_c, and of log rho_j: a factor of three.
 _LIKENESS = 1.0 / np.log(3.0) ** 2
-# With at least as many distinct rows per consequent, unbounded terms are tried, and every slope has
-# a weight of its own. Then, with three rows per input, planes of which a tenth of the slopes count
-# have half the error, and planes of which all count 5 % more. With fewer rows than inputs, slopes
-# with weights of their own fit noise.
+# From this many distinct rows per consequent on, unbounded terms are tried, and every slope has a
+# weight of its own. With three rows per input, such weights halve the error of planes of which a
+# tenth of the slopes count, and add 5 % to that of planes of which all count. With fewer rows than
+# inputs, they fit noise.
 ROWS_PER_CONSEQUENT = 2
 # With fewer rows per consequent, no weight is less than this.
 _LEAST = 1e-6
@@ -184,7 +184,7 @@ def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), 
 
 
 def least_weights(posterior: Laplace, n_distinct):
-    """The least weights: with smaller ones, the prior expects rules that no reader could believe.
+    """The least weights: with smaller ones, the prior expects rules far beyond the target.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
     from the common line has the variance sigma^2 / (n alpha). Neither may exceed the square of what

@@ -35,7 +35,7 @@ from .gram import DesignMoments
 from .passes import Design, FirstPass, JointPass, SecondPass, own_parameters
 from .penalty import CommonLine, Penalty, disagreement_matrix
 
-# Least 1 - h. A row that has a rule to itself makes it a rounding error, and its error unbounded.
+# Least 1 - h: for a row with a rule to itself it is a rounding error, and r / (1 - h) unbounded.
 _SMALLEST_FREEDOM = 1e-6
 
 

@@ -115,7 +115,7 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
         # columns; rounding keeps rounding errors from deciding between two equally near centres.
         table = np.round(table, DIGITS)
         order = np.lexsort(np.sort(table, axis=1).T)
-        # It warns of fewer clusters than asked for. ``Trials.larger`` checks their number.
+        # k-means warns of fewer clusters than asked for; ``Trials.larger`` checks their number.
         with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
             labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
         return labels[np.argsort(order)]

@@ -24,8 +24,9 @@ OVERLAP = 0.6
 _EDGE = 0.02
 # Neighbouring gaps differ by this factor at most; ``ordered_terms`` allows them a little more.
 _RATIO = 1.8
-# A term's width goes with the geometric mean of its distances to both neighbours; this is the
-# weight of the nearer. At even distances, 0.6 lies as far between the limits of ``ordered_terms``.
+# A term's width goes with a geometric mean of its distances to both neighbours; this is the weight
+# of the nearer. At even distances, an overlap of 0.6 lies at this part of the way, in logarithms,
+# from the least to the largest width of ``ordered_terms``.
 _NEARER = 1.0 / 6.0
 
 

@@ -53,7 +53,7 @@ def in_deviations(squares, n_free):
 
 
 def weighted_quantile(column, weight, part, side):
-    """The first value, from below (side 1) or above (-1), up to which is ``part`` of the weight."""
+    """The first value, from below (side 1) or above (-1), with ``part`` of the weight up to it."""
     order = np.argsort(column, kind="stable")[::side]
     upto = np.cumsum(weight[order])
     # A little less than the part: rounding of the sum must not make the two sides differ.

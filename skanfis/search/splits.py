@@ -18,7 +18,7 @@ from ..antecedent.tree import CRISP, LEAST_WIDTH
 from .sample import DIGITS, counting_weight, in_deviations, to_six_digits
 from .tuning import Tuned
 
-# The quantiles of a leaf that cuts are tried at divide it into this many parts.
+# Cuts are tried at the quantiles that divide a leaf into this many parts.
 _QUANTILES = 8
 # Width of a new cut, in standard deviations of the input in the leaf.
 _WIDTH = 0.5

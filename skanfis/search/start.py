@@ -63,7 +63,7 @@ def started(tuned: Tuned, plan: Plan, room: float, candidates) -> Start:
     agreement costs more on new rows than the training rows show.
     """
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
-    # Fixed premises cannot follow, which is what makes room for agreement: none is added.
+    # Premises make room for agreement by following it. Fixed ones cannot, so none is added.
     room = np.sqrt(room) if plan.premises_move else 1.0
     agreeing = with_most_agreement(tuned, room)
     is_raised = agreeing is not tuned

@@ -36,11 +36,11 @@ _ROWS_PER_PARAMETER, FEWEST_SEEN = 40, FOLDS * ENOUGH
 # Steps of the weights before a candidate is ranked; training goes on from there.
 _STEPS_TO_PROMISE = 1
 # Most operations of a pass over the rows that a candidate needs. The limit does not depend on the
-# rows that there are: more rows never mean fewer rules.
+# number of rows, so that more rows never mean fewer rules.
 _MOST_OPERATIONS = 4e9
 # This many inputs, or splits, with the largest scores (``TermScores``, ``splits``) are tried.
 _TRIED = 4
-# A tree splits one leaf at a time for every four that it has.
+# A tree splits one leaf for every four that it has, and at least one, at a time.
 _LEAVES_OF_ONE_SPLIT = 4
 # A score beyond this is more than chance.
 _SIGNIFICANT = 2.0
@@ -130,7 +130,7 @@ class Trials:
         begun = {}
         for one in filter(self._is_small, self._tried(kind, candidate, smaller)):
             problem = self._problem(one, smaller)
-            # k-means finds fewer clusters than asked for if few rows differ. That is not tried.
+            # If few rows differ, k-means finds fewer clusters than asked for: leave these out.
             if problem.antecedent.n_rules == one.n_rules:
                 begun[one] = self._train(problem, turns=0)
         self._begun |= begun
