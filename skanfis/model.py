@@ -12,7 +12,7 @@ follows the tangent as far as L standard deviations h_j of each input (linear),
     y(c) + sum_j dy/dx_j(c) clip(x_j - c_j, -L h_j, L h_j) .
 
 If there are monotonic constraints, the slope by a constrained input x_j is taken with the other
-constrained inputs at their medians. So it does not change with them, and no slope along them turns.
+constrained inputs at their medians. So it does not depend on them, and no slope changes its sign.
 Outputs are held within limits as well, see :class:`~skanfis.policies.TargetRange`.
 """
 
@@ -214,7 +214,7 @@ class TSKModel:
         return strongest_rules(self.strengths(X).T)
 
     def predict(self, X, inside=None) -> np.ndarray:
-        """Outputs (n_rows, n_outputs) by the policy; ``inside`` is the result of `in_bounds`."""
+        """Outputs (n_rows, n_outputs) by the policy; ``inside`` comes from :meth:`in_bounds`."""
         if inside is None:
             X = rows_by_name(X, self.input_names)
             inside = self.in_bounds(X)
@@ -276,7 +276,7 @@ class TSKModel:
         return self._slopes(X, self._linearised)
 
     def tangent_slopes(self, X) -> np.ndarray:
-        """Slopes that "linear" follows from the nearest point of the box, shaped as `gradient`."""
+        """Slopes that "linear" follows from the nearest point of the box, shaped as a gradient."""
         return self._slopes(X, self._tangent)
 
     def _slopes(self, X, linearised):
@@ -294,8 +294,8 @@ class TSKModel:
 
             exp(-delta^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2)
 
-        N_r counts distinct inputs on which rule r is the strongest, P its coefficients. d_r is a
-        distance from its rows (:doc:`/mathematics`), D_r the largest on them. Zero without data.
+        N_r counts distinct inputs on which rule r is the strongest, P counts its coefficients. d_r
+        is a distance from its rows (:doc:`/mathematics`), D_r the largest there. Zero without data.
         """
         X, support = rows_by_name(X, self.input_names), self.support
         if support is None:

@@ -73,7 +73,7 @@ class RowSums:
             raw = np.array(rows.X[part].T, dtype=float, order="C")
             strengths, shares = antecedent.strengths_and_shares(raw)
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
-            # By mantissa and exponent of the target, no unit of it overflows or vanishes.
+            # Mantissa and exponent of the target, so that no unit makes it overflow or vanish.
             marks = fingerprint(np.vstack([numbers, *np.frexp(rows.y[part].T)]))
             distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(slopes)]
             every = basis(Z)

@@ -110,7 +110,7 @@ def reweighted(rows, weights):
 def without_outliers(rows, weights):
     """The rows that keep at least half of their weight; all rows if these are the minority."""
     kept = weights >= _OUTLIER
-    # If most rows are outliers, none is.
+    # If most rows look like outliers, none counts as one.
     return rows.part(kept) if 2.0 * rows.weights[kept].sum() >= rows.weights.sum() else rows
 
 
