@@ -1,14 +1,14 @@
-r"""The THEN parts of the rules, which are linear, and the regression that finds them.
+r"""The linear THEN parts of the rules, and the regression that finds them.
 
 A rule's consequent is f_r(z) = beta_r . b(z) with the basis b(z) = [1, z_1, ..., z_d] (order 1) or
-[1] (order 0). The design has one column per rule and basis function, Phi_(r, i) = w_r b_i, rules
-first; it is held transposed, shape (n_columns, n_rows), as everything that runs along rows.
+[1] (order 0). The design has one column per rule and basis function, Phi_(r, i) = w_r b_i, ordered
+by rule. Like all arrays with an entry per row, it is transposed, shape (n_columns, n_rows).
 
 Far from the origin the columns w_r and w_r z_j are nearly parallel. Each rule therefore has a
-*local basis* centred and scaled where it fires, [1, (z_j - a_rj) / h_rj], with a and h the mean and
-the standard deviation of z_j weighted by w_r. Phi_local = Phi T with T block diagonal; the change
-is made on the Gram matrix, and the penalty of ``penalty`` acts on the local coefficients. T is
-frozen at the start of training, for the objective must be one and the same function throughout.
+*local basis*, centred and scaled where it fires, [1, (z_j - a_rj) / h_rj], with a and h the mean
+and standard deviation of z_j weighted by w_r. Phi_local = Phi T with T block diagonal. The Gram
+matrix is transformed, not the design, and the penalty acts on the local coefficients. T is fixed at
+the start of training, so that the objective stays the same function throughout.
 
 Since sum_r w_r = 1, the moments behind a and h are row sums of the Gram matrix itself:
 sum_r' G[(r, i), (r', j)] = sum over rows of s w_r b_i b_j, where b_j is 1 or z_j.
@@ -20,22 +20,23 @@ from functools import cached_property
 import numpy as np
 from scipy import linalg
 
-# A rule that fires on one spot only has no spread there; in standard deviations of the input.
+# Least h, in standard deviations of the input: a rule that fires on one spot has no spread.
 _SMALLEST_SPREAD = 0.05
 # A rule with less than this part of the data's weight has no usable moments.
 _SMALLEST_MASS = 1e-12
-# Tenfold shifts of a matrix that has no Cholesky factor: from rounding to the matrix itself.
+# A matrix without a Cholesky factor is shifted, ten times more each time: this many tries lead from
+# rounding to the size of the matrix.
 _MOST_SHIFTS = 20
-# Beyond so many columns what takes a matrix of their size costs seconds: a search takes fewer
-# steps, and traces are estimates.
+# Beyond this many columns, operations on square matrices cost seconds: a search takes fewer steps,
+# and traces are estimates.
 MANY_COLUMNS = 512
-# Random signs that give a trace to about 1 %.
+# Vectors of random signs that estimate a trace to about 1 %.
 _PROBES = 32
 _EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
 
 
 def basis(Z):
-    """Rows [1, z_1, ..., z_d], shape (1 + n_inputs, n_rows); [1] of no inputs."""
+    """Rows [1, z_1, ..., z_d], shape (1 + n_inputs, n_rows); [1] without inputs."""
     return np.concatenate([np.ones((1, Z.shape[1])), Z])
 
 
@@ -54,7 +55,7 @@ def outputs_of_rules(by_output, strengths, basis_rows):
 def in_user_units(coefficients, inputs, targets, slopes, order, common=(), masses=None):
     """Consequents about the inputs' means, from those on [1, z_slopes] of standardised data.
 
-    Slopes that are ``common``, as in ``Penalty``, become one to the last bit: their mean by the
+    Slopes that are ``common``, as in ``Penalty``, become equal to the last bit: their mean by the
     rules' ``masses``.
     """
     n_basis = 1 + slopes.size if order == 1 else 1
@@ -87,7 +88,7 @@ class LocalBasis:
 
     @classmethod
     def from_gram(cls, gram, n_rules):
-        """Weighted moments of the inputs under each rule, out of Phi' S Phi / sum(s)."""
+        """Weighted moments of the inputs under each rule, from Phi' S Phi / sum(s)."""
         n_basis = gram.shape[0] // n_rules
         blocks = gram.reshape(n_rules, n_basis, n_rules, n_basis)
         mass = blocks[:, 0, :, 0].sum(axis=1)
@@ -106,7 +107,7 @@ class LocalBasis:
         return 1 + self.center.shape[1]
 
     def transform_rows(self, matrix):
-        """T' M for a matrix, with one row per column of Phi, or its blocks by rule; in place."""
+        """T' M, in place; M has one row per column of Phi, or is an array of blocks by rule."""
         blocks = matrix.reshape(-1, self.n_basis, matrix.shape[-1])
         blocks[:, 1:] -= self.center[:, :, None] * blocks[:, :1]
         blocks[:, 1:] /= self.spread[:, :, None]
@@ -139,13 +140,13 @@ class LocalBasis:
 
 
 class NormalFactor:
-    r"""The Cholesky factor of G + P: the one factorisation behind solution and projector.
+    r"""The Cholesky factor L of G + P: the one factorisation behind solution and projector.
 
-    Solving with one factorisation and projecting with another makes the reduced gradient wrong as
-    soon as two rules are alike, which is an everyday case here. ``shift`` times the identity is
-    added, at the level of rounding (p eps max diag G): a singular matrix then has a solution too,
-    and it is of small norm. With orthonormal columns E (``free``) solutions are E v, and L is that
-    of E' (G + P) E.
+    Two different factorisations for them would make the reduced gradient wrong whenever two rules
+    are alike, which is common here. ``shift`` times the identity is added, at the level of rounding
+    (p eps max diag G), so that a singular matrix also has a solution, of small norm. With
+    orthonormal columns E (``free``), solutions have the form E v, and L is the factor of
+    E' (G + P) E.
     """
 
     def __init__(self, matrix, free=None):
@@ -163,14 +164,14 @@ class NormalFactor:
             lower, info = linalg.lapack.dpotrf(shifted, lower=1, clean=1)
             if info == 0:
                 return lower
-            # Rounding has made the sum of a semi-definite matrix and the floor indefinite.
+            # Rounding has made the shifted semi-definite matrix indefinite: shift further.
             shifted.flat[:: shifted.shape[0] + 1] += 9.0 * self.shift
             self.shift *= 10.0
         raise FloatingPointError("The normal equations of the consequents are not finite.")
 
     def solve(self, right_side):
         """(G + P)^-1 times right_side."""
-        # LAPACK itself: around it, scipy.linalg takes longer than what is solved mostly does.
+        # LAPACK directly: the checks of scipy.linalg mostly take longer than the solution.
         found = linalg.lapack.dpotrs(self._lower, self._within(right_side), lower=1)[0]
         return found if self._free is None else self._free @ found
 
@@ -192,12 +193,12 @@ class NormalFactor:
 
     @cached_property
     def root(self):
-        """L^-1, whose product with many columns is quicker than solving for them."""
+        """L^-1; its product with many columns is faster than solving for them."""
         found = np.ascontiguousarray(linalg.lapack.dtrtri(self._lower, lower=1)[0])
         return found if self._free is None else found @ self._free.T
 
     def trace(self, matrix):
-        """Tr (G + P)^-1 A of a symmetric A; of a large one an estimate (Hutchinson 1990)."""
+        """Tr (G + P)^-1 A for a symmetric A; an estimate if A is large (Hutchinson 1990)."""
         if matrix.shape[0] > MANY_COLUMNS:
             signs, solved = self._probes
             return float(np.vdot(solved, matrix @ signs)) / _PROBES
@@ -213,7 +214,7 @@ class NormalFactor:
 
     @cached_property
     def _probes(self):
-        """Random signs, and what solves them."""
+        """Vectors of random signs, and the solutions for them."""
         n = self._n
         signs = np.random.default_rng(n).choice([-1.0, 1.0], size=(n, _PROBES))
         return signs, self.solve(signs)

@@ -1,19 +1,19 @@
-r"""The trained model, frozen and in the user's units: what solvers end in and all else reads.
+r"""The trained model, frozen and in the user's units: all solvers return it, all else reads it.
 
 A first-order Takagi-Sugeno-Kang model (Jang 1993),
 
     y(x) = sum_r w_r(x) f_r(x) ,    f_r(x) = a_r + sum_j b_rj (x_j - x0_j) ,
 
-with normalised firing strengths w and consequents about x0, the mean of the training data: a column
-far from the origin (a time stamp, a raw count) so loses no digits. Outside the box of the training
-data it goes by the nearest point c of the box: it holds the value there (clip), or follows the
-tangent as far as L standard deviations h_j of each input (linear),
+with normalised firing strengths w and consequents about x0, the mean of the training data, so that
+a column far from the origin (a time stamp, a raw count) loses no digits. Outside the box of the
+training data, the nearest point c of the box decides: the model holds the value there (clip), or
+follows the tangent as far as L standard deviations h_j of each input (linear),
 
     y(c) + sum_j dy/dx_j(c) clip(x_j - c_j, -L h_j, L h_j) .
 
-Where an output rises or falls with some inputs for certain, the tangent by x_j is taken with all
-others of these at their medians: it does not change with them, and turns no slope. Outputs are held
-within limits as well, see :class:`~skanfis.policies.TargetRange`.
+If there are monotonic constraints, the slope by a constrained input x_j is taken with the other
+constrained inputs at their medians. So it does not depend on them, and no slope changes its sign.
+Outputs are held within limits as well, see :class:`~skanfis.policies.TargetRange`.
 """
 
 from collections.abc import Mapping
@@ -42,7 +42,7 @@ from .support import RuleSupport
 
 __all__ = ["TSKModel"]
 
-_ROUNDING = 1e-9  # of a variance, relative
+_ROUNDING = 1e-9  # relative error of a variance, and of values 0 and 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,16 +70,16 @@ class TSKModel:
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
     max_extrapolation : float
-        L of "linear", zero or positive. Where it is infinite, outputs are held within limits that
-        were asked for, and no others.
+        L of "linear", zero or positive. If it is infinite, outputs are held only within the limits
+        that the user has set.
     support, posterior, target : RuleSupport, Posterior, TargetRange or None
-        What coverage, deviations and limits of the outputs are computed from; None without data.
+        Sources of coverage, deviations and limits of the outputs; None without data.
     term_names, output_names : tuple of str
-        Where not given, see ``naming``.
+        Default names (see ``naming``) if not given.
     tangent_at : ndarray of shape (n_inputs,) or None
-        Medians of the inputs that an output must rise or fall with, NaN for the others.
+        Medians of the inputs with a monotonic constraint, NaN for the others.
     levels : dict
-        What indicators of a ``OneHotEncoder`` tell, by name, of a model that ``fold`` has made; see
+        Meaning of the indicators of a ``OneHotEncoder``, by name, in a model from ``fold``; see
         ``export.columns``.
     """
 
@@ -135,7 +135,7 @@ class TSKModel:
 
     @property
     def consequents(self):
-        """p0, p1 .. pd of every rule in the user's units, (n_rules, 1 + n_inputs, n_outputs)."""
+        """Coefficients on [1, x_1, ..., x_d] of every rule, (n_rules, 1 + n_inputs, n_outputs)."""
         textbook = np.zeros((self.n_rules, 1 + self.n_inputs, self.n_outputs))
         textbook[:, : self.coefficients.shape[1]] = self.coefficients
         textbook[:, 0] -= np.einsum("j,rjo->ro", self.reference, textbook[:, 1:])
@@ -143,7 +143,7 @@ class TSKModel:
 
     @property
     def common_slopes(self) -> np.ndarray:
-        """Where a rule has the slope, not zero, that most rules share, (n_rules, n_inputs)."""
+        """Whether a rule has the nonzero slope that most rules share, (n_rules, n_inputs)."""
         found = np.zeros((self.n_rules, self.n_inputs), dtype=bool)
         for j, slopes in enumerate(self.coefficients[:, 1:].transpose(1, 0, 2)):
             values, which, counts = np.unique(
@@ -156,7 +156,7 @@ class TSKModel:
 
     @property
     def rule_centers(self) -> np.ndarray:
-        """Mean of the training rows by each rule's strength, else of all, (n_rules, n_inputs)."""
+        """Strength-weighted mean of each rule's rows, else the mean of all, (n_rules, n_inputs)."""
         if self.support is None:
             return np.tile(self.reference, (self.n_rules, 1))
         return np.where(self.support.share[:, None] > 0.0, self.support.center, self.reference)
@@ -172,7 +172,7 @@ class TSKModel:
     def two_valued(self) -> np.ndarray:
         """Whether an input is 0 or 1 on all training rows, (n_inputs,).
 
-        Only then is its variance m (1 - m), with m the mean: the largest of values from 0 to 1.
+        Of all values from 0 to 1 with mean m, only these have the variance m (1 - m).
         """
         from_0_to_1 = np.maximum(np.abs(self.minimum), np.abs(self.maximum - 1.0)) <= _ROUNDING
         most = self.reference * (1.0 - self.reference)
@@ -180,7 +180,7 @@ class TSKModel:
 
     @property
     def output_limits(self) -> np.ndarray:
-        """Limits that outputs are held within, low and high, (2, n_outputs); infinite if none."""
+        """Lower and upper limits of the outputs, (2, n_outputs); infinite if there are none."""
         if self.target is None:
             return np.full((2, self.n_outputs), [[-np.inf], [np.inf]])
         return self.target.limits(self.max_extrapolation, is_line=self.n_rules == 1)
@@ -188,7 +188,7 @@ class TSKModel:
     def memberships(self, trained=True) -> list[dict]:
         """Memberships in the user's units, after training or before it.
 
-        One dict per term, with keys "input" (its name), "name", "function" and one per parameter.
+        One dict per term, with keys "input" (a name), "name", "function" and one per parameter.
         """
         antecedent = self.antecedent if trained else self.initial_antecedent
         terms: list[dict] = []
@@ -200,12 +200,12 @@ class TSKModel:
         return terms
 
     def in_bounds(self, X) -> np.ndarray:
-        """Whether each row is in the range of the training data, but for rounding, (n_rows,)."""
+        """Whether each row is in the range of the training data, up to rounding, (n_rows,)."""
         X = rows_by_name(X, self.input_names)
         return ~is_outside(X, self.minimum, self.maximum).any(axis=1)
 
     def strengths(self, X) -> np.ndarray:
-        """Normalised firing strengths, shape (n_rows, n_rules); those of the nearest in-box row."""
+        """Normalised firing strengths at the nearest point of the box, shape (n_rows, n_rules)."""
         X = rows_by_name(X, self.input_names)
         return self._by_block(X, lambda Z: self.antecedent.strengths(self._clip(Z)), self.n_rules)
 
@@ -214,7 +214,7 @@ class TSKModel:
         return strongest_rules(self.strengths(X).T)
 
     def predict(self, X, inside=None) -> np.ndarray:
-        """Outputs (n_rows, n_outputs) by the policy; ``inside`` is what :meth:`in_bounds` gives."""
+        """Outputs (n_rows, n_outputs) by the policy; ``inside`` comes from :meth:`in_bounds`."""
         if inside is None:
             X = rows_by_name(X, self.input_names)
             inside = self.in_bounds(X)
@@ -236,7 +236,7 @@ class TSKModel:
     def predict_with_deviation(self, X, inside=None) -> tuple[np.ndarray, np.ndarray]:
         """Outputs and their standard deviations, each of shape (n_rows, n_outputs).
 
-        NaN where the policy says NaN, ValueError where it raises or the model has no posterior.
+        NaN where the policy is "nan"; ValueError where it raises, or the model has no posterior.
         """
         posterior, n_values = self.posterior, 2 * self.n_outputs
         if posterior is None:
@@ -256,7 +256,8 @@ class TSKModel:
             values, slopes = self._tangent(nearest)
             followed = self._followed(way) if self.out_of_bounds == "linear" else 0.0 * way
             outputs = self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
-            # The deviation is of the tangent: what the prediction leaves out of it counts in full.
+            # The deviation is that of the whole tangent. The part that the prediction does not
+            # follow counts in full.
             left = np.einsum("ji,joi->oi", way - followed, slopes)
             return np.vstack([outputs, np.hypot(posterior.tangent(self, nearest, way), left)])
 
@@ -270,7 +271,7 @@ class TSKModel:
     def gradient(self, X) -> np.ndarray:
         """Derivative of every output by every input, shape (n_rows, n_inputs, n_outputs).
 
-        Rows out of the box are taken at its nearest point, and outputs before they are held.
+        Rows outside the box are taken at its nearest point, and outputs before the limits.
         """
         return self._slopes(X, self._linearised)
 
@@ -293,7 +294,8 @@ class TSKModel:
 
             exp(-delta^2 / 2) sum_r w_r(c) min(1, N_r / P) exp(-max(0, d_r(c) - D_r)^2 / 2)
 
-        :doc:`/mathematics` has the distances d_r. Zero everywhere where no data are known.
+        N_r counts distinct inputs on which rule r is the strongest, P counts its coefficients. d_r
+        is a distance from its rows (:doc:`/mathematics`), D_r the largest there. Zero without data.
         """
         X, support = rows_by_name(X, self.input_names), self.support
         if support is None:
@@ -334,9 +336,9 @@ class TSKModel:
     def as_rule_table(self) -> Self:
         """Return the same model as rules with one term on an input, such as .fis files hold.
 
-        Of two cuts of an input on one path of a tree, a product of two sigmoids says on which
-        sides; three on a path are a ValueError. The memberships before training, and the
-        posterior, stay behind.
+        Two cuts of an input on one path of a tree become one term, a product of two sigmoids.
+        ValueError where there are three. The result has no posterior, and its memberships before
+        training are those after it.
         """
         if not isinstance(self.antecedent, RuleTableAntecedent):
             return self
@@ -350,14 +352,14 @@ class TSKModel:
 
     @property
     def policy(self) -> str:
-        """The policy out of bounds as it is set: "out_of_bounds='clip'"."""
+        """The policy out of bounds as parameters, like "out_of_bounds='clip'"."""
         text = f"out_of_bounds={self.out_of_bounds!r}"
         if self.out_of_bounds == "linear":
             text += f", max_extrapolation={float(self.max_extrapolation)!r}"
         return text
 
     def with_out_of_bounds(self, policy, max_extrapolation=None) -> Self:
-        """Return the same model with another policy, and another limit where one is given."""
+        """Return the same model with another policy, and another limit if given."""
         limit = self.max_extrapolation if max_extrapolation is None else max_extrapolation
         check_policy(policy, limit)
         if limit == "auto":
@@ -368,9 +370,9 @@ class TSKModel:
 
     @cached_property
     def _supported_extrapolation(self):
-        """The L of "auto": the target's deviation over the noise, of several outputs the least.
+        """The L of "auto": the target's deviation over that of the noise, the least of all outputs.
 
-        Over each deviation of an input, the target is taken to bend by no more than the noise.
+        This assumes that over one deviation of an input, the target bends by at most the noise.
         """
         target, posterior = self.target, self.posterior
         if target is None or posterior is None:
@@ -396,7 +398,7 @@ class TSKModel:
 
     @property
     def _n_slopes(self):
-        """Values per row that :meth:`_linearised` needs memory for."""
+        """Values per row that :meth:`_linearised` holds in memory."""
         return 2 * self.antecedent.parameters.size + self.n_inputs * self.n_outputs
 
     def _clip(self, Z):
@@ -409,7 +411,7 @@ class TSKModel:
             return np.clip(Z - nearest, -reach, reach)
 
     def _followed(self, way):
-        """The way out of the box, as far as the tangent is followed."""
+        """The part of the way out of the box on which the tangent is followed."""
         reach = (self.max_extrapolation * self.spread)[:, None]
         return np.clip(way, -reach, reach)
 
@@ -422,7 +424,7 @@ class TSKModel:
 
     @cached_property
     def _limits_of_columns(self):
-        """The limits as columns; cached, since they are a sixth of the work of a single row."""
+        """The limits as columns; cached, because they take a sixth of the time of a single row."""
         return self.output_limits[:, :, None]
 
     def _outputs(self, Z):
@@ -431,7 +433,7 @@ class TSKModel:
         return self._hold(outputs_of_rules(by_output, strengths, basis_rows))
 
     def _outputs_linear(self, Z):
-        """Value and slope of the nearest point in the box."""
+        """Outputs by the tangent at the nearest point of the box."""
         nearest = self._clip(Z)
         values, slopes = self._tangent(nearest)
         followed = self._followed(self._way(Z, nearest))
@@ -441,7 +443,7 @@ class TSKModel:
     def tangent_groups(self):
         """Groups of inputs whose slopes are taken at one point, as masks, and these points.
 
-        Both are (n_groups, n_inputs); a point is NaN where an input keeps its own value.
+        Both are (n_groups, n_inputs). NaN in a point stands for the row's own value.
         """
         if self.tangent_at is None:
             return np.ones((1, self.n_inputs), dtype=bool), np.full((1, self.n_inputs), np.nan)
@@ -461,8 +463,8 @@ class TSKModel:
     def _linearised(self, Z):
         """y (n_outputs, n_rows) and dy/dx (n_inputs, n_outputs, n_rows).
 
-        Memberships depend on x and their location through the difference alone: the derivative of
-        log mu by x is minus that by the location.
+        A membership depends on x and its location only through their difference. So the derivative
+        of log mu by x is minus that by the location.
         """
         log_mu, gradients = self.antecedent.log_memberships_and_gradient(Z)
         strengths, shares = self.antecedent.normalise(log_mu)

@@ -1,4 +1,4 @@
-"""What is answered outside the range of the training data: the policies, and limits of outputs."""
+"""Predictions outside the range of the training data: the policies, and limits of outputs."""
 
 import math
 from dataclasses import dataclass
@@ -8,38 +8,37 @@ import numpy as np
 
 from .digits import told_apart
 
-# What varies by less than this part of its size varies by rounding errors only.
+# A column that varies by less than this part of its size varies by rounding errors only.
 ROUNDING = 16.0 * np.finfo(float).eps
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
-# Those that answer nothing.
+# The policies that give no value.
 SILENT = ("nan", "raise")
-# How far the tangent is followed where the noise is not known, in standard deviations of each
-# input; and at most, where there is none: no more than a row in 10,000 is that far from its mean
-# (Chebyshev).
+# How far the tangent is followed, in standard deviations of each input. The first holds if the
+# noise is not known. The second is the limit if there is next to no noise: at most one row in
+# 10,000 lies that far from its mean (Chebyshev).
 MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
-# A row further off than so many of them counts as so far: results saturate, and overflow nowhere.
+# Rows further off, in standard deviations, count as this far, so that nothing overflows.
 FARTHEST_ROW = 1e100
-# What a prediction may have beyond the range of the target: of a line so many standard deviations
-# at least, whatever the limit of inputs; of rules that bend, for peaks between rows, this part of
-# the range.
+# How far a prediction may leave the range of the target: a single line by at least this many
+# standard deviations; several rules, which may peak between rows, by this part of the range.
 _LEAST_MARGIN, _PART_OF_RANGE = 0.5, 0.25
 
 
 @dataclass(frozen=True, eq=False)
 class TargetRange:
-    """What the target was in training, and what else is known of it; of every output."""
+    """The range of every output in training, and the limits that the user has set."""
 
     minimum: np.ndarray
     maximum: np.ndarray
     spread: np.ndarray  # weighted standard deviation, positive
-    lower: np.ndarray | float = -np.inf  # limits that were asked for; infinite where none was
+    lower: np.ndarray | float = -np.inf  # the user's limits; infinite if there are none
     upper: np.ndarray | float = np.inf
 
     def within(self, lower, upper, values):
-        """The same where limits are known too, and some values (n_values, n_outputs).
+        """The same with the user's limits, and with some known values (n_values, n_outputs).
 
-        A value that is known is as good as one that was seen; a limit that all that was seen
-        lies beyond shows how far the target goes.
+        Known values extend the range as seen ones do. So does a limit, if all seen values lie
+        beyond it.
         """
         low = np.vstack([self.minimum, upper, values]).min(axis=0)
         high = np.vstack([self.maximum, lower, values]).max(axis=0)
@@ -52,9 +51,9 @@ class TargetRange:
         return TargetRange(low, high, scale * self.spread, lower, upper)
 
     def limits(self, max_extrapolation, is_line):
-        """Lowest and highest output, of a line or of what bends, (2, n_outputs).
+        """Lowest and highest output, of one line or of several rules, (2, n_outputs).
 
-        They are those that were asked for, or infinite, where the tangent is followed without end.
+        If the tangent is followed without end, only the user's limits count.
         """
         margin = max(max_extrapolation, _LEAST_MARGIN) * self.spread
         if not is_line and np.isfinite(max_extrapolation):
@@ -64,7 +63,7 @@ class TargetRange:
 
 
 def policy_in_words(policy: str, max_extrapolation: float) -> str:
-    """What is answered outside the range of the training data, as a clause."""
+    """What the model does outside the range of the training data, as a clause."""
     if policy in SILENT:
         return "there is no value"
     if policy == "clip" or max_extrapolation == 0.0:
@@ -90,7 +89,7 @@ def check_policy(policy, max_extrapolation):
 
 
 def is_outside(X, minimum, maximum):
-    """Which entries of X, (n_rows, n_inputs), leave the ranges, by more than rounding errors."""
+    """Which entries of X, (n_rows, n_inputs), lie outside the ranges by more than rounding."""
     room = ROUNDING * np.maximum(np.abs(minimum), np.abs(maximum))
     return ~((minimum - room <= X) & (maximum + room >= X))
 

@@ -1,12 +1,12 @@
-r"""How far off a prediction can be: the posterior of a fit, and the variance that it gives a row.
+r"""How far off a prediction can be: the posterior of a fit, and the variance of a row's output.
 
-A row's output changes with the consequents by its design phi, with the premises by d. With F and T
-the inverse factors of the posterior precision, and B the part of both, its variance is
+The derivative of a row's output by the consequents is its design phi, that by the premises is d.
+With F and T inverse factors of the posterior precision, and B their cross term, the variance is
 
     sigma^2 + |h|^2 ,    h = [sigma F phi, T d - B F phi] ,
 
-noise, consequents and premises. Out of the range, on the way delta from its nearest point c, it is
-that of the tangent at c: h = h(c) + h'(c) delta. docs/mathematics.rst derives both.
+from noise, consequents and premises. Out of the range, at delta from the nearest point c in it, the
+variance is that of the tangent at c: h = h(c) + h'(c) delta. docs/mathematics.rst derives both.
 """
 
 from dataclasses import dataclass, field, replace
@@ -19,12 +19,12 @@ from .consequent import rule_outputs
 
 # A model of more parameters keeps no posterior: its factor would take more than 32 MB.
 MOST_PARAMETERS = 2000
-# Of what is known at points that lie close together, what says nothing new.
+# Known values at points that lie close together count as one below this relative singular value.
 _DEPENDENT = 1e-7
-# The tangent at the edge is that of a parabola through points one, two and three steps inside, for
-# terms may have a corner on the edge: weights of its value, and of its slope outwards in steps. A
-# step is this part of the narrowest term, or of the input's standard deviation if that is less;
-# beside an outlier no shorter than a part of the latter that floating point numbers tell apart.
+# Terms may have a corner on the edge. So the tangent there is that of a parabola through points
+# one, two and three steps inside: weights of its value, and of its slope outwards in steps. A step
+# is the first part of the narrowest term, or of the input's standard deviation if that is less.
+# Terms count as at least the second part of the deviation wide, which floats can still resolve.
 _VALUE, _SLOPE = (3.0, -3.0, 1.0), (2.5, -4.0, 1.5)
 _STEP, _NARROWEST = 2.0**-14, 2.0**-24
 
@@ -38,13 +38,13 @@ class Posterior:
     noise_k^2 + |h|^2 - |Q_k h|^2 with h = [noise_k u, v_k].
     """
 
-    noise: np.ndarray  # its standard deviation, in the outputs' units, (n_outputs,)
-    inputs: np.ndarray  # those that the consequents are linear in
+    noise: np.ndarray  # standard deviation of the noise, in the outputs' units, (n_outputs,)
+    inputs: np.ndarray  # inputs that the consequents are linear in
     consequents: np.ndarray  # F, lower triangular, (n_columns, n_columns)
-    premises: np.ndarray  # T, (n_displacements, n_parameters); no rows where none were learnt
+    premises: np.ndarray  # T, (n_displacements, n_parameters); no rows if none were learnt
     cross: np.ndarray  # B_k, (n_outputs, n_displacements, n_columns)
-    # Q_k, orthonormal rows: what is known of each output for certain, at fixed points, (n_outputs,
-    # n_pinned, n_columns + n_displacements). Zeros where outputs have different numbers of rows.
+    # Q_k, orthonormal rows: directions that values known for certain fix in each output,
+    # (n_outputs, n_pinned, n_columns + n_displacements). Padded with zeros.
     pinned: np.ndarray = field(default_factory=lambda: np.zeros((0, 0, 0)))
 
     def __post_init__(self):
@@ -53,7 +53,7 @@ class Posterior:
             object.__setattr__(self, "pinned", none)
 
     def __getstate__(self):
-        """What a file holds: of a triangle no zeros."""
+        """The state to pickle, without the zeros of the triangle."""
         lower = self.consequents[np.tril_indices(len(self.consequents))]
         return vars(self) | {"consequents": lower}
 
@@ -65,7 +65,7 @@ class Posterior:
 
     @property
     def n_values(self):
-        """Numbers per row that a deviation takes, about."""
+        """Roughly how many numbers per row a deviation holds in memory."""
         return 4 * sum(self.cross.shape[1:]) + 2 * self.noise.size * self.premises.shape[1]
 
     def change_units(self, antecedent: Antecedent, scale, order):
@@ -94,11 +94,11 @@ class Posterior:
         )
 
     def given(self, model, points):
-        """The same posterior, given that what outputs are at some points is known.
+        """The same posterior, given that the outputs at some points are known for certain.
 
-        Where a value is known for certain, what remains uncertain is orthogonal to it: of the half
-        h of every row the part along the halves of what is known is taken off. Exact for a Gaussian
-        posterior and equalities. ``points`` (n_points, n_inputs) lie in the range.
+        The remaining uncertainty is orthogonal to that of the known values: h of every row loses
+        its part along the h of these points. This is exact for a Gaussian posterior and equalities.
+        ``points`` (n_points, n_inputs) lie in the range.
         """
         if not len(points):
             return self
@@ -110,7 +110,7 @@ class Posterior:
         return replace(self, pinned=pinned)
 
     def of_coefficients(self, n_rules):
-        """Deviations of the coefficients about the reference, (n_rules, n_basis, n_outputs)."""
+        """Deviations of the coefficients on ``model.basis``, (n_rules, n_basis, n_outputs)."""
         n_columns, n_changes = len(self.consequents), self.noise.size * self.premises.shape[1]
         halves = self._halves(np.eye(n_columns + n_changes, n_columns))
         found = [np.sqrt(np.maximum(self._product(k, h, h), 0.0)) for k, h in enumerate(halves)]
@@ -122,7 +122,7 @@ class Posterior:
         return self._deviations([self._product(k, h, h) for k, h in enumerate(halves)])
 
     def of_mean(self, model, Z, before=None):
-        """The same of the mean over rows, or its change from rows ``before``, without noise."""
+        """Deviation of the mean over rows, or of its change from rows ``before``, without noise."""
         rows = self._rows(model, Z)
         if before is not None:
             rows = rows - self._rows(model, before)
@@ -131,15 +131,15 @@ class Posterior:
         return np.sqrt(np.maximum(squares, 0.0)) * self._unit
 
     def tangent(self, model, Z, way):
-        """The same of the tangents at points Z of the edge, on the way (n_inputs, n_rows) out.
+        """Deviations of tangents at points Z of the edge, at the end of ``way`` (n_inputs, n_rows).
 
-        It never falls on the way: the product of value and change counts where it is positive.
+        They never fall on the way: the product of value and change counts only if positive.
         """
         lengths = way / _lengths(model)[:, None]
         length = np.sqrt(np.sum(lengths**2, axis=0))
         step = way * (_STEP / np.maximum(length, np.finfo(float).tiny))
         edge = change = 0.0
-        # Rows are subtracted before they are multiplied with the factor: no digits are lost.
+        # Subtract rows before the product with the factor, so that no digits are lost.
         for i, (of_value, of_slope) in enumerate(zip(_VALUE, _SLOPE, strict=True), start=1):
             rows = self._rows(model, Z - i * step)
             edge, change = edge + of_value * rows, change + of_slope * rows
@@ -154,7 +154,7 @@ class Posterior:
 
     @property
     def _unit(self):
-        """Powers of two near the noise of every output, in which squares stay finite."""
+        """A power of two near the noise of every output, as a unit in which squares stay finite."""
         return np.ldexp(1.0, np.frexp(self.noise)[1])
 
     def _deviations(self, squares):
@@ -163,14 +163,14 @@ class Posterior:
         return np.sqrt(noise**2 + np.maximum(squares, 0.0)) * self._unit[:, None]
 
     def _product(self, k, one, other):
-        """Inner products of halves of output k, less those along what is known of it."""
+        """Inner products of two h of output k, less the part along directions that are known."""
         found = np.einsum("pn,pn->n", one, other)
         if self.pinned.shape[1]:
             found -= np.einsum("pn,pn->n", self.pinned[k] @ one, self.pinned[k] @ other)
         return found
 
     def _rows(self, model, Z):
-        """The design, and under it the derivatives d_k of every output, (n_values, n_rows)."""
+        """The design, then the derivatives d_k of every output, (n_values, n_rows)."""
         antecedent = model.antecedent
         log_mu, gradients = antecedent.log_memberships_and_gradient(Z)
         strengths, shares = antecedent.normalise(log_mu)
@@ -185,9 +185,9 @@ class Posterior:
         return np.concatenate(rows)
 
     def _halves(self, rows):
-        """H of every output, (n_columns + n_displacements, n_rows) each, in its unit."""
+        """The half h of every output, in its unit, (n_columns + n_displacements, n_rows) each."""
         n_columns, n_parameters = self.consequents.shape[0], self.premises.shape[1]
-        # A product with a triangle: half the work of a full one.
+        # A product with a triangle takes half the work of a full one.
         u = blas.dtrmm(1.0, self.consequents.T, rows[:n_columns].T, side=1).T
         halves = []
         for k, unit in enumerate(self._unit):
@@ -201,7 +201,7 @@ class Posterior:
 
 
 def parameter_units(antecedent: Antecedent, scale):
-    """Of every parameter, how much it changes in other units as it changes in those of now."""
+    """For every parameter, its change in other units, per change in the units of now."""
     units = []
     for group in antecedent.groups:
         kinds = np.array([parameter.kind for parameter in group.family.parameters])
@@ -210,7 +210,7 @@ def parameter_units(antecedent: Antecedent, scale):
 
 
 def _lengths(model):
-    """Of every input what memberships change over: its narrowest term, or its deviation if less."""
+    """Length over which each input's memberships change: its narrowest term, or its deviation."""
     lengths = model.spread.copy()
     for group in model.antecedent.groups:
         natural = group.family.natural(group.theta)
@@ -221,7 +221,7 @@ def _lengths(model):
 
 
 def _orthonormal_rows(columns):
-    """Orthonormal rows that span some columns, (n, n_columns); what rounding leaves is dropped."""
+    """Orthonormal rows that span some columns, (n, n_columns); dependent columns add none."""
     lengths = np.sqrt(np.sum(columns**2, axis=0))
     columns = columns[:, lengths > 0.0] / lengths[lengths > 0.0]
     left, sizes, _ = np.linalg.svd(columns, full_matrices=False)

@@ -9,8 +9,8 @@ log-membership of term t has one form for every rule base,
 
     dy / d log mu_t = sum_(rules r that contain t) w_r f_r  -  nu_t y ,
 
-where nu_t is the share of the strength that rules containing t hold (on a grid, what is left of
-its own membership when its input's are normalised; scattered rules: the rule's strength itself).
+where the share nu_t is the sum of the strengths of the rules that contain t. On a grid, it is the
+membership of t, normalised over the terms of its input; of scattered rules, the rule's strength.
 """
 
 from abc import ABC, abstractmethod
@@ -23,15 +23,15 @@ import numpy as np
 
 from ..membership import Membership
 
-# In standard deviations of an input: what is nearer is one place, to a reader and for the data.
+# In standard deviations of an input: values nearer than this count as one place.
 TOLD_APART = 0.1
-# To either side of a row on a corner of a term, standardised: far beyond rounding.
+# Step, standardised, to either side of a row that stands on a corner of a term; far above rounding.
 _ASIDE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
 class TermGroup:
-    """Consecutive terms of one family: parameters theta (n_parameters, n_terms), input of each."""
+    """Consecutive terms of one family: their inputs, and parameters (n_parameters, n_terms)."""
 
     family: type[Membership]
     inputs: np.ndarray
@@ -44,7 +44,7 @@ class TermGroup:
 
 
 def groups_of(terms):
-    """Groups of terms (input, family, theta), consecutive ones of one family together."""
+    """Groups from terms (input, family, theta); consecutive terms of one family form a group."""
     groups = []
     for family, members in groupby(terms, key=lambda term: term[1]):
         inputs, _, theta = zip(*members, strict=True)
@@ -53,21 +53,21 @@ def groups_of(terms):
 
 
 def _stack(values, Z):
-    """Rows of all groups; the usual single group is not copied."""
+    """The rows of all groups stacked; a single group, the usual case, is not copied."""
     if len(values) == 1:
         return values[0]
     return np.concatenate(values) if values else np.empty((0, Z.shape[1]))
 
 
 def by_group(gradients, by_term):
-    """Gradients of every group, and what belongs to its terms, out of a row per term."""
+    """Pairs of the gradients of a group, and its rows of ``by_term``, which has one per term."""
     ends = np.cumsum([gradient.shape[1] for gradient in gradients])
     # Without any group there is nothing to split.
     return zip(gradients, np.split(by_term, ends[:-1]), strict=False)
 
 
 def by_parameter(gradients, by_term):
-    """Derivatives by every parameter out of those by log mu, shape (n_parameters, n_rows)."""
+    """Derivatives by every parameter from those by log mu, shape (n_parameters, n_rows)."""
     pairs = by_group(gradients, by_term)
     return _stack([(gradient * own).reshape(-1, own.shape[1]) for gradient, own in pairs], by_term)
 
@@ -79,7 +79,7 @@ def strongest_rules(strengths):
 
 
 def combinations(parts):
-    """Products of one row of each part, all combinations, the last part's row fastest."""
+    """Products of one row of each part, in all combinations; the last part's row varies fastest."""
     found, *others = parts
     for other in others:
         found = (found[:, None, :] * other).reshape(-1, found.shape[1])
@@ -98,16 +98,16 @@ class Antecedent(ABC):
     """The IF parts of a set of rules over a sequence of terms; immutable."""
 
     groups: tuple[TermGroup, ...]
-    # Of a term, in standardised units; what is narrower is crisp, and does not move.
+    # Least width of a term, standardised; narrower terms are crisp and do not move.
     least_width: ClassVar[float] = 0.0
 
     def without_implied(self, tolerance, columns=None) -> "Antecedent":
-        """The same without terms that other terms of the same rule imply, but for so little."""
+        """The same without terms that other terms of the same rule imply, up to ``tolerance``."""
         return self
 
     @property
     def is_ordered(self) -> bool:
-        """Whether rules share the terms of an input, which then can be kept in order."""
+        """Whether rules share the terms of an input; shared terms can be kept in order."""
         return True
 
     @property
@@ -132,7 +132,7 @@ class Antecedent(ABC):
 
     @property
     def inputs_with_terms(self) -> tuple[int, ...]:
-        """In the order of the terms; of a grid, each has a factor of the strengths."""
+        """Inputs with terms, in the order of the terms; on a grid, each is a factor of w."""
         return tuple(dict.fromkeys(self.term_inputs.tolist()))
 
     @property
@@ -148,43 +148,43 @@ class Antecedent(ABC):
     @property
     @abstractmethod
     def rule_terms(self):
-        """Indices of the terms of each rule, shape (n_rules, n_terms_per_rule)."""
+        """Indices of each rule's terms, -1 for none, shape (n_rules, n_terms_per_rule)."""
 
     @property
     def grid_counts(self) -> tuple[int, ...] | None:
-        """Terms of each input that has some, where rules are all combinations; else None."""
+        """Number of terms of each input that has some, if rules are all combinations; else None."""
         return None
 
     @property
     def tied(self):
-        """Of every entry of :attr:`parameters`, by which displacement it moves (``premise``)."""
+        """For every entry of :attr:`parameters`, the displacement that moves it (``premise``)."""
         return np.arange(self.parameters.size)
 
     def factor_terms(self) -> list[dict[int, np.ndarray]]:
         """For each factor of the strengths, by input, the terms of each of its shares.
 
-        Arrays (n_shares, most terms of a share on the input) of positions; ``n_terms`` is none.
+        Arrays (n_shares, most terms of a share on the input) of positions; ``n_terms`` means none.
         """
         table, inputs = self.rule_terms, self.term_inputs
         of = np.append(inputs, -1)[table]
-        # Rules that look at nothing have no terms of the first input either.
+        # Without any terms, the first input stands for all, with none.
         used = np.unique(of[table >= 0]).tolist() or [0]
         found = {j: np.where((of == j) & (table >= 0), table, inputs.size) for j in used}
-        # Most rules have one term of an input: columns that hold none of it go.
+        # Most rules have one term of an input: drop the columns without any.
         return [{j: where[:, (where < inputs.size).any(axis=0)] for j, where in found.items()}]
 
     def without_rules(self, rules) -> tuple["Antecedent", np.ndarray]:
-        """The rule base without some rules, and the terms that are left, by position.
+        """The rule base without some rules, and the positions of the terms that are left.
 
-        Those that are left are listed one by one. Terms that no rule uses go too.
+        The other rules are listed one by one. Terms that no rule uses go too.
         """
         table, every = np.delete(self.rule_terms, rules, axis=0), np.arange(self.n_terms)
         unused = np.setdiff1d(every, table)
         return self.without_terms(unused, table), np.delete(every, unused)
 
     def without_terms(self, terms, table=None) -> "Antecedent":
-        """The same rules, or those of a table, listed one by one without some terms."""
-        from .rule_table import RuleTableAntecedent  # which is built on this module
+        """The same rules, or those of ``table``, listed one by one without some terms."""
+        from .rule_table import RuleTableAntecedent  # here, because it imports this module
 
         table = self.rule_terms if table is None else table
         kept, place = np.delete(np.arange(self.n_terms), terms), np.full(self.n_terms + 1, -1)
@@ -222,14 +222,14 @@ class Antecedent(ABC):
         return _stack([value for value, _ in found], Z), [gradient for _, gradient in found]
 
     def log_memberships_and_mean_gradient(self, Z):
-        """The same, but on a corner the mean of both sides: rounding would choose one of them."""
+        """The same; on a corner, the mean of both sides, where rounding would else choose one."""
         if not any(group.family.has_corners for group in self.groups):
             return self.log_memberships_and_gradient(Z)
         sides = [self.log_memberships_and_gradient(Z + aside)[1] for aside in (-_ASIDE, _ASIDE)]
         return self.log_memberships(Z), [0.5 * (a + b) for a, b in zip(*sides, strict=True)]
 
     def strengths_and_shares(self, Z):
-        """Normalised firing strengths w (n_rules, n_rows), and the shares that they factor into."""
+        """Normalised firing strengths w (n_rules, n_rows), and the shares of terms."""
         return self.normalise(self.log_memberships(Z))
 
     def strengths(self, Z):
@@ -238,13 +238,13 @@ class Antecedent(ABC):
 
     @property
     def share_counts(self) -> tuple[int, ...]:
-        """How many shares each factor of the strengths has: w is a product of one of each."""
+        """Number of shares of each factor of the strengths; w is a product of one share of each."""
         return (self.n_rules,) if self.grid_counts is None else self.grid_counts
 
     def factors(self, Z):
-        """A function per term, (n_terms, n_rows), whose products over rules' terms are strengths.
+        """A function of one input per term, (n_terms, n_rows), with rules' products as strengths.
 
-        None where strengths are no products of functions of one input each.
+        None where strengths are no such products.
         """
         return None
 
@@ -261,7 +261,7 @@ class Antecedent(ABC):
         return contains
 
     def sum_over_rules(self, values):
-        """Of every term, the sum of values (n_rules, n_rows) over the rules that contain it."""
+        """For every term, the sum of values (n_rules, n_rows) over the rules that contain it."""
         return self._contains.T @ values
 
     def term_sensitivity(self, rule_outputs, output, shares):

@@ -13,20 +13,20 @@ from .base import Antecedent, combinations, groups_of, softmax_in_place
 class GridAntecedent(Antecedent):
     r"""Every combination of one term per input (grid partition).
 
-    The sum over all rules of products of memberships is the product of the sums, so that each input
-    is normalised alone and the strengths are the products of the shares,
+    The sum over all rules of products of memberships is the product of the sums over terms. So each
+    input can be normalised alone, and the strengths are the products of the shares,
 
-        w_(k1 .. kd) = prod_j nu_(j, kj) ,    nu_jk = mu_jk / sum_k' mu_jk' :
+        w_(k1 .. kd) = prod_j nu_(j, kj) ,    nu_jk = mu_jk / sum_k' mu_jk' .
 
-    as many exponentials as there are terms, not as there are rules times inputs. Rules are in
-    C order: the last input's term changes fastest.
+    This takes one exponential per term, instead of one per rule and input. Rules are in C order:
+    the last input's term changes fastest.
     """
 
     counts: tuple[int, ...] = ()
 
     @classmethod
     def build(cls, families, inputs, thetas):
-        """One entry of each argument per input that has terms; thetas (n_parameters, count)."""
+        """Each argument has one entry per input with terms; thetas are (n_parameters, count)."""
         entries = zip(inputs, families, thetas, strict=True)
         groups = groups_of((j, family, one) for j, family, theta in entries for one in theta.T)
         return cls(groups, counts=tuple(theta.shape[1] for theta in thetas))
@@ -44,9 +44,9 @@ class GridAntecedent(Antecedent):
         return [{j: terms[inputs == j]} for j in self.inputs_with_terms]
 
     def without_rules(self, rules):
-        """As of every rule base; a grid stays a grid where whole terms go.
+        """As in the base class, but a grid stays a grid if whole terms go.
 
-        An input with one term left has no say any more.
+        An input with one term left has no influence any more, and loses its term.
         """
         table = np.delete(self.rule_terms, rules, axis=0)
         if prod(np.unique(column).size for column in table.T) != table.shape[0]:
@@ -74,7 +74,7 @@ class GridAntecedent(Antecedent):
         edges = [0, *accumulate(self.counts)]
         shares = [log_mu[i:j] for i, j in pairwise(edges)]
         if min(self.counts) == max(self.counts):
-            # All inputs at once: fewer calls, which is what the prediction of one row consists of.
+            # All inputs at once: the time to predict one row is mostly that of calls.
             softmax_in_place(log_mu.reshape(len(shares), -1, n_rows))
         else:
             for share in shares:
@@ -82,7 +82,7 @@ class GridAntecedent(Antecedent):
         return combinations(shares), log_mu
 
     def term_sensitivity(self, rule_outputs, output, shares):
-        # A term's share is the sum of its rules' strengths: no need to form those products.
+        # A share is already the sum of its rules' strengths: no product per rule is needed.
         sensitivity = self.sum_over_rules(rule_outputs)
         sensitivity -= shares * output
         return sensitivity

@@ -9,7 +9,7 @@ from .base import Antecedent, groups_of, softmax_in_place
 
 
 def _one_term(terms):
-    """Family and theta of the product of some terms; None where it is none that is known."""
+    """Family and theta of the product of some terms; None if no known family is this product."""
     if len(terms) == 1:
         return terms[0]
     (first, low), (second, high), *others = sorted(terms, key=lambda one: one[1][0])
@@ -24,10 +24,9 @@ def _one_term(terms):
 class RuleTableAntecedent(Antecedent):
     """Any rules over any terms.
 
-    w = softmax over rules of the sum of log mu over the rule's terms. ``table`` (n_rules, n_terms
-    of a rule) holds positions of terms; -1 stands for none, where a rule does not look at an input.
-    A full grid in this form has the strengths of :class:`GridAntecedent`, at the price of one
-    exponential per rule.
+    w is the softmax over rules of the sum of log mu over the rule's terms. ``table`` (n_rules,
+    terms per rule) holds positions of terms; -1 stands for none. A full grid in this form has the
+    strengths of :class:`GridAntecedent`, but takes one exponential per rule.
     """
 
     table: np.ndarray
@@ -36,13 +35,13 @@ class RuleTableAntecedent(Antecedent):
     def of_own_terms(cls, families, terms):
         """Scattered rules: each with terms of its own.
 
-        ``terms`` are parameters (n_parameters, n_rules) by input, of which NaN is no term;
+        ``terms`` are parameters (n_parameters, n_rules) by input; NaN stands for no term.
         ``families`` are by input too.
         """
         every = list(dict.fromkeys(families[j] for j in terms))
         inputs = sorted(terms, key=lambda j: every.index(families[j]))
         has_term = np.isfinite([terms[j][0] for j in inputs]).T
-        # Rule by rule, but terms of one family together.
+        # Terms are ordered by family, then by rule.
         of_family = ([families[j] is family for j in inputs] for family in every)
         places = np.concatenate([np.argwhere(has_term & is_own) for is_own in of_family])
         table = np.full(has_term.shape, -1)
@@ -63,10 +62,10 @@ class RuleTableAntecedent(Antecedent):
         return self.table
 
     def with_one_term_each(self, input_names):
-        """The same rules, each with one term of an input at the most; of what each term is made.
+        """The same rules with at most one term per input and rule; the old terms of each new one.
 
-        Two sides of an input are a product of two sigmoids. What no term says, three of them, is a
-        ValueError.
+        Two sides of an input become a product of two sigmoids. ValueError where no one term says
+        the same, as for three sides.
         """
         own = self.terms
         rules: list[dict[int, tuple[int, ...]]] = []

@@ -4,9 +4,9 @@ Node n cuts one input j at c over a width s,
 
     sigma_n(x) = 1 / (1 + exp(-(x_j - c) / s)) ,
 
-the truth of "x_j is above c"; below c it is 1 - sigma_n. A rule's strength is the product over the
-nodes on its path. Strengths sum to one as they are (Jordan and Jacobs 1994), so that no rule comes
-back far away, and a rule speaks of the inputs on its path alone.
+the membership in "x_j is above c"; that in "below c" is 1 - sigma_n. A rule's strength is the
+product over the nodes on its path. Strengths sum to one without normalisation (Jordan and Jacobs
+1994). So no rule regains strength far away, and it depends on the inputs on its path alone.
 
 As a rule base it is a table of rules over two terms per node, its sides: first all that are above,
 then all that are below. Both sides have one cut and one width.
@@ -21,27 +21,27 @@ from ..membership import SigmoidFalling, SigmoidRising
 from .base import TOLD_APART, TermGroup
 from .rule_table import RuleTableAntecedent
 
-# A side is 0.9 true where a place is told from its cut, no sooner: the error hardly tells a soft
-# split from a jump, and a reader does.
+# A side reaches 0.9 at the distance TOLD_APART from its cut, not nearer: for the error a narrow
+# split is as good as a jump, for a reader it is not.
 LEAST_WIDTH = TOLD_APART / np.log(9.0)
-# Where a product of two sides is looked at, in widths from either cut.
+# Places, in widths from either cut, at which the product of two sides is evaluated.
 _AROUND = np.linspace(-6.0, 6.0, 49)
-# Between two values a cut stands so many widths from either: its sides are one to the last bit.
+# Widths of a cut between it and both values of a two-valued input: its sides are 0 or 1 there.
 CRISP = 40.0
 
 
 @dataclass(frozen=True, eq=False)
 class TreeAntecedent(RuleTableAntecedent):
-    """Leaves of a tree; ``table`` has the sides on the path of each, from the root on."""
+    """Leaves of a tree; ``table`` holds the sides on the path to each, from the root."""
 
     is_ordered = False
     least_width = LEAST_WIDTH
 
     @classmethod
     def build(cls, inputs, theta, paths):
-        """Of the input of each node, theta (2, n_nodes), and for every leaf its path.
+        """From the input of each node, theta (2, n_nodes), and the path to each leaf.
 
-        A path is a sequence of (node, is_above) from the root on.
+        A path is a sequence of (node, is_above) from the root.
         """
         inputs, theta = np.asarray(inputs, dtype=int), np.asarray(theta, dtype=float)
         table = np.full((len(paths), max(map(len, paths), default=0)), -1)
@@ -57,20 +57,21 @@ class TreeAntecedent(RuleTableAntecedent):
 
     @property
     def tied(self):
-        """Parameters of both sides are one."""
+        """Both sides of a node move by the same displacements."""
         return np.tile(np.arange(2 * self.n_nodes), 2)
 
     @property
     def paths(self):
-        """Of every leaf, (node, is_above) from the root on."""
+        """For every leaf, (node, is_above) from the root."""
         n = self.n_nodes
         return [[(int(t) % n, bool(t < n)) for t in row if t >= 0] for row in self.table]
 
     @property
     def walk(self):
-        """Nodes, each after those above it in the tree; what is above and below the cut of each.
+        """Nodes, each after its parent, and the two children of each, above and below its cut.
 
-        That is leaf r, or n_rules + k for the k-th of these nodes: arrays (n_nodes,), (n_nodes, 2).
+        A child is leaf r, or n_rules + k for the k-th of these nodes. Arrays (n_nodes,) and
+        (n_nodes, 2).
         """
         depth, ends = np.zeros(self.n_nodes, dtype=int), np.zeros((self.n_nodes, 2), dtype=int)
         for r, path in enumerate(self.paths):
@@ -82,7 +83,7 @@ class TreeAntecedent(RuleTableAntecedent):
         return order, rank[ends[order]]
 
     def split(self, leaf, j, cut, log_width):
-        """The tree in which two leaves stand for one: above the cut, in its place, and below."""
+        """The tree with two leaves in place of one: that above the cut first, then that below."""
         paths, node = self.paths, self.n_nodes
         paths[leaf : leaf + 1] = [[*paths[leaf], (node, side)] for side in (True, False)]
         nodes = self.groups[0]
@@ -92,12 +93,12 @@ class TreeAntecedent(RuleTableAntecedent):
     def without_implied(self, tolerance, columns=None):
         """A table of the rules without sides that another side on the same path implies.
 
-        As "x < 9 ± 1" follows from "x < 7.1 ± 0.7": nowhere is x below the one cut and above the
-        other, the truth of one times that of the other, by more than the tolerance. Of inputs that
-        are of one column, by its name in ``columns``, only one is above its cut.
+        "x < 7.1 ± 0.7" implies "x < 9 ± 1" if the product of the memberships in "below 7.1" and
+        "above 9" nowhere exceeds the tolerance. Inputs with the same name in ``columns`` are
+        indicators of one column: one above its cut implies that the others are below theirs.
         """
         nodes, table = self.groups[0], self.table.copy()
-        # Of two cuts k and m of one input, whether what is below k is below m too.
+        # Of two cuts k and m of one input, whether "below k" implies "below m".
         is_less = nodes.inputs[:, None] == nodes.inputs
         is_less &= nodes.theta[0][:, None] < nodes.theta[0]
         for k, m in np.argwhere(is_less):
@@ -121,8 +122,8 @@ class TreeAntecedent(RuleTableAntecedent):
 
 
 def _overlap(theta):
-    """The most that x is below the first of two cuts times above the second."""
-    # The product has its peak within some widths of one of them.
+    """The largest product of "below the first cut" and "above the second" over all x."""
+    # It lies within some widths of one of the cuts.
     x = (theta[0] + _AROUND[:, None] * np.exp(theta[1])).ravel()
     below, above = (SigmoidFalling, theta[:, :1]), (SigmoidRising, theta[:, 1:])
     return np.exp(sum(side.log_value(x, own) for side, own in (below, above)).max())

@@ -1,4 +1,4 @@
-"""Certain bounds: what a model can say on a box of inputs, proven."""
+"""Proven bounds of the predictions of a model on a box of inputs, and of their slopes."""
 
 from .certified import Bounds, bounds, gradient_bounds, monotonicity
 from .constraints import FixedPoint, OutputLimits

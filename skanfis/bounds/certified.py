@@ -1,4 +1,4 @@
-"""Bounds of predictions and of their slopes over a box: what a user calls."""
+"""The public functions: bounds of predictions, and of their slopes, over a box."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -19,25 +19,25 @@ from .enclosure import Enclosure, reach_of
 from .search import largest
 from .terms import size
 
-# Points that are tried first: so many all over the box, and its corners if inputs are this few.
+# Number of points all over a box that are tried first; up to this many inputs, all corners too.
 _POINTS, _MOST_INPUTS_OF_CORNERS = 1024, 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Bounds:
-    """What outputs, or slopes, lie between on a box.
+    """Bounds of outputs, or of slopes, on a box.
 
     Parameters
     ----------
     lower, upper : ndarray of shape (n_outputs,)
-        Proven: no value in the box is below, or above.
+        Proven: no value in the box is below ``lower``, or above ``upper``.
     lowest, highest : ndarray of shape (n_outputs,)
         The lowest and highest values that were found in the box.
     at_lowest, at_highest : ndarray of shape (n_outputs, n_inputs)
-        Where they were found.
+        The points where they were found.
     box : ndarray of shape (n_inputs, 2)
     n_boxes : int
-        Parts of the box that were looked at.
+        Number of parts of the box that were evaluated.
     converged : bool
         Whether ``tol`` was reached, for every output.
     input_names, output_names : tuple of str
@@ -70,7 +70,7 @@ class Bounds:
         """The larger gap between bound and value, as part of ``highest - lowest``, (n_outputs,)."""
         gap = np.maximum(self.upper - self.highest, self.lowest - self.lower)
         with np.errstate(divide="ignore", invalid="ignore"):
-            # Of a constant, rounding may leave the lowest above the highest.
+            # If the output is constant, rounding may leave the lowest above the highest.
             return np.where(gap > 0.0, gap / np.maximum(self.highest - self.lowest, 0.0), 0.0)
 
     def __repr__(self):
@@ -100,14 +100,14 @@ def bounds(
         Low and high of every input, in the units of X, or {name: (low, high)}; ends may be
         infinite. Inputs not named, or all with None, have the range of the training data.
     tol : float, default=0.01
-        How far bounds and values that were found may be apart, relative to the output's range.
+        Largest gap between a bound and the value found, relative to the output's range.
     max_boxes : int, default=200_000
-        Most boxes to look at for each bound. The bounds hold even where this ends the search.
+        Most boxes to evaluate for each bound. The bounds hold even where this ends the search.
 
     Returns
     -------
     bounds : Bounds
-        With ``out_of_bounds`` "nan" and "raise" those of the rows in range.
+        With ``out_of_bounds`` "nan" and "raise", those over the part of the box in range.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def gradient_bounds(
 ) -> Bounds:
     """Enclose the slope of the predictions by one input over a box of inputs, provably.
 
-    Out of range it is the slope of the policy; where it jumps the slopes from all sides count.
+    Out of range it is the slope by the policy. Where it jumps, the slopes on all sides count.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def gradient_bounds(
     tol : float, default=0.01
         Relative to the largest absolute slope.
     max_boxes : int, default=200_000
-        The others as in :func:`bounds`.
+        This, and the others, as in :func:`bounds`.
 
     Returns
     -------
@@ -208,8 +208,8 @@ def monotonicity(
     (j,) = feature_indices([feature], model.input_names, "feature")
     low, high = varying_part(box, model, of_slopes=True)
     is_in_range = (low >= model.minimum).all() and (high <= model.maximum).all()
-    # Order in the range is order beyond it too where the value is held there, or the tangent does
-    # not change with other inputs.
+    # If rules in order prove it in the range, they also do beyond it if the value is held there, or
+    # if the tangent does not change with other inputs.
     is_steady = model.tangent_at is not None and np.isfinite(model.tangent_at[j])
     is_enough = is_in_range or is_steady or model.out_of_bounds != "linear"
 
@@ -240,7 +240,7 @@ def _enclosed(model, box, j, scale, tol, max_boxes):
         tolerance = tol * float(scale([-tops[0], tops[1]]))
         for evaluate, (bound, points, attained, _) in zip(sides, seen, strict=True):
             top = int(attained.argmax())
-            # Bound and value are apart by rounding, beneath which no bound can go.
+            # At the same point, bound and value differ by rounding: no tolerance can be less.
             least = max(tolerance, 8.0 * float(bound[top] - attained[top]))
             first = points[:, top], float(attained[top])
             found.append(largest(evaluate, low, high, least, max_boxes, training_box(model), first))
@@ -275,7 +275,7 @@ def _checked(model, box, tol, max_boxes):
 
 
 def read_box(box, model: TSKModel):
-    """The box as an array (n_inputs, 2); what is not given is the range of the training data."""
+    """The box as an array (n_inputs, 2); inputs not given have the range of the training data."""
     rows, given = training_box(model).tolist(), {} if box is None else box
     if isinstance(given, Mapping):
         for name, ends in given.items():
@@ -300,11 +300,11 @@ def read_box(box, model: TSKModel):
 
 
 def varying_part(box, model: TSKModel, of_slopes):
-    """Lows and highs of the part of a box in which predictions change, and next to nothing more."""
+    """Lows and highs of the part of a box in which predictions change, up to rounding."""
     reach, is_silent = reach_of(model), model.out_of_bounds in SILENT
     is_endless = model.out_of_bounds == "linear" and np.isinf(model.max_extrapolation)
-    # The way beyond is computed, and held, in floats: a few units in the last place more reach its
-    # end, from which on slopes are zero.
+    # Beyond the end of the way out, slopes are zero. That end is rounded: go past it by a few units
+    # in the last place.
     rounding = 8.0 * np.finfo(float).eps * (np.abs(model.minimum) + np.abs(model.maximum) + reach)
     more = np.where((reach > 0.0) | (of_slopes and not is_silent), reach + rounding, 0.0)
     edges = np.stack([model.minimum - more, model.maximum + more])
@@ -325,7 +325,7 @@ def varying_part(box, model: TSKModel, of_slopes):
 
 
 def spread_points(low, high):
-    """Rows all over a box, and of few inputs all its corners."""
+    """Points (n_points, n_inputs) all over a box, with all its corners if inputs are few."""
     unit = qmc.Halton(low.size, scramble=False).random(_POINTS)
     if low.size <= _MOST_INPUTS_OF_CORNERS:
         unit = np.vstack([np.indices((2,) * low.size).reshape(low.size, -1).T, unit])

@@ -1,8 +1,8 @@
-"""Any local consequents at the premises of one fit, and the nearest that are proven to keep all.
+"""The consequents nearest to those of a free fit that provably keep all constraints.
 
-Those nearest to the free fit that keep the constraints at the points where it did not are easily
-found, and keep them nearly everywhere. On the straight way from these, 0, to those of
-rules in order, 1, the nearest are sought of which branch and bound proves it.
+The premises are those of one fit. First come the nearest consequents that keep the constraints at
+points where the free fit breaks them: they keep them nearly everywhere. Then a bisection on the
+line from these, 0, to rules in order, 1, finds the nearest that branch and bound can prove.
 """
 
 from contextlib import suppress
@@ -22,27 +22,27 @@ from .search import largest
 
 # Standard deviations of the target that rounding may leave between a fixed point and a prediction.
 _OFF = 1e-8
-# Halvings of the way; most boxes of a proof, and of all proofs before the way is halved (fewer
-# where there are more terms than so many, for boxes then take longer).
+# Halvings of the line; most boxes of a proof, and of all proofs before the line is halved; number
+# of terms beyond which both are fewer, because boxes then take longer.
 _HALVINGS, _MOST_BOXES, _ALL_BOXES, _TERMS = 6, 3000, 10_000, 20
-# Points that are added at once, the worst of many; and the margin that is kept at them, in standard
-# deviations of the target, and of the input.
+# Number of points that are added at once, the worst of a sample; and the margin that is kept at
+# them, in standard deviations of the target, and of the input.
 _POINTS_A_ROUND, _MARGIN = 20, 0.01
 
 
 class Consequents:
-    """What other consequents make of a free fit, and whether they keep the constraints.
+    """A free fit with other consequents: their model, their error, and proofs of the constraints.
 
-    ``model`` is in the user's units; ``free`` is the evaluation of the free fit, at premises for
-    which there is an order of the rules, if there is any. ``n_boxes`` are those of all proofs.
+    ``model`` is in the user's units. ``free`` is the evaluation of the free fit, if possible at
+    premises for which an order of the rules is known. ``n_boxes`` counts the boxes of all proofs.
     """
 
     def __init__(self, model, free, problem, constraints):
         self.problem, self.free, self.constraints = problem, free, constraints
-        # That outputs are held on top is monotone: what rules keep, predictions do.
+        # Holding outputs within limits is monotone: a constraint that the rules keep still holds.
         self._base = replace(model, target=None)
         self.inequalities = constraints.inequalities(model)
-        # A model with an output for each local consequent: what it adds to the standardised target.
+        # A model whose outputs are the parts of each local consequent in the standardised target.
         each = np.eye(problem.n_columns)
         self.columns = self._model(each, unit_scale(each))
         # E and e of the fixed points, for the local consequents.
@@ -52,7 +52,7 @@ class Consequents:
         self.n_boxes, self._part = 0, min(1.0, _TERMS / max(free.antecedent.n_terms, 1))
 
     def model(self, local, is_line=False):
-        """The model; of one line for all rules, one to the last bit."""
+        """The model with these consequents; if ``is_line``, its rules are equal to the last bit."""
         found = self._model(local, self.problem.rows.targets)
         if not is_line:
             return found
@@ -80,7 +80,7 @@ class Consequents:
         return float(np.maximum(self.free.mean_squares + more, 0.0).sum())
 
     def is_certified(self, local, is_line):
-        """Whether all constraints are kept, by the order of the rules."""
+        """Whether the order of the rules proves all constraints, and fixed points are met."""
         model, constraints = self.model(local, is_line), self.constraints
         limits = zip(constraints.lower, constraints.upper, strict=True)
         return self.meets_points(model) and all(
@@ -95,14 +95,14 @@ class Consequents:
         return bool((off <= _OFF).all())
 
     def nearest_proven(self, ordered):
-        """The nearest local consequents that are proven, and how much of the way they are."""
+        """The nearest proven local consequents, and how far they are on the line to ``ordered``."""
         if not {one.family for one in self.free.antecedent.groups} <= {*FAMILIES.values()}:
             return ordered, 1.0
         near = self._nearest_at_points(ordered)
         if self._is_proven(near):
             return near, 0.0
         local, drawn, least = ordered, 1.0, 0.5**_HALVINGS
-        # First the least step: where that fails others will too.
+        # First the least step back: if its proof fails, those of larger steps will too.
         for step in (least, *(0.5**k for k in range(1, _HALVINGS))):
             now = near + (drawn - step) * (ordered - near)
             if self._is_proven(now):
@@ -112,16 +112,17 @@ class Consequents:
         return local, drawn
 
     def _nearest_at_points(self, ordered):
-        """The local consequents nearest to the free fit that keep all where they did not.
+        """The local consequents nearest to the free fit that keep the constraints at some points.
 
         Points are the worst of a sample, then those at which branch and bound finds a violation.
         """
         normal, (equal, equal_to) = self.free.normal, self.fixed
-        # The points differ by input: their ranges and not the order of the columns decide how.
+        # Each input has a spacing of its own. Sorting the inputs by their ranges makes the points
+        # independent of the order of the columns.
         order = np.lexsort(self.problem.rows.inputs.box)
         low, high = self.columns.minimum, self.columns.maximum
         sample = spread_points(low[order], high[order])[:, np.argsort(order)]
-        # An output stays in order where not even the fixed points can be met otherwise.
+        # An output keeps the consequents in order if no others even meet the fixed points.
         local = ordered.copy()
         nothing = np.empty((0, self.problem.n_columns)), np.empty(0)
 
@@ -138,24 +139,24 @@ class Consequents:
 
         for k, values in enumerate(equal_to.T):
             given = normal.factor, normal.coefficients[:, k], equal, values, *nothing
-            # Where the exchange does not end, its last consequents are as good to draw back from.
+            # If the exchange does not end, its last consequents are as good a start of the line.
             with suppress(InfeasibleError):
                 local[:, k] = nearest_by_exchange(*given, partial(violated, k=k))
         return local
 
     def _rows(self, one, points):
-        """Sums over the local consequents that an inequality is about at points; their least."""
+        """Rows of G and entries of h, G u >= h, of an inequality at points."""
         rows, found = self.problem.rows, one.of(self.columns, points)
         if one.input is None:
             targets = rows.targets
             least = one.sign * (one.limit - targets.offset[one.output]) / targets.scale[one.output]
             return found, np.full(len(points), least + _MARGIN)
         found = found * rows.inputs.scale[one.input]
-        # Where no consequents have much of a slope, none is asked for.
+        # Ask for less margin where no consequents have much of a slope.
         return found, _MARGIN * np.minimum(np.abs(found).sum(axis=1), 1.0)
 
     def _proof(self, one, model):
-        """What branch and bound finds of an inequality, and what its bound must not be above."""
+        """What branch and bound finds for an inequality, and the largest bound that proves it."""
         bound_of = Enclosure(model, one.output, -one.sign).evaluate(one.input)
         until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
         most = int(_MOST_BOXES * self._part)
@@ -169,12 +170,12 @@ class Consequents:
         return self.meets_points(model) and all(one.bound <= until for one, until in proofs)
 
     def _failure(self, one, model):
-        """The point where branch and bound finds that an inequality fails, if it does."""
+        """The point at which branch and bound finds a violation, (1, n_inputs), or no point."""
         found, until = self._proof(one, model)
         return found.point[None][: int(found.attained > until)]
 
 
 def _worst(excess, points):
-    """The points at which something is in excess, the worst of them first, and not all."""
+    """The points with the largest positive excess, worst first, up to ``_POINTS_A_ROUND``."""
     order = np.argsort(-excess)[:_POINTS_A_ROUND]
     return points[order[excess[order] > 0.0]]

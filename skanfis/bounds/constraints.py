@@ -1,4 +1,4 @@
-"""Constraints on the outputs, read from what a user gives."""
+"""Constraints on the outputs, read from the user's parameters."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from .._validation import feature_indices, position_of
 
 @dataclass(frozen=True)
 class OutputLimits:
-    """Limits that no prediction passes: kept by the rules in range, provably, and held beyond.
+    """Limits of all predictions: in range the rules provably keep them, beyond outputs are held.
 
     Parameters
     ----------
@@ -36,14 +36,14 @@ class OutputLimits:
 
 @dataclass(frozen=True)
 class FixedPoint:
-    """A value that the model is to have at a point.
+    """A value that the model must have at a point.
 
     Parameters
     ----------
     x : array-like of shape (n_features,) or dict
         The point, in the units of X, or by the inputs' names.
     y : float or array-like of shape (n_outputs,)
-        What is predicted there.
+        The value there.
 
     Examples
     --------
@@ -63,9 +63,9 @@ class FixedPoint:
 
 @dataclass(frozen=True)
 class Inequality:
-    """An inequality on one output: on its slope by ``input``, or, where that is None, its value.
+    """An inequality on one output: on its slope by ``input``, or on its value if that is None.
 
-    sign times it must be at least sign times ``limit``.
+    ``sign`` times the slope or value must be at least ``sign`` times ``limit``.
     """
 
     output: int
@@ -75,19 +75,19 @@ class Inequality:
     name: str
 
     def of(self, model, points):
-        """Sign times what it is about, of every output at points, (n_points, n_outputs)."""
+        """Sign times the slope or value of every output at points, (n_points, n_outputs)."""
         if self.input is None:
             return self.sign * model.predict(points)
         return self.sign * model.gradient(points)[:, self.input]
 
     def excess(self, model, points):
-        """By how much it does not hold at points, (n_points,)."""
+        """By how much the inequality is violated at points, (n_points,); negative if it holds."""
         return self.sign * self.limit - self.of(model, points)[:, self.output]
 
 
 @dataclass(frozen=True, eq=False)
 class Constraints:
-    """Constraints of every output, in the user's units."""
+    """All constraints, by output, in the user's units."""
 
     signs: np.ndarray  # (n_outputs, n_inputs): 1 must not fall, -1 must not rise, 0 is free
     lower: np.ndarray  # (n_outputs,), infinite where there is no limit
@@ -97,7 +97,7 @@ class Constraints:
 
     @classmethod
     def read(cls, monotonic_cst, constraints, input_names, n_outputs):
-        """What the parameters say; None where they ask for nothing."""
+        """The constraints that the parameters ask for; None if they ask for none."""
         signs, n_inputs = _signs(monotonic_cst, input_names, n_outputs), len(input_names)
         lower, upper = np.full(n_outputs, -np.inf), np.full(n_outputs, np.inf)
         points, values = [], []
@@ -122,7 +122,7 @@ class Constraints:
         return found if asks else None
 
     def inequalities(self, model):
-        """Those of them that are inequalities on the outputs of a model, output by output."""
+        """The inequalities on the outputs of a model, output by output."""
         found = []
         for k, name in enumerate(model.output_names):
             for j, sign in enumerate(self.signs[k]):
@@ -166,7 +166,7 @@ class Constraints:
 def _signs(given, input_names, n_outputs):
     n_inputs, told = len(input_names), f"monotonic_cst={given!r}"
     if isinstance(given, Mapping):
-        # A column of the name "7" is meant by 7 too.
+        # The key 7 also stands for a column named "7".
         names = [str(name) if str(name) in input_names else name for name in given]
         if names:
             feature_indices(names, input_names, "monotonic_cst")

@@ -1,16 +1,16 @@
-"""Rules in order: predictions that rise, or keep within limits, by how a model is made.
+"""Rules in order: conditions on them that make predictions rise, or keep within limits.
 
-Let no rule's slope by x_j be negative. Where the part of one rule grows at the cost of another's,
-the prediction changes by the difference of their values, and by their own slopes. It rises where,
-for every such pair, with values f, slopes b by x_j and u = (x_j - middle) / width,
+Let no rule's slope by x_j be negative. As x_j rises, the strength of one rule grows at the cost of
+another's. The prediction then changes by the difference of their values f, and by their slopes b.
+It rises on a box if every such pair keeps, with u = (x_j - middle) / width,
 
     f_above - f_below + width ((o + c e^u) b_above + (o + c e^-u) b_below) >= 0
 
-all over a box. This is linear in the consequents at every point, and least at a corner of all
-inputs but x_j, along which it is convex. docs/bounds.rst says why, which rules of a tree, a grid
-and scattered rules are pairs, and their middle, width, o and c. One line for all rules has none.
+everywhere on the box. This is linear in the consequents at every point. It is convex along x_j, and
+least at a corner of all other inputs. docs/bounds.rst proves it, and says which rules of a tree, a
+grid and scattered rules form pairs, with which middle, width, o and c. A single line has no pairs.
 
-To fall is the same with all signs reversed. A prediction is within limits where every rule is.
+To fall, all signs are reversed. A prediction is within limits if every rule is.
 """
 
 from dataclasses import dataclass, replace
@@ -24,19 +24,19 @@ from ..model import TSKModel
 from .quadratic_program import nearest_by_exchange
 from .terms import EPS, ROUNDINGS
 
-# The margin that a slope keeps of zero, and a pair of its inequality, in standard deviations of the
-# target; a pair that has half of its margin is let be.
+# Margins of slopes, and of the inequalities of pairs, in standard deviations of the target. A pair
+# that keeps half of its margin counts as in order.
 _SLOPE, _MARGIN = 1e-6, 1e-5
-# Stands for a slope of zero, as a divisor; and the largest u, so that exp(u) is finite.
+# Replaces a slope of zero as a divisor; and the largest u, so that exp(u) is finite.
 _TINY, _FARTHEST = float(np.finfo(float).tiny), 300.0
 ONE_RULE = GridAntecedent.build([], [], [])
 
 
 class _Pairs(NamedTuple):
-    """Pairs of rules, and what must hold of each; widths are negative where predictions fall.
+    """Pairs of rules with the numbers of their inequality; widths are negative for falling ones.
 
     Rule -1 is zero everywhere; ``column`` is the place of x_j in [1, x]. Until pairs are joined, a
-    number may stand for all of them.
+    single number may stand for all of them.
     """
 
     above: Any
@@ -54,16 +54,16 @@ _NO_PAIRS = _Pairs(np.empty(0, dtype=int), np.empty(0, dtype=int))
 
 @dataclass(frozen=True, eq=False)
 class RuleOrder:
-    """What the rules of one output must keep on all of a box; ``signs`` are those of slopes."""
+    """The conditions on the rules of one output over a box; ``signs`` are those of slopes."""
 
     pairs: _Pairs
     signs: np.ndarray
 
     @classmethod
     def of(cls, antecedent: Antecedent, signs, limits, slope_inputs, reference):
-        """None where no order is known that is enough.
+        """The conditions for signs and limits; None where no sufficient ones are known.
 
-        Consequents slope by ``slope_inputs``, and are of these less their ``reference``.
+        Consequents are linear in ``slope_inputs``, less their ``reference``.
         """
         every = np.arange(antecedent.n_rules)
         nothing, found = np.full(every.size, -1), [_NO_PAIRS]
@@ -84,16 +84,17 @@ class RuleOrder:
         return cls(_joined(found), signs[slope_inputs])
 
     def margins(self, rules, low, high):
-        """By how much every inequality holds for rules a + b x on a box, and the rounding of that.
+        """Least margin of every inequality for rules a + b x on a box, and its rounding error.
 
-        Then, where it holds by least, its factors of [a, b] of the rule above, and of that below.
+        Also, where it is least, the factors of [a, b] of the rule above, and of the rule below.
         """
         pairs, columns = self.pairs, self.pairs.column
         rules = np.vstack([rules, np.zeros((1, rules.shape[1]))])
         low, high, every = np.append(1.0, low), np.append(1.0, high), np.arange(columns.size)
         above, below = rules[pairs.above], rules[pairs.below]
         at = np.where(above > below, low, high)
-        # Where the slope along x_j is zero, b_above (1 + c e^u) = b_below (1 + c e^-u).
+        # The inequality is stationary along x_j where
+        # b_above (1 + c e^u) = b_below (1 + c e^-u).
         rise, fall = (np.maximum(np.abs(one[every, columns]), _TINY) for one in (above, below))
         root, curved = np.sqrt(rise) * np.sqrt(fall), np.maximum(pairs.curved, _TINY)
         with np.errstate(over="ignore"):
@@ -107,13 +108,13 @@ class RuleOrder:
         by_below[every, columns] -= pairs.width * (pairs.own + pairs.curved * np.exp(-u))
         margins = (by_above * above - by_below * below).sum(axis=1) - pairs.least
         size = (np.abs(by_above * above) + np.abs(by_below * below)).sum(axis=1)
-        # The error of u grows with the distance of the place from the middle, in widths.
+        # The error of u grows with the size of place and middle, in widths.
         far = 1.0 + (np.abs(place) + np.abs(pairs.middle)) / np.abs(pairs.width)
         rounding = EPS * (ROUNDINGS + at.shape[1]) * (size + np.abs(pairs.least)) * far
         return margins, rounding, by_above, by_below
 
     def holds(self, rules, low, high):
-        """Whether all hold for certain, whatever rounding has done."""
+        """Whether all conditions hold for certain, rounding included."""
         if not (self.signs * rules[:, 1:] >= 0.0).all():
             return False
         margins, rounding, *_ = self.margins(rules, low, high)
@@ -121,9 +122,9 @@ class RuleOrder:
 
 
 def is_in_order(model: TSKModel, output, signs, limits=(-np.inf, np.inf)):
-    """Whether a frozen model keeps signs and limits all over its range, by the order of its rules.
+    """Whether the order of its rules proves that a frozen model keeps signs and limits in range.
 
-    This is the certificate: it knows nothing of how the model was found.
+    This certificate does not depend on how the model was found.
     """
     antecedent, rules = model.antecedent, model.coefficients[:, :, output]
     if (rules == rules[0]).all():
@@ -140,14 +141,14 @@ def _joined(parts):
 
 
 def _pairs_along(antecedent, j, origin):
-    """What must be in order for predictions to rise with x_j; None where no order is enough."""
+    """Pairs whose order makes predictions rise with x_j; None if no sufficient order is known."""
     if isinstance(antecedent, TreeAntecedent):
         return _pairs_of_tree(antecedent, j, origin)
     has_own = np.append(antecedent.term_inputs == j, False)[antecedent.rule_terms]
     lines, shared = np.arange(antecedent.n_rules)[None], 0.0
     if not has_own.any():
         return _NO_PAIRS
-    # One term each, of one width: else no order of the rules is known to be enough.
+    # Every rule has one Gaussian term, all of one width: else no sufficient order is known.
     kinds = {(family, theta[1]) for i, family, theta in antecedent.terms if i == j}
     (family, log_width), *others = kinds
     if family is not Gaussian or others or (has_own.sum(axis=1) != 1).any():
@@ -197,13 +198,13 @@ def with_equal_widths(antecedent: Antecedent, inputs) -> Antecedent:
 
 
 def nearest_in_order(order: RuleOrder, factor, start, to_rules, box, equal, equal_to):
-    """The u nearest to ``start`` that keep an order on a box; InfeasibleError where none do.
+    """The u nearest to ``start`` that keep an order on a box; InfeasibleError if there are none.
 
-    Rules on [1, z] are ``to_rules @ u``; of E u = e, ``equal`` is E and ``equal_to`` e.
+    Rules on [1, z] are ``to_rules @ u``. ``equal`` and ``equal_to`` are E and e of E u = e.
     """
     n_basis = 1 + order.signs.size
     n_rules = len(to_rules) // n_basis
-    # Signs of slopes are given at once; a pair is added when it fails, at the point of the worst.
+    # Signs of slopes are constraints at once. A pair that fails adds one, where it fails most.
     slopes = to_rules.reshape(n_rules, n_basis, -1)[:, 1:][:, order.signs != 0]
     signs = order.signs[order.signs != 0, None]
     slopes = (signs * slopes).reshape(-1, to_rules.shape[1])
@@ -218,6 +219,6 @@ def nearest_in_order(order: RuleOrder, factor, start, to_rules, box, equal, equa
         rows = rows[:, :-1].reshape(short.size, len(to_rules)) @ to_rules
         return rows, order.pairs.least[short] + _MARGIN
 
-    # A slope that the penalty holds at zero, since data ask for none, cannot keep a margin.
+    # A slope that ``Penalty.absent`` holds at zero cannot keep a margin.
     least = _SLOPE * factor.half_solve(slopes.T).any(axis=0)
     return nearest_by_exchange(factor, start, equal, equal_to, slopes, least, violated)

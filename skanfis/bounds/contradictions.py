@@ -1,8 +1,8 @@
-"""Whether data contradict a constraint: whether the free fit breaks it, and is certain to.
+"""Whether data contradict a constraint: the free fit breaks it by more than its uncertainty.
 
-A slope: over a third of the rows, sorted by the input, the mean change of the free fit from the
-smallest to the largest value is against the sign by more than four of its standard deviations. A
-limit: at some row the free fit is beyond it by as many.
+For a sign, the rows are split into thirds by the input. On one third, the mean change of the free
+fit from the smallest to the largest value must be against the sign by more than four of its
+standard deviations. For a limit, the free fit must be beyond it by as many at some row.
 """
 
 from itertools import pairwise
@@ -11,10 +11,10 @@ import numpy as np
 
 from .enclosure import reach_of
 
-# Ratio of squared errors, with the constraint over without, below which nothing is said.
+# Ratio of squared errors, with the constraint over without, below which there is no warning.
 _WORTH_SAYING = 1.01**2
-# Standard deviations that make certain; and the part of all slopes by an input that has the wrong
-# sign where data contradict: less may come from how rules bend between data.
+# Standard deviations that count as certain; and the least part of all slopes by an input with the
+# wrong sign: less may come from how rules bend between data.
 _CERTAIN, _WRONG_PART = 4.0, 0.25
 _MOST_ROWS, _ROWS_NAMED, _PARTS = 2048, 5, 3
 
@@ -32,7 +32,7 @@ def contradicted(free, held, inequalities, fixed, rows, raised):
     points, values = fixed
     gap = np.zeros(values.shape)
     if len(points):
-        # A point beyond the range is predicted as the nearest point from which nothing changes.
+        # Predictions no longer change beyond the reach: a point further out is moved there.
         reach = reach_of(free)
         answered = np.clip(points, free.minimum - reach, free.maximum + reach)
         gap = np.abs(free.predict(points) - values) - _CERTAIN * _deviation(free, answered).T
@@ -53,7 +53,7 @@ def contradicted(free, held, inequalities, fixed, rows, raised):
 
 
 def _speaks_against(one, free, X):
-    """Whether the free fit is certain of what an inequality forbids."""
+    """Whether the free fit violates an inequality for certain."""
     excess = one.excess(free, X)
     if one.input is None:
         return bool((excess > _CERTAIN * _deviation(free, X)[one.output]).any())

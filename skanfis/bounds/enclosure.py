@@ -1,8 +1,9 @@
-"""What a model's output, and its slopes, can be on a box: docs/bounds.rst has the derivation.
+"""Ranges of a model's output, and of its slopes, on a box: docs/bounds.rst derives them.
 
-E is the mean over rules by their strengths; f are the values of the consequents and b their slopes;
-D are the slopes of log-strengths less their mean, c their curvatures; phi is any function that all
-rules share; h is the way that is followed out of range. Bounds allow for rounding.
+E is the mean over rules, weighted by their strengths. f are the values of the consequents, b their
+slopes. D are the slopes of log-strengths less their mean, c their curvatures. phi is any function
+that all rules share. h is the way on which a tangent is followed out of range. Bounds include
+rounding errors.
 """
 
 from dataclasses import replace
@@ -27,14 +28,14 @@ from .terms import (
 
 
 def reach_of(model):
-    """How far predictions change beyond the range of each input, (n_inputs,)."""
+    """How far beyond the range of each input predictions still change, (n_inputs,)."""
     if model.out_of_bounds != "linear" or model.max_extrapolation == 0.0:
         return np.zeros(model.n_inputs)
     return min(model.max_extrapolation, FARTHEST_ROW) * model.spread
 
 
 class _Parts:
-    """What one batch of boxes is made of; ranges have both ends along their first axis."""
+    """The quantities of one batch of boxes; ranges have both ends along their first axis."""
 
     def __init__(self, rules: "Enclosure", low, high):
         model, ends = rules.model, np.stack([low, high])
@@ -42,7 +43,7 @@ class _Parts:
         middle, half = 0.5 * (box[0] + box[1]), 0.5 * (box[1] - box[0]) * (1.0 + 4.0 * EPS)
         terms = term_ranges(model.antecedent, *box)
         at_middle = term_ranges(model.antecedent, middle, middle)
-        # The part in the range, (2, n_inputs, n_boxes), half its widths, and the range of h.
+        # The part of the boxes in range, (2, n_inputs, n_boxes), half its widths, the range of h.
         self.box, self.half = box, half
         self.way = np.clip(ends - box, -rules.reach[:, None], rules.reach[:, None])
         self.shares = [
@@ -52,13 +53,13 @@ class _Parts:
         # Ranges of D and of d^2 log w / dx_j^2, which broadcast to the shape of f.
         self.departure = {j: ends for one in self.shares for j, ends in one.departure.items()}
         self.curvature = {j: ends for one in self.shares for j, ends in one.curvature.items()}
-        self.strength = prod(one.high for one in self.shares)  # the largest of every rule
+        self.strength = prod(one.high for one in self.shares)  # upper bound for every rule
         # f at the middle of the box, of shape (*counts, n_boxes), and its range.
         centre = rules.height + rules.slopes @ (middle - model.reference[:, None])
         radius = np.abs(rules.slopes) @ half
         self.middle = rules.shaped(centre)
         self.value = rules.shaped(np.stack([centre - radius, centre + radius]))
-        self.known: dict = {}  # what has been computed of them
+        self.known: dict = {}  # cache
         self.slack, self.slope_slack = rules.slacks(self)
 
 
@@ -70,7 +71,7 @@ class Enclosure:
         factors = model.antecedent.factor_terms()
         self.counts = model.antecedent.share_counts if factors else (1,)
         self.axes = tuple(range(len(self.counts)))
-        # The terms of a factor's shares along an axis of its own.
+        # Every factor has its shares along an axis of its own.
         shapes = np.where(np.eye(len(self.counts), dtype=bool), self.counts, 1).tolist()
         self.factors = [
             {j: terms.reshape(*shape, terms.shape[-1]) for j, terms in one.items()}
@@ -81,26 +82,26 @@ class Enclosure:
         self.place = {j: place for place, one in enumerate(self.factors) for j in one}
         self.reach, self.tangents = reach_of(model), model.tangent_groups
         answering = model.with_out_of_bounds("clip") if model.out_of_bounds in SILENT else model
-        # The rules are enclosed before outputs are held: that is monotone, and comes last.
+        # The bounds are those of the rules. Holding outputs is monotone, and is applied to bounds.
         self.rules = replace(answering, target=None)
         self.lowest, self.highest = np.sort(sign * model.output_limits[:, output])
 
     def say(self, X):
-        """Sign times the output of rows, before it is held."""
+        """Sign times the output at rows, before it is held within limits."""
         return self.sign * self.rules.predict(X)[:, self.output]
 
     def hold(self, values):
-        """Values, or bounds of them, within the limits that outputs are held in."""
+        """Values, or bounds, held within the limits of the output."""
         return np.clip(values, self.lowest, self.highest)
 
     def evaluate(self, j=None):
-        """What :func:`~skanfis.bounds.search.largest` takes: of the slope by input j, or values."""
+        """The function for ``search.largest``: that of the slope by input j, or of values."""
         return self.values if j is None else partial(self.slope, j=j)
 
     def values(self, low, high):
         """Upper bounds on boxes (n_inputs, n_boxes), a point in each, and the output there.
 
-        Then how much of the bound is due to the width along each input, (n_inputs, n_boxes).
+        Also how much the width along each input adds to the bound, (n_inputs, n_boxes).
         """
         with np.errstate(all="ignore"):
             parts = _Parts(self, low, high)
@@ -114,14 +115,14 @@ class Enclosure:
         return self.hold(bound), points, self.hold(attained), gain
 
     def slope(self, low, high, j):
-        """As :meth:`values`, of the slope by input j; of a jump, values are one-sided limits."""
+        """As :meth:`values`, for the slope by input j; where it jumps, values are one-sided."""
         with np.errstate(all="ignore"):
             parts = _Parts(self, low, high)
             natural = self._slope(parts, low, high, j)[1]
             bends = np.stack([self._mixed(parts, i, j) for i in range(len(low))], axis=1)
             points, rise = _best_centres(bends, low, high)
             least, most = self._slope(_Parts(self, points, points), points, points, j)
-            # Beyond the range the tangent's own slope changes by what is not enclosed here.
+            # Beyond the range, the slope of the tangent changes by terms not enclosed here.
             inside = (low >= self.model.minimum[:, None]) & (high <= self.model.maximum[:, None])
             by_bends = np.where(inside.all(axis=0), most + rise, np.inf)
             gain = np.where(
@@ -129,7 +130,7 @@ class Enclosure:
             )
             bound = np.fmin(natural, by_bends)
             if np.isfinite([self.lowest, self.highest]).any():
-                # Where the output may be held its slope may be zero.
+                # If the output may be held, its slope may be zero.
                 lowest, highest = self._natural(parts)
                 is_free = (lowest >= self.lowest) & (highest <= self.highest)
                 bound = np.where(is_free, bound, np.maximum(bound, 0.0))
@@ -138,7 +139,7 @@ class Enclosure:
         return bound, points, attained, gain * (high - low)
 
     def _gain_of_slope(self, parts, j):
-        """About how much of the range of dP/dx_j goes with each input's width, (n_inputs, n)."""
+        """Roughly how much each input's width adds to the range of dP/dx_j, (n_inputs, n)."""
         gain, tangent = np.zeros_like(parts.half), parts.strength * size(self._tangent(parts, j))
         for i, ends in parts.departure.items():
             gain[i] = (size(ends) * tangent).sum(axis=self.axes)
@@ -150,14 +151,14 @@ class Enclosure:
         largest = (np.abs(self.height) + np.abs(self.slopes) @ far_off).max(axis=0)
         part = EPS * (ROUNDINGS + self.model.n_rules + self.model.n_inputs)
         strength = parts.strength
-        # What the errors of the strengths move the output by, rule by rule.
+        # How much errors of the strengths change the output, rule by rule.
         moved = np.zeros(parts.middle.shape)
         for place, one in enumerate(parts.shares):
             error = np.fmin(one.error, 1.0)
             moved += 2.0 * strength * error * size(self._centred(parts, place))
         slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
         for j, ends in parts.departure.items():
-            # Where one rule speaks alone D is zero, and yet its slope has been rounded.
+            # Where one rule fires alone, D is zero, but its slope is still rounded.
             steepness = np.maximum(parts.shares[self.place[j]].steepness[j], size(ends))
             slopes[j] += part * (strength * steepness).sum(axis=self.axes) * largest
             slopes[j] += 2.0 * (size(ends) * moved).sum(axis=self.axes)
@@ -177,7 +178,7 @@ class Enclosure:
         return own + product(parts.departure[j], self._centred(parts, self.place[j]))
 
     def _centred(self, parts, *places):
-        """Range of f less its means along the axes of these factors, at the middle's shares."""
+        """Range of f less its means along the axes of these factors, by shares at the middle."""
         if places not in parts.known:
             middle, radius = self._less_means(parts, parts.middle, places), 0.0
             for i in np.flatnonzero(self.slopes.any(axis=0)):
@@ -197,7 +198,7 @@ class Enclosure:
         return mean_range(ends, parts.shares).reshape(2, -1)
 
     def _natural(self, parts):
-        """Range of what the rules say, E f + sum_j h_j dy/dx_j, (2, n_boxes)."""
+        """Range of the rules' output by its formula, E f + sum_j h_j dy/dx_j, (2, n_boxes)."""
         found = self._mean(parts, parts.value)
         for j in self._ways_out(parts):
             slope = self._steepness(self._there(parts, j), j)
@@ -205,7 +206,7 @@ class Enclosure:
         return widened(found, parts.slack)
 
     def _there(self, parts, j):
-        """Parts of where the tangent along j is found: other inputs may be held elsewhere."""
+        """The parts at which the tangent along j is taken: other inputs may be at their medians."""
         own, at = self.tangents
         g = int(np.flatnonzero(own[:, j])[0])
         if np.isnan(at[g]).all():
@@ -216,11 +217,11 @@ class Enclosure:
         return parts.known["there", g]
 
     def _steepness(self, parts, j):
-        """Range of the slope by x_j where the model is that of its rules."""
+        """Range of the slope by x_j of the rules, in range."""
         return widened(self._mean(parts, self._tangent(parts, j)), parts.slope_slack[j])
 
     def _ways_out(self, parts):
-        """Inputs along which some box leaves the range."""
+        """Inputs along which at least one box leaves the range."""
         return np.flatnonzero(parts.way.any(axis=(0, 2)))
 
     def _slope(self, parts, low, high, i):
@@ -229,7 +230,7 @@ class Enclosure:
         inside = beyond = self._steepness(parts, i)
         if i in outside:
             beyond = self._steepness(self._there(parts, i), i)
-        # A tangent that is found elsewhere along i does not change with x_i.
+        # A tangent that is taken at a median of x_i does not change with x_i.
         moves = np.isnan(at[own[:, outside].argmax(axis=0), i])
         for j in outside[(outside != i) & moves]:
             inside = inside + product(parts.way[:, j], self._mixed(self._there(parts, j), i, j))
@@ -244,11 +245,11 @@ class Enclosure:
         )
         down = np.min([np.where(there, ends, np.inf)[0] for there, ends in pieces], axis=0)
         up = np.max([np.where(there, ends, -np.inf)[1] for there, ends in pieces], axis=0)
-        # What is not known has no bounds.
+        # NaN stands for an unknown range: it is infinite.
         return np.where(np.isnan([down, up]), [[-np.inf], [np.inf]], [down, up])
 
     def _mixed(self, parts, i, j):
-        """Range of the second derivative by two inputs, or twice by one."""
+        """Range of the second derivative by x_i and x_j, which may be the same input."""
         found = np.zeros_like(parts.value)
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:
@@ -262,7 +263,7 @@ class Enclosure:
                 both = square(parts.departure[i]) + parts.curvature[i]
             off = self._centred(parts, *places)
             if len(places) == 1:
-                # Of one factor f is less its mean whatever the shares, for E D_i D_j is not zero.
+                # E D_i D_j is not zero within one factor: f loses its mean for any shares.
                 off = off - mean_range(off, [parts.shares[self.place[i]]])[::-1]
             found = found + product(both, off)
         slack = EPS * ROUNDINGS * prod(self.counts) * size(found).max(axis=self.axes)
@@ -270,7 +271,7 @@ class Enclosure:
 
 
 def _best_centres(slopes, low, high):
-    """The points from which slopes give the least upper bound, and how far this is above them."""
+    """Points at which the mean value form gives the least bound, and its rise above the value."""
     down, up = slopes
     between = (up * high - down * low) / (up - down)
     points = np.where(down >= 0.0, high, np.where(up <= 0.0, low, between))

@@ -1,8 +1,8 @@
-"""Constraints on the outputs of a fit, kept for certain.
+"""Constraints on the outputs of a fit, provably kept.
 
-Rules in order (``construction``) keep them by inequalities of their own; where no order is known,
-or none holds, the best line for all rules does. If that raises the error by more than 2 %, the fit
-goes back towards the free one as far as branch and bound can prove that all are kept.
+Rules in order (``construction``) keep them by linear inequalities. If no order is known, or none
+exists, one line for all rules keeps them. If this raises the error by more than 2 %, the fit moves
+back towards the free one, as far as branch and bound can prove that all constraints still hold.
 """
 
 from contextlib import suppress
@@ -22,21 +22,21 @@ from .construction import ONE_RULE, RuleOrder, nearest_in_order, with_equal_widt
 from .contradictions import contradicted
 from .quadratic_program import InfeasibleError
 
-# Ratios of squared errors, constrained over free: beyond the first, consequents nearer to the free
-# fit are sought; beyond the other, consequents that were drawn are worth a warning.
+# Ratios of squared errors, constrained over free. Beyond the first, consequents nearer to the free
+# fit are sought; beyond the second, there is a warning if the fit was drawn towards rules in order.
 _COSTLY, _WORTH_A_WARNING = 1.02**2, 1.1**2
-_OF_MARGINS = 1e-8  # variances of the target that margins alone may cost
+_OF_MARGINS = 1e-8  # squared error, in variances of the target, that margins alone may cost
 
 
 def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, rows):
-    """The consequents nearest to those of an evaluation that keep all constraints, for certain.
+    """The consequents nearest to those of an evaluation that provably keep all constraints.
 
-    With them, in the user's units as ``model`` is, come the evaluation of the free ones at these
-    premises, the points in the range at which values are known, and a report. With ``rows``, X, y
-    and their numbers, a warning names those that contradict a constraint.
+    Returns these, in the user's units like ``model``; the evaluation of the free consequents at the
+    same premises; the points in range at which values are known; and a report. If ``rows`` are
+    given, X, y and their numbers, a warning names those that contradict a constraint.
     """
     _check_points(model, constraints)
-    # The best at premises for which there is an order.
+    # The free fit at premises for which an order may be known.
     free = at_equal_widths(problem, evaluation, constraints)
     found = Consequents(model, free, problem, constraints)
     local, is_line = _in_order(found)
@@ -46,7 +46,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         nearer, way = found.nearest_proven(local)
         if found.loss(nearer) < after:
             held, drawn, after = found.model(nearer), way, found.loss(nearer)
-    raised = after / max(before, _OF_MARGINS)  # of exact data the free fit may have no error
+    raised = after / max(before, _OF_MARGINS)  # on exact data, the free fit may have no error
     report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
     if rows is not None:
         unheld, fixed = replace(model, target=None), (constraints.points, constraints.values)
@@ -65,14 +65,14 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         )
     points = constraints.points
     if model.out_of_bounds == "linear":
-        # Beyond, a tangent is known, which is more than a value: it is not counted.
+        # A point beyond the range fixes a tangent, not a value in range: it is left out.
         points = points[model.in_bounds(points)]
     points = np.clip(points, model.minimum, model.maximum)
     return held.coefficients, free, points, report
 
 
 def _check_points(model, constraints):
-    """Raise ValueError where a point is fixed at which the policy predicts nothing."""
+    """Raise ValueError for a fixed point at which the policy gives no value."""
     beyond = constraints.points[~model.in_bounds(constraints.points)]
     if len(beyond) and model.out_of_bounds in SILENT:
         raise ValueError(
@@ -83,10 +83,10 @@ def _check_points(model, constraints):
 
 
 def _in_order(found: Consequents):
-    """Rules in order, or a line, and which; an error says what constraints cannot be kept."""
+    """Local consequents in order, and whether they are one line; an error if there are none."""
     try:
         ways = ways_in_order(found.problem, found.free, found.constraints, *found.fixed)
-        # Of rules rounding may be larger than the margin, of a line there is next to none.
+        # Rounding may exceed the margin of rules, but hardly that of a line, which comes next.
         return next(way for way in ways if found.is_certified(*way))
     except InfeasibleError:
         raise InfeasibleConstraintsError(_refusal(found)) from None
@@ -103,7 +103,7 @@ def _refusal(found):
 
 
 def at_equal_widths(problem, evaluation, constraints: Constraints):
-    """The evaluation where Gaussian terms have one width on every input that has a sign."""
+    """The evaluation with Gaussian terms of one width on every input with a monotonic sign."""
     inputs = np.flatnonzero(constraints.signs.any(axis=0))
     antecedent = with_equal_widths(evaluation.antecedent, inputs)
     if (antecedent.parameters == evaluation.antecedent.parameters).all():
@@ -112,10 +112,10 @@ def at_equal_widths(problem, evaluation, constraints: Constraints):
 
 
 def ways_in_order(problem, evaluation, constraints: Constraints, equal, equal_to):
-    """Yield the nearest rules in order, then the nearest line, and whether it is one.
+    """Yield the nearest rules in order, then the nearest line, each with whether it is a line.
 
-    InfeasibleError if neither exists. Of the equalities E u = e for local consequents u, ``equal``
-    is E, ``equal_to`` e by output.
+    InfeasibleError if neither exists. ``equal`` is E and ``equal_to`` e by output, in the
+    equalities E u = e for local consequents u.
     """
     for is_line in (False, True):
         with suppress(InfeasibleError):
@@ -124,10 +124,10 @@ def ways_in_order(problem, evaluation, constraints: Constraints, equal, equal_to
 
 
 def held_in_search(constraints: Constraints | None):
-    """The function that keeps signs during the search, on standardised data; None without signs.
+    """The function that enforces signs during the search, on standardised data; None without signs.
 
-    It gives the antecedent and consequents nearest to an evaluation. Limits and fixed points, which
-    are in the user's units, are left to the final fit.
+    It returns the antecedent and the nearest consequents in order for an evaluation. Limits and
+    fixed points, which are in the user's units, are left to the final fit.
     """
     if constraints is None or not constraints.signs.any():
         return None

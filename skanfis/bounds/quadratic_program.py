@@ -1,7 +1,7 @@
 """The nearest consequents that keep linear constraints.
 
-(u - u0)' M (u - u0), with M = L L' the matrix of the normal equations, is to be least over
-E u = e, G u >= h. In v = L' (u - u0) equalities are eliminated by a QR factorisation; the rest is
+They minimise (u - u0)' M (u - u0) subject to E u = e and G u >= h, M = L L' being the matrix of the
+normal equations. In v = L' (u - u0), a QR factorisation eliminates equalities; the rest is
 least-distance programming by non-negative least squares (Lawson and Hanson 1974, chapter 23).
 """
 
@@ -11,9 +11,9 @@ from scipy.optimize import nnls
 
 from ..consequent import NormalFactor
 
-# What is smaller is zero: a minimum, and, of rows of length one, what others leave of them.
+# Distances, and lengths relative to a row's own, that count as zero below this.
 _ZERO = 1e-10
-# Rounds in which inequalities are found.
+# Most rounds of the exchange.
 _MOST_ROUNDS = 1000
 
 
@@ -22,7 +22,7 @@ class InfeasibleError(Exception):
 
 
 def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
-    """The u nearest to ``start`` with E u = e and G u >= h, and which of these hold it back."""
+    """The u nearest to ``start`` with E u = e and G u >= h, and which inequalities are active."""
     half = factor.half_solve(at_least.T)
     base, toward = np.empty((len(half), 0)), np.empty(0)
     if equal.size:
@@ -34,7 +34,7 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
     short = least - at_least @ start - half.T @ (base @ toward)
     free = half - base @ (base.T @ half)
     length = np.sqrt(np.sum(free**2, axis=0))
-    # Inequalities that the equalities decide, or no u can change: they hold, or nothing helps.
+    # No u changes these inequalities, given the equalities: if one fails, nothing helps.
     fixed = length <= _ZERO * np.sqrt(np.sum(half**2, axis=0)) + np.finfo(float).tiny
     if (short[fixed] > _ZERO * (1.0 + np.abs(least[fixed]))).any():
         raise InfeasibleError
@@ -48,9 +48,9 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
 
 
 def nearest_by_exchange(factor, start, equal, equal_to, at_least, least, violated):
-    """The same for inequalities that are found as they are needed, beside those given.
+    """The same with inequalities that are added when they are violated, on top of those given.
 
-    ``violated`` gives rows of G, and of h, that a u does not keep; none where it keeps all.
+    ``violated`` returns the rows of G, and of h, that a u violates; none if it keeps all.
     """
     n_given = len(least)
     for _ in range(_MOST_ROUNDS):
@@ -58,7 +58,7 @@ def nearest_by_exchange(factor, start, equal, equal_to, at_least, least, violate
         more, least_of_more = violated(solved)
         if not len(more):
             return solved
-        # Those that do not hold u back may be needed again: the distance grows, so it ends.
+        # Inactive ones are dropped, and may come back. The distance grows, so this ends.
         kept = holds_back | (np.arange(len(least)) < n_given)
         at_least = np.vstack([at_least[kept], more])
         least = np.append(least[kept], least_of_more)

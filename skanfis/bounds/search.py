@@ -5,12 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-# Most boxes that are split in one round; fewest that are worth evaluating: fewer are split again.
+# Most boxes that are split in one round; fewest to evaluate at once: fewer are split again first.
 _BATCH, _FEWEST = 1024, 64
 
 
 class Found(NamedTuple):
-    """The largest value over a box: between ``attained``, at ``point``, and ``bound``."""
+    """The largest value over a box lies between ``attained``, found at ``point``, and ``bound``."""
 
     bound: float
     attained: float
@@ -20,7 +20,7 @@ class Found(NamedTuple):
 
 
 class _Boxes(NamedTuple):
-    """Boxes (n_inputs, n_boxes), their bounds, and how much is due to the width by each input."""
+    """Boxes (n_inputs, n_boxes), their bounds, and how much the width along each input adds."""
 
     low: np.ndarray
     high: np.ndarray
@@ -44,7 +44,7 @@ class _Boxes(NamedTuple):
         return found.low, found.high
 
     def _halves(self, cuts):
-        """Both halves of every box, along the input that promises most."""
+        """Both halves of every box, along the input with the largest gain."""
         k = np.arange(self.low.shape[1])
         width = self.high - self.low
         gain = np.where(np.isfinite(self.gain), self.gain, np.finfo(float).max) * (width > 0.0)
@@ -67,7 +67,7 @@ def largest(
     """Enclose the largest value that a function takes on a box.
 
     ``evaluate`` is as ``Enclosure.values``. The search ends when bound and value are ``tolerance``
-    apart, or on one side of ``until``. It cuts at ``cuts`` first; ``first`` is a point, its value.
+    apart, or on one side of ``until``. It cuts at ``cuts`` first; ``first``: a point and its value.
     """
     where, best = (low, -np.inf) if first is None else first
     lows, highs = low[:, None].astype(float), high[:, None].astype(float)

@@ -1,12 +1,12 @@
-r"""What terms can be on a box, for every family; shares of strengths, and means by them.
+r"""Ranges of terms on a box, for every family; of shares of strengths; and of means by shares.
 
-log mu rises up to the term's place and falls from there on. Slopes of log-concave families
-(Gaussians, sigmoids) fall; those of bells and of flanks with a foot are looked at piece by piece.
-The box is first widened by what rounding x and the term's numbers may amount to, then the ranges by
-their own rounding: they hold of log mu as it is, and as it is computed.
+log mu rises up to the term's place and falls from there on. Its slope decreases for log-concave
+families (Gaussians, sigmoids); that of bells and of flanks with a foot is enclosed piece by piece.
+Boxes are first widened by the rounding errors of x and the term's numbers, then ranges by their
+own. So they hold both for the exact log mu, and for log mu as computed.
 
-Strengths are products of shares, one of each factor: a softmax of sums l_k of log mu, enclosed from
-the ranges of all l_k. Means sum_k nu_k v_k are bounded by weak duality: see docs/bounds.rst.
+Strengths are products of shares, one of each factor. Shares are a softmax of sums l_k of log mu,
+enclosed from the ranges of all l_k. Weak duality bounds means sum_k nu_k v_k: see docs/bounds.rst.
 """
 
 from dataclasses import dataclass, replace
@@ -32,24 +32,24 @@ from ..membership import (
 from ..membership.profiles import LinearProfile, SplineProfile
 
 EPS = float(np.finfo(float).eps)
-# Rounding errors, in EPS, of a membership, a share, a rule's output or its slope: of a dozen steps,
-# with room to spare. Those of sums are counted beside.
+# Rounding error, in EPS, of a membership, a share, a rule's output or its slope: a dozen steps,
+# with room to spare. Errors of sums over terms and rules are added.
 ROUNDINGS = 32.0
 _SIDES, _PRODUCTS = tuple(SIDES.values()), tuple(PRODUCTS.values())
 _ONE_SIDED = (SShaped, ZShaped)
 _TURNING = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
-# Where the logarithm of a floored flank is steepest, to the last bit: of the straight one as the
-# foot is reached; of two parabolas where 2 s^2 is about as large as the floor, s = 1 - t.
+# The t at which the logarithm of a floored flank is steepest, to the last bit: for the straight one
+# just before the foot; for two parabolas where 2 (1 - t)^2 is about as large as the floor.
 _STEEPEST = {LinearProfile: np.nextafter(1.0, 0.0), SplineProfile: 1.0 - 5.506937986e-6}
 
 
 class TermRanges(NamedTuple):
-    """Ranges over every box for every term, (2, n_terms, n_boxes), and an error."""
+    """Ranges over every box for every term, (2, n_terms, n_boxes), and the error of log mu."""
 
     log_mu: np.ndarray
     slope: np.ndarray
     curve: np.ndarray  # d^2 log mu / dx^2; NaN where it has no bound
-    error: np.ndarray  # of log mu as it is computed, at most
+    error: np.ndarray  # largest rounding error of log mu as computed
 
 
 def ranges(group: TermGroup, low, high):
@@ -57,7 +57,8 @@ def ranges(group: TermGroup, low, high):
     family, theta = group.family, group.theta
     lo, hi = low[group.inputs], high[group.inputs]
     off = np.abs(theta[0])
-    # A shoulder is off by no more than the x at which flanks are felt; a sigmoid is felt anywhere.
+    # Size of the term's numbers. A shoulder matters only for an x beyond it, whose size covers it.
+    # The cuts of sigmoids, at center -+ width, matter everywhere.
     if family in (SigmoidDifference, *_PRODUCTS):
         off = off + np.exp(theta[1])
     reach = ROUNDINGS * EPS * (np.maximum(np.abs(lo), np.abs(hi)) + off[:, None])
@@ -79,11 +80,11 @@ def ranges(group: TermGroup, low, high):
 
 
 def _with_turns(group, lo, hi, slope):
-    """Range of slopes that turn between the ends: at these, and where they turn, a flank each.
+    """Range of slopes that are not monotonic: from the ends, and the extremes on each flank.
 
-    Of a bell they do where |d log mu / dt| = 2b t^(2b - 1) / (1 + t^(2b)) has its peak, t flank
-    lengths off the shoulder; with 2b < 1 it is at the centre, and has no bound. With a foot they do
-    where a flank is steepest, and at t = 1, from where on it falls as a Gaussian does.
+    For a bell, the extreme is at the peak of |d log mu / dt| = 2b t^(2b - 1) / (1 + t^(2b)), t in
+    lengths of the flank; with 2b < 1 it is at the centre, and unbounded. For a flank with a foot,
+    extremes are where it is steepest, and at t = 1, from where on it falls as a Gaussian does.
     """
     family, theta = group.family, group.theta[:, :, None]
     widths = np.exp(theta[1:])
@@ -98,7 +99,7 @@ def _with_turns(group, lo, hi, slope):
             turns = [(over ** (1.0 / double), over ** (1.0 - 1.0 / double))]
     else:
         top = _STEEPEST[family.profile]
-        # The top may lie between floats.
+        # The extreme may lie between floats: allow a little more.
         turns = [(top, -(1.0 + 1e-3) * family.profile.log_value_and_slope(top)[1]), (1.0, 1.0)]
     half = 0.5 * widths[2] if family in (Trapezoidal, PiShaped) else 0.0
     for side, flank in flanks.items():
@@ -113,8 +114,8 @@ def _with_turns(group, lo, hi, slope):
 def _curvature(group, lo, hi):
     """Range of d^2 log mu / dx^2; NaN where it has no bound.
 
-    That is of flanks with a foot, whose slope jumps or nearly so, and of pointed bells, b < 1. Of
-    families but sigmoids it is the range wherever x is.
+    It has none for flanks with a foot, whose slope jumps or nearly so, and for pointed bells,
+    b < 1. Only for sigmoids does the range depend on the box.
     """
     family, theta = group.family, group.theta[:, :, None]
     if family in (Gaussian, TwoSidedGaussian):
@@ -127,7 +128,7 @@ def _curvature(group, lo, hi):
             cuts = [(theta[0] - width, theta[2]), (theta[0] + width, theta[-1])]
         found = 0.0
         for cut, log_length in cuts:
-            # Of each it is -s (1 - s) / length^2: the larger, the nearer x is to the cut.
+            # For each sigmoid s it is -s (1 - s) / length^2, largest in size next to the cut.
             length, furthest = np.exp(log_length), np.maximum(np.abs(lo - cut), np.abs(hi - cut))
             odds = np.exp(-np.stack([np.abs(np.clip(cut, lo, hi) - cut), furthest]) / length)
             found = found - odds / (length * (1.0 + odds)) ** 2
@@ -141,12 +142,12 @@ def _curvature(group, lo, hi):
 
 
 def _along(factor, by_term):
-    """By input, sums over the terms of each share."""
+    """By input, sums of ``by_term`` over the terms of each share."""
     return {j: by_term[..., places, :].sum(axis=-2) for j, places in factor.items()}
 
 
 def _total(factor, by_term):
-    """Sums over the terms of each share on all inputs."""
+    """Sums of ``by_term`` over the terms of each share on all inputs."""
     return sum(_along(factor, by_term).values())
 
 
@@ -158,12 +159,12 @@ class Shares:
     ranges have both ends in front.
     """
 
-    axis: int  # its own, from the end
-    middle: np.ndarray  # at the middle of the box
+    axis: int  # the factor's own, counted from the end
+    middle: np.ndarray  # shares at the middle of the box
     low: np.ndarray
     high: np.ndarray
-    error: np.ndarray  # of the logarithm of a share as it is computed, at most
-    steepness: dict[int, np.ndarray]  # size of d l / dx_j
+    error: np.ndarray  # largest rounding error of the logarithm of a share
+    steepness: dict[int, np.ndarray]  # largest |d l / dx_j|
     curvature: dict[int, np.ndarray]  # range of d^2 l / dx_j^2
     departure: dict[int, np.ndarray]  # range of D_j, d l / dx_j less its mean by the shares
 
@@ -179,13 +180,13 @@ def term_ranges(antecedent: Antecedent, low, high):
 def enclosed(factor: dict, axis: int, terms: TermRanges, at_middle: TermRanges, half):
     """The :class:`Shares` of a factor, from the ranges of its terms over boxes and at the middles.
 
-    A factor has, by input, the terms whose log mu add up to that of a share, along the last axis;
-    the last place is none.
+    ``factor`` holds, by input, the positions of the terms of each share along the last axis; the
+    last position, of the row of zeros, means no term.
     """
     middle = softmax(_total(factor, at_middle.log_mu.mean(axis=0)), axis=axis)
     least, most = _by_range(_total(factor, terms.log_mu), axis)
     error = _total(factor, terms.error)
-    # The mean error of all counts for each: the sum of the softmax.
+    # The sum in the softmax adds the mean error of all shares.
     mean, largest = (most * error).sum(axis=axis, keepdims=True), _largest(error, axis)
     error = error + np.minimum(mean, largest) + EPS * (ROUNDINGS + least.shape[axis])
     slopes, curvature = _along(factor, terms.slope), _along(factor, terms.curve)
@@ -205,15 +206,15 @@ def enclosed(factor: dict, axis: int, terms: TermRanges, at_middle: TermRanges, 
 
 
 def _by_range(logarithms, axis):
-    """Ranges of shares from those of their logarithms alone."""
+    """Ranges of shares from the ranges of their logarithms alone."""
     down, up = np.exp(logarithms - _largest(logarithms[1], axis))
     slack = (down.shape[axis] + ROUNDINGS) * EPS
     all_up, all_down = (one.sum(axis=axis, keepdims=True) for one in (up, down))
-    # What the subtraction has lost counts as being there.
+    # Add what the subtraction may have lost to rounding.
     least = down / (down + np.maximum(all_up - up, 0.0) + 2.0 * slack * all_up)
     spare = np.maximum(all_down - down - 2.0 * slack * all_down, 0.0)
     most = np.minimum(up / (up + spare) * (1.0 + slack), 1.0)
-    # 0 / 0: all that is known of the share is that it lies from 0 to 1.
+    # 0 / 0: nothing is known of the share, but that it lies from 0 to 1.
     return np.nan_to_num(least * (1.0 - slack), nan=0.0), np.nan_to_num(most, nan=1.0)
 
 
@@ -221,7 +222,7 @@ def _departures(shares, slopes):
     found = {}
     for j, ends in slopes.items():
         total = (shares.high * size(ends)).sum(axis=shares.axis, keepdims=True)
-        # A slope is off by so many roundings, and its mean by those of the sum besides.
+        # Rounding errors of the slope, and of its mean, a sum.
         slack = EPS * (5.0 * ROUNDINGS + ends.shape[shares.axis]) * total
         slack = slack + 4.0 * ROUNDINGS * EPS * size(ends)
         found[j] = widened(ends - mean_range(ends, [shares])[::-1], slack)
@@ -229,7 +230,7 @@ def _departures(shares, slopes):
 
 
 def _by_mean_value(departure, at_middle, shares, half):
-    """Ranges of D, narrower by d D_j / dx_i = [i = j] (c_j - E c_j) - E D_i D_j."""
+    """Ranges of D, narrowed by d D_j / dx_i = [i = j] (c_j - E c_j) - E D_i D_j."""
     found = {}
     for j, ends in departure.items():
         change = 0.0
@@ -241,7 +242,7 @@ def _by_mean_value(departure, at_middle, shares, half):
             rate = size(curve - mean_range(both + curve, [shares])[::-1]) + 2.0 * slack
             change = change + half[i] * rate
         low, high = widened(at_middle[j], change)
-        # Where the curvature is not known neither is a change: NaN.
+        # An unknown curvature gives NaN, which fmax and fmin ignore.
         found[j] = np.stack([np.fmax(ends[0], low), np.fmin(ends[1], high)])
     return found
 
@@ -252,7 +253,7 @@ def mean_range(ends, every):
 
 
 def largest_mean(values, every):
-    """Upper bound of the mean of values under all factors' shares."""
+    """Upper bound of the mean of values, under any shares of all factors in their ranges."""
     for shares in reversed(every):
         middle = (shares.middle * values).sum(axis=shares.axis, keepdims=True)
         off = values - middle
@@ -266,7 +267,7 @@ def _largest(values, axis):
 
 
 def product(one, other):
-    """Range of a product from the ranges of both; NaN, for unknown, of zero times infinity."""
+    """Range of a product from the ranges of both; NaN, for unknown, if zero meets infinity."""
     corners = np.stack([a * b for a in one for b in other])
     return np.stack([corners.min(axis=0), corners.max(axis=0)])
 
@@ -284,6 +285,6 @@ def size(ends):
 
 
 def widened(ends, by=0.0):
-    """The interval, wider to either side, and by rounding errors of its ends."""
+    """The interval, widened to either side by ``by`` and by rounding errors of its ends."""
     slack = ROUNDINGS * EPS * size(ends) + by
     return np.stack([ends[0] - slack, ends[1] + slack])

@@ -1,4 +1,4 @@
-"""Clusterers in their own right, which know a rule base when they see one."""
+"""Two clusterers with scikit-learn's interface, for rule bases and for use on their own."""
 
 from .fuzzy_cmeans import FuzzyCMeans
 from .subtractive import SubtractiveClustering

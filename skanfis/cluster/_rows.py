@@ -1,6 +1,6 @@
-"""What both clusterers do with rows: check, merge, measure by blocks, give to the nearest centre.
+"""Rows of both clusterers: checked, merged, measured by blocks, assigned to the nearest centre.
 
-Fits see distinct rows, sorted: neither order nor repetition changes the last bit.
+A fit uses the sorted distinct rows, so that neither order nor repetition changes the last bit.
 """
 
 from typing import Any, Self
@@ -15,7 +15,7 @@ from .._sklearn import check_sample_weight, fit_context
 from .._validation import check_finite, check_not_negative
 from ..blocks import row_blocks
 
-# Distances in a block: a few arrays of this size stay in the cache.
+# Number of distances in a block: a few arrays of this size stay in the cache.
 _BLOCK_SIZE = 32_768
 
 
@@ -45,13 +45,13 @@ def distance_blocks(points, centers):
 
 
 def nearest(points, centers):
-    """Which centre is nearest to each point; the first of several."""
+    """The index of the centre nearest to each point; the first of several."""
     found = [distances.argmin(axis=0) for _, distances in distance_blocks(points, centers)]
     return np.concatenate(found)
 
 
 class Clusterer(ClusterMixin, BaseEstimator):
-    """Finds ``cluster_centers_``, of which the nearest is a row's cluster."""
+    """Finds ``cluster_centers_``; a row belongs to the nearest."""
 
     cluster_centers_: np.ndarray
     _find_centers: Any
@@ -65,7 +65,7 @@ class Clusterer(ClusterMixin, BaseEstimator):
         X : array-like of shape (n_samples, n_features)
         y : None
         sample_weight : array-like of shape (n_samples,), default=None
-            Zero or positive; a whole number counts as so many copies of the row.
+            Zero or positive; a whole number counts as that many copies of the row.
         """
         X = check_rows(self, X, reset=True)
         self._find_centers(*distinct_rows(X, sample_weight))

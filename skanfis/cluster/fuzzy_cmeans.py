@@ -1,7 +1,7 @@
 r"""Fuzzy c-means by alternating optimisation.
 
-Memberships at fixed centres and centres at fixed memberships are each the best (Bezdek 1981).
-Distances are taken relative to the nearest centre's, for as m → 1 their powers would overflow.
+Each step finds the best memberships for fixed centres, then the best centres for these (Bezdek
+1981). Distances are relative to that of the nearest centre: as m → 1, their powers would overflow.
 """
 
 import warnings
@@ -20,7 +20,7 @@ from sklearn.utils.validation import check_is_fitted
 from .._sklearn import Interval, StrOptions
 from ._rows import Clusterer, check_rows, distance_blocks
 
-# Centres that differ by less than this part of their cluster's own spread are one.
+# Centres that differ by less than this part of their clusters' spread coincide.
 _SAME = 0.01
 
 
@@ -29,7 +29,7 @@ def memberships(distances, m):
     closest = distances.min(axis=0)
     nearness = np.ones_like(distances)
     np.divide(closest, distances, out=nearness, where=distances > closest)
-    # "auto" is m = 1 where all rows are the same.
+    # m may be 1: "auto" gives that if all rows are the same.
     nearness **= 1.0 / max(m - 1.0, np.finfo(float).tiny)
     nearness /= nearness.sum(axis=0)
     return nearness
@@ -45,7 +45,7 @@ def alternate(points, weight, centers, m):
         mass += pull.sum(axis=1, keepdims=True)
         scatter += np.einsum("kn,kn->k", pull, distances)[:, np.newaxis]
         moment += pull @ points[part]
-    # A centre far from all rows has none where m is near to one: it stays where it is.
+    # With m near 1, a centre far from all rows has no mass: it stays where it is.
     has_rows = mass > 0.0
     mass = np.where(has_rows, mass, 1.0)
     new = np.where(has_rows, moment / mass, centers)
@@ -65,7 +65,7 @@ def descend(points, weight, centers, m, tol, max_iter):
 
 
 def largest_exponent(points, weight):
-    """Above this m all centres coincide at the mean, which then attracts; inf of no such m.
+    """The m above which all centres fall together at the mean; inf if there is none.
 
     1 / (1 - 2 λ), λ the largest eigenvalue of Σ_i w_i x_i x_iᵀ / |x_i|² / Σ_i w_i (Yu et al. 2004).
     """

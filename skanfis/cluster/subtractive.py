@@ -1,4 +1,4 @@
-"""Subtractive clustering: data points that many others are near to, one after the other."""
+"""Subtractive clustering: the data points with the most others nearby, one after the other."""
 
 from numbers import Integral, Real
 from typing import ClassVar
@@ -10,7 +10,7 @@ from scipy.spatial.distance import cdist
 from .._sklearn import Interval
 from ._rows import Clusterer, distance_blocks, nearest
 
-# Potentials this near, relative to the first centre's, differ by rounding: the first of them wins.
+# Potentials that differ by less, relative to the first centre's, are tied: the first row wins.
 _TIE = 1e-9
 
 
@@ -24,8 +24,8 @@ class SubtractiveClustering(Clusterer):
     r"""Subtractive clustering: finds the number of clusters and their centres.
 
     The potential of a row [1]_ counts the rows near it, with every column scaled to 0 to 1,
-    :math:`P_i = \sum_j w_j \exp(-4 \| x_i - x_j \|^2 / r^2)`. The highest row becomes a centre,
-    what it explains is subtracted, and so on. Time grows with the square of the number of rows.
+    :math:`P_i = \sum_j w_j \exp(-4 \| x_i - x_j \|^2 / r^2)`. The highest row becomes a centre, its
+    part of all potentials is subtracted, and so on. Time grows with the square of the rows.
 
     Parameters
     ----------
@@ -34,9 +34,9 @@ class SubtractiveClustering(Clusterer):
     squash : float, default=1.25
         The radius in which a centre takes potential from its neighbours, relative to ``radius``.
     accept, reject : float, default=0.5 and 0.15
-        A row becomes a centre if its potential is more than ``accept`` times the first centre's,
-        none if less than ``reject`` times; in between if P / P_1 + d / radius >= 1, with d the
-        distance from the nearest centre.
+        A row becomes a centre if its potential P is more than ``accept`` times that of the first
+        centre, P_1. It does not if P is less than ``reject`` times P_1. In between, it does if
+        P / P_1 + d / radius >= 1, with d the distance from the nearest centre.
     max_clusters : int or None, default=None
         Most clusters, those of highest potential; None sets no limit.
 
@@ -98,10 +98,10 @@ class SubtractiveClustering(Clusterer):
         self.cluster_centers_ = rows[centers]
 
     def _highest(self, points, potential):
-        """Positions of the centres in ``points``, as they were chosen, and their potentials.
+        """Positions of the centres in ``points``, in the order of choice, and their potentials.
 
-        Neither potential nor distance grows: a point that was passed over is never accepted later,
-        so that the next centre is the highest of those that may be one (Chiu 1994).
+        The next centre is the highest point that may be one (Chiu 1994). Potential and distance
+        never grow, so a point that was passed over cannot become one later.
         """
         first, distance = potential.max(), np.full(points.shape[0], np.inf)
         centers: list[int] = []

@@ -1,16 +1,16 @@
 r"""The functional ANOVA of a sum of rules under the product of the distributions of its inputs.
 
-Inputs come in blocks, of one or of several that enter as one. On grids and trees the strength of
-rule r is a product of a function of each block, w_r = prod_g p_rg, and its consequent is a sum,
-a_r + sum_g l_rg. With a number e whose square is zero, what the rule adds to the output is the
-factor of e in one product over the blocks,
+Inputs come in blocks, of one input or of several that enter together. On grids and trees the
+strength of rule r is a product of a function of each block, w_r = prod_g p_rg, and its consequent
+is a sum, a_r + sum_g l_rg. With a number e whose square is zero (a dual number), the rule adds to
+the output the factor of e in one product over the blocks,
 
     (1 + a_r e) prod_g (p_rg + p_rg l_rg e) .
 
-So E[y | x_v] needs, of blocks that are not in v, the means of p and p l; the mean of its square
-needs, of those in v, the means of products of these in rules r and s, which have an e each.
-Components are differences. Rules of other kinds are sampled: y at draws, and at draws that share
-x_v with them alone.
+So E[y | x_v] takes the means of p and p l of the blocks that are not in v. The mean of its square
+takes, for the blocks in v, the means of products of these in rules r and s, each with an e of its
+own. Components are differences. Rules of other kinds are sampled: y at draws, and at other draws
+that share only x_v with them.
 """
 
 from dataclasses import dataclass, replace
@@ -24,16 +24,17 @@ from ..learning.data import Scale, StandardisedData
 from ..policies import ROUNDING
 from ..search import representative_rows, weighted_quantile
 
-# Values of every input that a fit keeps, from so many rows at most; draws in place of closed forms,
-# and those that each point of a curve is a mean over.
+# Values of every input that a fit keeps, and most rows that they come from; draws in place of
+# closed forms, and draws for the mean at each point of a curve.
 N_VALUES, _MOST_ROWS, N_DRAWS, N_SHARED = 200, 2000, 20_000, 200
 
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """Inputs that enter as one: their distribution as rows with weights, None for equal ones.
+    """Inputs that enter as one, and their distribution: rows with weights, None for equal weights.
 
-    And the mean products of what rules say of them; None where strengths are no products.
+    ``moments`` are mean products of the rules' functions of them, None if strengths are no
+    products.
     """
 
     inputs: tuple[int, ...]
@@ -43,7 +44,7 @@ class Block:
 
 
 def rule_functions(antecedent, inputs):
-    """Sets of terms that rules have on some inputs, the empty one first; and that of each rule."""
+    """Sets of terms that rules have on some inputs, the empty one first; and each rule's set."""
     table = antecedent.rule_terms
     own = np.where(np.isin(np.append(antecedent.term_inputs, -1)[table], inputs), table, -1)
     own = np.pad(own, ((1, 0), (0, 1)), constant_values=-1)
@@ -52,7 +53,7 @@ def rule_functions(antecedent, inputs):
 
 
 def _functions(factors, sets, z):
-    """[p, z_1 p, ...] of the functions p of a block with standardised inputs z, a row each."""
+    """Rows [p, z_1 p, ...] for the functions p of a block, z its standardised inputs."""
     padded = np.vstack([factors, np.ones((1, z.shape[1]))])
     p = np.ones((len(sets), z.shape[1]))
     for column in sets.T:
@@ -73,7 +74,7 @@ def _sums(rows, antecedent, blocks, sets):
 
 
 def _moments(rows, antecedent, blocks):
-    """Means over rows of the same; None for each block if strengths are no products."""
+    """Means over rows of these products; None for each block if strengths are no products."""
     if antecedent.factors(np.zeros((rows.inputs.scale.size, 1))) is None:
         return [None] * len(blocks)
     sets = [rule_functions(antecedent, inputs)[0] for inputs in blocks]
@@ -95,7 +96,7 @@ def blocks_of_rows(model, blocks, X, weight=None):
 
 
 def input_marginals(rows, antecedent):
-    """What a fit keeps of every input alone, see ``RuleSupport.marginals``."""
+    """The data that a fit keeps on every input alone, see ``RuleSupport.marginals``."""
     blocks = [(j,) for j in range(rows.inputs.scale.size)]
     table, weight, _ = representative_rows(rows.sample or rows, _MOST_ROWS)
     parts = (np.arange(N_VALUES) + 0.5) / N_VALUES
@@ -106,7 +107,7 @@ def input_marginals(rows, antecedent):
 
 
 def _beside(rows, antecedent):
-    """Of every term the values next above and below its place, (2, n_terms), the first negative."""
+    """For every term, minus the next value above its place, and the next below, (2, n_terms)."""
     inputs, places = antecedent.term_inputs, antecedent.term_places[:, None]
     found = np.full((2, inputs.size), -np.inf)
     for _, every, _, _ in rows.blocks(fitting_rows(4 * inputs.size + 1)):
@@ -129,7 +130,7 @@ def draw(blocks, n_draws, rng):
 class ProductAnova:
     """The ANOVA of one output of rules whose strengths are products, in closed form.
 
-    ``error`` is what a share of the variance may be off by.
+    ``error`` is the error that a share of the variance may have.
     """
 
     error = 0.0
@@ -142,7 +143,7 @@ class ProductAnova:
         every = np.arange(model.n_rules)
         for block in blocks:
             sets, which = rule_functions(model.antecedent, block.inputs)
-            # p and p l of every rule by the functions of the block.
+            # p and p l of every rule as sums of the functions of the block.
             by = np.zeros((2, model.n_rules, len(block.moments)))
             by[0, every, which] = 1.0
             for i, j in enumerate(block.inputs, start=1):
@@ -153,12 +154,12 @@ class ProductAnova:
             self.squares.append(np.einsum("arm,bsm->abrs", half, by, optimize=True))
         self.start = np.stack([np.ones(model.n_rules), model.coefficients[:, 0, output]])
         self.mean = float(self._others(())[1].sum())
-        # About the mean, so that no square loses digits.
+        # Count from the mean, so that squares lose no digits.
         self.start[1] -= self.mean
         self.variance = _but_rounding(self.closed(range(len(blocks))), self.mean)
 
     def _others(self, subset):
-        """Of every rule, the product of the means of all blocks that are not in the subset."""
+        """For every rule, the product of the means of all blocks that are not in the subset."""
         others = (mean for g, mean in enumerate(self.means) if g not in subset)
         return reduce(_times, others, self.start)
 
@@ -168,7 +169,7 @@ class ProductAnova:
         return float(reduce(_times_both, squares, _outer(self._others(subset)))[1, 1].sum())
 
     def totals(self):
-        """Of every block, the variance that is left when all others are known (Sobol's total)."""
+        """For every block, the variance left when all others are known (Sobol's total)."""
         before = accumulate(self.squares[:-1], _times_both, initial=_outer(self.start))
         nothing = np.zeros_like(self.squares[0])
         nothing[0, 0] = 1.0
@@ -192,7 +193,7 @@ class ProductAnova:
         return found
 
     def covariances(self, subsets, X):
-        """Of E[y | x_v] and y over rows X in the box, and the variance of y there."""
+        """Covariances of E[y | x_v] and y over rows X in the box, and the variance of y there."""
         subsets = [range(self.n_blocks), *subsets]
         sums = products = np.zeros(len(subsets))
         n_values = 4 * self.n_blocks * self.n_rules + len(subsets)
@@ -214,7 +215,7 @@ def _times(one, other):
 
 
 def _times_both(one, other):
-    """The same of two such numbers, each with an e of its own."""
+    """The same product for numbers with two different e, one for each rule."""
     (a, b), (c, d) = one, other
     return np.stack([_times(a, c), _times(a, d) + _times(b, c)])
 
@@ -224,12 +225,12 @@ def _outer(of_rules):
 
 
 def _but_rounding(variance, mean):
-    """Zero where an output varies by rounding errors only."""
+    """The variance, or zero where an output varies by rounding errors only."""
     return variance if variance > (ROUNDING * mean) ** 2 else 0.0
 
 
 class DrawnAnova:
-    """The same for any rules, by draws."""
+    """The ANOVA of one output of any rules, by draws."""
 
     error = 0.02
 
@@ -247,15 +248,15 @@ class DrawnAnova:
         self.variance = _but_rounding(float(self.y.var()), self.mean)
 
     def _given(self, subset, X, draws):
-        """The sum of rules at ``draws``, which take x_v from rows X, less the mean."""
+        """The sum of rules at ``draws``, less the mean; x_v is first replaced by that of rows X."""
         columns = [j for g in subset for j in self.blocks[g].inputs]
         draws[:, columns] = X[:, columns]
         return replace(self.model, target=None).predict(draws)[:, self.output] - self.mean
 
     def _conditional(self, subset, X):
-        """At rows X in the box, y with all but x_v drawn, less the mean: E[y | x_v] in expectation.
+        """An estimate of E[y | x_v] less the mean, at rows X in the box: y with the rest drawn.
 
-        What the draws themselves add is taken off, by regression on y at the draws.
+        Regression on y at the draws takes off the part that the draws themselves explain.
         """
         if not (parts := [g for g in subset if self.has_part[g]]):
             return np.zeros(len(X))
@@ -268,12 +269,12 @@ class DrawnAnova:
         return float(self.y @ self._conditional(subset, self.rows)) / N_DRAWS
 
     def totals(self):
-        """Of every block, half of the mean square by which it alone moves y (Jansen 1999)."""
+        """For every block, half of the mean square by which it alone moves y (Jansen 1999)."""
         moved = (self._given((g,), self.others, self.rows.copy()) for g in range(self.n_blocks))
         return np.array([np.mean((one - self.y) ** 2) / 2.0 for one in moved])
 
     def covariances(self, subsets, X):
-        """Of E[y | x_v] and y over rows X in the box, and the variance of y there."""
+        """Covariances of E[y | x_v] and y over rows X in the box, and the variance of y there."""
         X = np.tile(X, (-(-N_DRAWS // len(X)), 1))
         y = self._given((), X, X)
         y -= y.mean()
@@ -281,7 +282,7 @@ class DrawnAnova:
         return np.array(found), float(y.var())
 
     def curve(self, subset, X):
-        """E[y | x_v] at rows X, less the mean, over the same draws of all others at each."""
+        """E[y | x_v] at rows X, less the mean; all rows share the draws of the other inputs."""
         draws = np.tile(self.rows[:N_SHARED], (len(X), 1))
         found = self._given(subset, np.repeat(X, N_SHARED, axis=0), draws)
         return found.reshape(len(X), -1).mean(axis=1)

@@ -24,11 +24,11 @@ from .sentences import PRECISION
 _N_POINTS, BINS = 201, 30
 # The brightest end of a colour map is hard to see on white.
 BRIGHTEST = 0.85
-# Beyond so many terms, a legend is longer than the picture is high.
+# With more terms, a legend is longer than the picture is high.
 _MOST_NAMED = 7
 # Characters of a legend, or of a note below, that a panel has room for.
 _LEGEND_WIDTH = 42
-# Contours that can still be told apart by colour; of values, what is rounding.
+# Contours that can still be told apart by colour; relative range that counts as rounding errors.
 _LEVELS, _FLAT = 15, 1e-11
 # Below this coverage a prediction counts as extrapolated: it does not set the colours.
 _COVERED = 0.5
@@ -40,8 +40,8 @@ class InputTerms(NamedTuple):
     input_name: str
     term_names: tuple[str, ...]
     grid: np.ndarray  # (n_points,)
-    before: np.ndarray  # (n_terms, n_points), as after
-    after: np.ndarray
+    before: np.ndarray  # memberships before training, (n_terms, n_points)
+    after: np.ndarray  # and after it
     edges: np.ndarray | None  # of the bins of the data, (n_bins + 1,)
     counts: np.ndarray | None  # rows in each bin, (n_bins,)
 
@@ -57,7 +57,7 @@ class MembershipDisplay:
     inputs : list of objects with attributes
         ``input_name``, ``term_names``, a ``grid`` of values, the memberships ``before`` and
         ``after`` training, (n_terms, n_points), ``edges`` and ``counts`` of the histogram, or None.
-        Of the cuts of a tree there are the sides above.
+        For the cuts of a tree, only the sides above are drawn.
 
     Examples
     --------
@@ -79,11 +79,11 @@ class MembershipDisplay:
         Parameters
         ----------
         estimator : fitted estimator or TSKModel
-            As :func:`skanfis.export.fold` takes it; the units are those of a pipeline's input.
+            As for :func:`skanfis.export.fold`; units are those of a pipeline's input.
         X : array-like of shape (n_samples, n_features), default=None
             Data whose histogram lies behind the memberships.
         ax : matplotlib Axes or sequence of Axes, default=None
-            One for each input that has terms; None makes a figure.
+            One for each input with terms; None makes a figure.
         """
         model, rows = fold_with_rows(estimator, X)
         with_terms = np.unique(model.antecedent.term_inputs).tolist()
@@ -105,7 +105,7 @@ def _terms_on(model, j, rows):
     grid = np.linspace(model.minimum[j], model.maximum[j], _N_POINTS)
     own = np.flatnonzero(model.antecedent.term_inputs == j)
     if isinstance(model.antecedent, TreeAntecedent):
-        # Of a cut the side above; the one below is the rest to one.
+        # Draw only the side above a cut; the side below is one minus that.
         own = own[own < model.antecedent.n_nodes]
     Z = np.zeros((model.n_inputs, _N_POINTS))
     Z[j] = grid
@@ -121,7 +121,7 @@ def _draw_terms(axes, terms):
     if terms.counts is not None:
         heights = terms.counts / max(terms.counts.max(), 1)
         axes.stairs(heights, terms.edges, fill=True, color="0.9", zorder=0)
-    # In the order of places: scattered terms come in the order of their rules.
+    # Shades follow the places of terms: scattered terms come in the order of their rules.
     places = terms.after @ terms.grid / terms.after.sum(axis=1)
     shades = pyplot().get_cmap()(np.linspace(0.0, BRIGHTEST, len(names)))
     for t, shade in zip(np.argsort(places, kind="stable"), shades, strict=True):
@@ -137,7 +137,7 @@ def _draw_terms(axes, terms):
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class ResponseSurfaceDisplay:
-    """Prediction over two inputs with the rest held; it fades where no data cover it.
+    """Prediction over two inputs with the others held; it fades where no data cover it.
 
     ``ax_``, ``figure_`` and ``surface_`` are matplotlib's, once drawn.
 
@@ -145,7 +145,7 @@ class ResponseSurfaceDisplay:
     ----------
     xx0, xx1, response, coverage : ndarray of shape (grid_resolution, grid_resolution)
         Values of the two inputs, as of ``numpy.meshgrid``, the prediction, and how well the
-        training data cover each point, from 0 to 1; 1 where none are known.
+        training data cover each point, from 0 to 1; 1 if they are not known.
     input_names, output_name : tuple of two str, str
         Names of the two inputs and of the output.
     held : dict
@@ -194,8 +194,8 @@ class ResponseSurfaceDisplay:
         X : array-like of shape (n_samples, n_features), default=None
             Rows to show as points.
         features, held, output : pair of int or str, dict, int or str
-            Inputs across and up; values of others, by default their mean, or the commonest case of
-            one that is 0 or 1 and of a category; which output.
+            Inputs across and up; values of the others, by default the mean, or the commonest case
+            of a category or of an input that is 0 or 1; which output.
         grid_resolution : int, default=60
             Points on each axis, 2 or more.
         ax : matplotlib Axes, default=None
@@ -241,12 +241,12 @@ class ResponseSurfaceDisplay:
         seen = self.response[self.coverage >= _COVERED]
         seen = seen if seen.size > 1 else self.response
         low, high = np.min(seen), np.max(seen)
-        # What is flat but for rounding has a scale about its one value.
+        # A surface that is flat but for rounding gets a scale around its value.
         room = 0.0 if high - low > _FLAT * max(-low, high) else 0.1 * max(-low, high) or 1.0
         levels = pyplot().MaxNLocator(_LEVELS).tick_values(low - room, high + room)
         self.surface_ = ax.contourf(x, y, self.response, levels=levels, extend="both")
         self.figure_.colorbar(self.surface_, ax=ax, label=on_axis(self.output_name))
-        # White over the surface, the thicker the less data cover it; under the points.
+        # White over the surface, below the points, fades it where few data cover it.
         white = np.ones((*self.coverage.shape, 4))
         white[..., 3] = 0.85 * np.clip(1.0 - self.coverage, 0.0, 1.0)
         ax.pcolormesh(x, y, white, zorder=1.5)
@@ -260,12 +260,12 @@ class ResponseSurfaceDisplay:
 
 
 def axes_or_new(ax, figsize=(5.6, 4.2)):
-    """The axes that are given, or those of a new figure."""
+    """The given axes, or those of a new figure."""
     return pyplot().subplots(figsize=figsize, layout="constrained")[1] if ax is None else ax
 
 
 def panels_or_new(ax, count, note):
-    """So many axes as an array: those given, or new ones in a figure with a note at its foot."""
+    """An array of ``count`` axes: the given ones, or those of a new figure with a note below."""
     if ax is not None:
         axes = np.ravel(ax)
         if axes.size != count:
@@ -279,7 +279,7 @@ def panels_or_new(ax, count, note):
 
 
 def pyplot():
-    """The module of matplotlib; ImportError with what to install."""
+    """The module matplotlib.pyplot; the ImportError says what to install."""
     try:
         import matplotlib.pyplot as plt
     except ImportError as error:
@@ -293,8 +293,9 @@ def pyplot():
 def section_over(model, both, n_points, held):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 
-    The others take their value in ``held``, or their mean in training, in few digits, or what is
-    commonest of 0 and 1 and of a category; without training data, the middle of their range.
+    The others take their value in ``held``, or their mean in training, in few digits. An input that
+    is 0 or 1, and a category, take the commonest case. Without training data, the others take the
+    middle of their range.
     """
     mean = model.reference if has_training_data(model) else 0.5 * (model.minimum + model.maximum)
     row = np.clip(rounded(mean, model.spread, PRECISION), model.minimum, model.maximum)
@@ -305,7 +306,7 @@ def section_over(model, both, n_points, held):
     names, columns = model.input_names, categories(model)
     taken = {*both, *(checked_position(feature, names) for feature in held)}
     for one in columns.values():
-        # The commonest level is held, unless a level is drawn or held already.
+        # Hold the commonest level, unless a level is already drawn or held.
         row[one.inputs] = 0.0
         share = model.reference[one.inputs]
         if taken.isdisjoint(one.inputs) and share.max() >= 1.0 - share.sum():

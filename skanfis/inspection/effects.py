@@ -1,4 +1,4 @@
-"""What every input, and every pair of inputs, does to the output, and how much of it."""
+"""The effects of every input, and every pair of inputs: their shares of the output's variance."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -17,15 +17,15 @@ from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
 from .text import MOST_NAMED, counted
 
-# Notes are made of shares that differ by more, and of outputs held on more of the combinations.
+# A note tells of shares that differ by more, and of outputs held on a larger part of combinations.
 _DIFFERENT, _HELD = 0.1, 0.01
-_N_HELD = 10_000  # combinations that are drawn
+_N_HELD = 10_000  # combinations drawn to find this part
 _DIGITS = 3  # of printed shares
 
 
 @dataclass(frozen=True, eq=False)
 class Effects:
-    """What :func:`effects` has found; printed, the table and what is to be said of it."""
+    """The result of :func:`effects`; it prints as the table and the notes on it."""
 
     table: pd.DataFrame
     held: float
@@ -45,35 +45,35 @@ def effects(
     groups: Mapping[str, Sequence[int | str]] | None = None,
     output: int | str = 0,
 ) -> Effects:
-    r"""Tell what part of the output's variance is due to each input, and to each pair of them.
+    r"""Find the part of the output's variance that is due to each input, and to each pair of them.
 
-    The functional ANOVA of the sum of rules, before it is held, in the range of training, under the
-    product of the inputs' distributions: exact for grids and trees, whose strengths are products of
-    one function per input. Scattered and listed rules: by 20,000 draws, which the notes say.
+    This is the functional ANOVA of the sum of rules, before it is held, in the range of training,
+    under the product of the inputs' distributions. It is exact for grids and trees, whose strengths
+    are products of one function per input. For other rules it uses 20,000 draws; a note says so.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        As :func:`skanfis.export.fold` takes it. Columns that a OneHotEncoder makes of one category
-        enter as one.
+        As for :func:`skanfis.export.fold`. Columns that a OneHotEncoder makes of one category enter
+        as one.
     X : array-like of shape (n_samples, n_features), default=None
         Rows whose distributions are taken, input by input. None: those of the training rows, which
         ``fit`` keeps (JSON, ``partial_fit`` and ``merge`` do not).
     groups : dict of str to sequence of str or int, default=None
-        Columns that enter as one, by a name for them. Needs X, which tells how they go together.
+        Columns that enter as one, by a name for them. Needs X, for their joint distribution.
     output : int or str, default=0
         Which output.
 
     Returns
     -------
     effects : object with attributes
-        ``table``: DataFrame with a row per input, category or group, one per pair, the strongest
-        first, and "three or more"; pairs that are zero because no rule has either input in its IF
-        part are left out; "sobol", shares of the variance where inputs are independent,
-        and with X "rows", Cov(component, output) / Var(output) over its rows [1]_, which may be
-        negative. Each column sums to one. ``held``: part of the combinations of independent inputs
-        where the output would be held within its limits, from 10,000 draws. ``notes``: sentences.
-        Printed, many rows that do nothing, or no more than draws are off by, are one.
+        ``table``: DataFrame with a row per input, category or group, then one per pair, strongest
+        first, and "three or more". Pairs that are zero because no rule has either input in its IF
+        part are left out. Column "sobol" has shares of the variance for independent inputs; with X,
+        "rows" has Cov(component, output) / Var(output) over its rows [1]_, which may be negative.
+        Each column sums to one. ``held``: part of the combinations of independent inputs on which
+        the output would be held within its limits, from 10,000 draws. ``notes``: sentences. When
+        printed, many rows without an effect, or with one below the error of draws, become one.
 
     Raises
     ------
@@ -105,14 +105,14 @@ def effects(
     if study.rows is not None:
         columns["rows"] = _shares(subsets, *anova.covariances(subsets, study.rows))
     table = pd.DataFrame(columns, index=[" and ".join(labels[g] for g in v) for v in subsets])
-    # Rounded, so that inputs alike but for rounding errors stay in their order.
+    # Rounded, so that rounding errors do not change the order of inputs with equal shares.
     shares = table["sobol"].round(9).tolist()
     order = sorted(range(len(subsets)), key=lambda i: (len(subsets[i]), -shares[i]))
     table = table.iloc[order]
     printed = _as_printed(table, [subsets[i] for i in order], anova.error)
     if len(ones) > 2:
         left = (float(anova.variance > 0.0) - table.sum()).to_frame("three or more").T
-        # Not by its label, which an input may have.
+        # Append it by position: an input may have the same label.
         table, printed = pd.concat([table, left]), pd.concat([printed, left])
     held = study.held
     notes = _notes(table, held, isinstance(anova, DrawnAnova))
@@ -120,10 +120,10 @@ def effects(
 
 
 def _as_printed(table, subsets, error):
-    """The table with one row for inputs and pairs that do nothing, to the digits that are printed.
+    """The table with one row for all inputs and pairs whose printed shares are zero.
 
-    ``error`` is what shares are off by. An input stays that does something together with another.
-    A few rows stay as they are.
+    Shares below ``error`` count as zero. An input stays if a pair with it does, and a few rows stay
+    in any case.
     """
     is_seen = (table.round(_DIGITS).abs() > error).any(axis=1).to_numpy()
     seen = {g for v in compress(subsets, is_seen) for g in v}
@@ -137,7 +137,7 @@ def _as_printed(table, subsets, error):
 
 
 def _shares(subsets, closed, variance):
-    """Shares of components: of pairs, what is left without their inputs."""
+    """Shares of components: those of pairs are without the shares of their inputs."""
     if variance <= 0.0:
         return np.zeros(len(subsets))
     found = dict(zip(subsets, closed, strict=True))
@@ -165,7 +165,7 @@ def _notes(table, held, is_by_draws):
 
 
 def importances(model: TSKModel) -> np.ndarray:
-    """Sobol's total share of every input over their sum, (n_outputs, n_inputs)."""
+    """Sobol's total share of every input, over the sum of all, (n_outputs, n_inputs)."""
     blocks = _known(model, [(j,) for j in range(model.n_inputs)], None)
     anovas = [_anova(model, k, blocks) for k in range(model.n_outputs)]
     found = np.array([anova.totals() * (anova.variance > 0.0) for anova in anovas])
@@ -179,7 +179,7 @@ def _anova(model, output, blocks):
 
 
 def _known(model, blocks, rows):
-    """Blocks of inputs with their distributions: over rows, or without these in training."""
+    """Blocks of inputs with their distributions: over the rows, or if None those in training."""
     if rows is not None:
         return blocks_of_rows(model, blocks, rows)
     if model.support is None or not model.support.marginals:
@@ -191,7 +191,7 @@ def _known(model, blocks, rows):
     for inputs in blocks:
         own = list(inputs)
         if len(own) > 1 or two_valued[own[0]]:
-            # Indicators of the levels of a category, and none of these; their means are known.
+            # Indicators of levels, at most one of which is 1: their means are the distribution.
             share = np.clip(model.reference[own], 0.0, 1.0)
             share = np.append(share, max(1.0 - share.sum(), 0.0))
             X = np.tile(model.reference, (share.size, 1))
@@ -213,14 +213,14 @@ class Study:
     output: int
     labels: list[str]
     blocks: list[Block]
-    levels: dict[str, list[str]]  # of each category, those without an indicator as one, the last
-    is_shown: list[bool]  # whether pictures show it: one input, or a category
+    levels: dict[str, list[str]]  # by category; the last joins all levels without an indicator
+    is_shown: list[bool]  # whether pictures show a block: if it is one input, or a category
     rows: np.ndarray | None
     anova: ProductAnova | DrawnAnova
 
     @classmethod
     def of(cls, estimator, X, groups, output):
-        """Of an estimator; ValueError as of :func:`effects`."""
+        """From an estimator; ValueError as of :func:`effects`."""
         model, rows = fold_with_rows(estimator, X)
         k = checked_position(output, model.output_names, "output")
         rows = None if rows is None else np.clip(rows, model.minimum, model.maximum)
@@ -251,7 +251,7 @@ class Study:
         return cls(model, k, labels, blocks, levels, is_shown, rows, _anova(model, k, blocks))
 
     def pairs(self):
-        """Pairs of blocks by their positions, but those that are zero for want of terms."""
+        """Pairs of blocks by their positions, without those that are zero for want of terms."""
         terms = set(self.model.antecedent.term_inputs.tolist())
         active = [bool(terms & set(block.inputs)) for block in self.blocks]
         least = 1 if self.model.order else 2
@@ -259,12 +259,12 @@ class Study:
         return [(g, h) for g, h in every if active[g] + active[h] >= least]
 
     def sobol(self, subsets):
-        """Shares of inputs and pairs in the variance, where inputs are independent."""
+        """Shares of inputs and pairs in the variance, if inputs are independent."""
         return _shares(subsets, [self.anova.closed(v) for v in subsets], self.anova.variance)
 
     @property
     def held(self):
-        """Part of the product's mass where the output would be held."""
+        """Part of the combinations of independent inputs on which the output would be held."""
         rows = draw(self.blocks, _N_HELD, np.random.default_rng(0))
         y = replace(self.model, target=None).predict(rows)[:, self.output]
         low, high = self.model.output_limits[:, self.output]

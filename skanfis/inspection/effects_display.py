@@ -1,4 +1,4 @@
-"""A picture of what every input, and every pair of inputs, does to the output."""
+"""A picture of the effects of every input, and of the strongest pairs, on the output."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from .effects import Study
 from .labels import on_axis
 
 _N_POINTS, _N_ACROSS = 61, 31
-# A pair of a smaller share, beside what that may be off by, is not drawn.
+# Least share, beyond its error, of a pair that is drawn.
 _LEAST = 0.005
-# Letters of labels that stand side by side under a panel, each as wide as the longest.
+# Most letters of all labels side by side under a panel, each as wide as the longest.
 _MOST_LETTERS = 24
-# Above and below the curves, as a part of what they span: below stand the data.
+# Room above and below the curves, as a part of their span; the data stand below.
 _ROOM = 0.2
 
 
@@ -26,17 +26,17 @@ _ROOM = 0.2
 class EffectsDisplay:
     """The output along every input, averaged over the others, and the two strongest pairs.
 
-    The band is two standard deviations of the curve, of consequents and premises, to either side;
-    terms are shaded, data grey. A pair shows what both do together beyond what each does alone.
+    The band is two standard deviations of the curve to either side, from consequents and premises.
+    Terms are shaded, data grey. A pair shows its joint effect beyond the two effects alone.
     ``axes_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
     curves : list of dict
         The strongest first: "input", "points" (of a category 0, 1, ...), "levels" or None, "share"
-        of the variance (Sobol's, of this input alone), "mean" and its "deviation", 0 where none is
-        known, (n_points,); "terms", how true each is, (n_terms, n_points); "edges" and "counts" of
-        the histogram of the data. Groups of several columns have no curve.
+        of the variance (Sobol's, of this input alone), "mean" and its "deviation", 0 if not known,
+        (n_points,); "terms", the memberships, (n_terms, n_points); "edges" and "counts" of the
+        histogram of the data. Groups of several columns have no curve.
     pairs : list of dict
         "inputs", "points", "levels" of both, "share", and "effect" (n_points up, n_points across).
     output_name : str
@@ -100,7 +100,7 @@ class EffectsDisplay:
         note += "; colours: beyond what both do alone" if self.pairs else ""
         self.axes_ = panels_or_new(ax, len(self.curves) + len(self.pairs), note)
         self.figure_ = self.axes_[0].figure
-        # One scale for all, so that what is flat looks flat.
+        # One scale for all, so that a flat curve looks flat.
         mean, sd = (np.hstack([one[key] for one in self.curves]) for key in ("mean", "deviation"))
         low, high = np.min(mean - 2.0 * sd), np.max(mean + 2.0 * sd)
         room = _ROOM * (high - low or 1.0)
@@ -155,7 +155,7 @@ def _curve(study, g):
 
 
 def _pair(study, g, h):
-    """What two blocks do together, less what each does alone."""
+    """The joint effect of two blocks, less the effects of each alone."""
     (across, one), (up, other) = _along(study, g, _N_ACROSS), _along(study, h, _N_ACROSS)
     rows, own = np.tile(across, (len(up), 1)), study.blocks[h].inputs
     rows[:, own] = np.repeat(up[:, own], len(across), axis=0)
@@ -172,7 +172,7 @@ def _pair(study, g, h):
 def _draw_curve(axes, curve):
     points, mean, band = curve["points"], curve["mean"], 2.0 * curve["deviation"]
     on_height = {"transform": axes.get_xaxis_transform()}
-    # Of the height of a panel, the room below the curves.
+    # The histogram fits the room below the curves, in parts of the height of a panel.
     heights = 0.9 * _ROOM / (1.0 + 2.0 * _ROOM) * curve["counts"] / curve["counts"].max()
     axes.stairs(heights, curve["edges"], fill=True, color="0.8", zorder=0, **on_height)
     if curve["levels"] is not None:
@@ -185,7 +185,7 @@ def _draw_curve(axes, curve):
         axes.plot(points, mean, color="black", linewidth=1.8)
     axes.set_xlim(curve["edges"][0], curve["edges"][-1])
     _name(axes.xaxis, curve["input"], points, curve["levels"])
-    # Shares by draws may be off by more than there is.
+    # A share by draws may come out negative.
     title = f"alone {max(round(100.0 * curve['share']), 0)} % of variance"
     axes.set_title(title, fontsize="small", loc="left")
 

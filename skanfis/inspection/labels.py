@@ -1,29 +1,29 @@
-"""Names from files and tables, as pictures and terminals may show them."""
+"""Names from files and tables, made safe for pictures and terminals."""
 
 from textwrap import fill, wrap
 
 from .text import counted
 
-# Joiners, without which some scripts are not written, and blanks between numbers and units.
+# Joiners, which some scripts need, and blanks between numbers and units.
 _SHOWN = "\u200c\u200d\u00a0\u202f"
 # Inputs that a title names; letters in a line of a title, and of a label along an axis.
 _MOST_HELD, _LETTERS, _LETTERS_ON_AXIS = 4, 60, 20
 
 
 def printable(text):
-    """The text with escapes for what no reader sees: control signs, lone surrogates, line ends."""
+    """The text with invisible signs escaped: control signs, lone surrogates, line ends."""
     return "".join(
         sign if sign.isprintable() or sign in _SHOWN else ascii(sign)[1:-1] for sign in str(text)
     )
 
 
 def as_label(name):
-    """A name for matplotlib, which takes what stands between dollars for mathematics."""
+    """A name for matplotlib, which would read text between dollars as mathematics."""
     return printable(name).replace("$", r"\$")
 
 
 def on_axis(name):
-    """The same along an axis, in lines that a small panel has room for."""
+    """A name for an axis, in lines that fit a small panel."""
     return "\n".join(map(as_label, wrap(printable(name), _LETTERS_ON_AXIS)))
 
 

@@ -22,21 +22,21 @@ from .sentences import Sentences
 
 @dataclass(frozen=True, eq=False)
 class Measures:
-    """What was found on rows; errors are in standard deviations of the target."""
+    """Measures of rules on rows; errors are in standard deviations of the target."""
 
-    deviation: np.ndarray  # standard deviation of the target; one of a constant, (n_outputs,)
+    deviation: np.ndarray  # standard deviation of the target; 1 if constant, (n_outputs,)
     rule_weights: np.ndarray  # part of the rows' weight on which each rule fires, (n_rules,)
     rule_rows: np.ndarray  # weight of the rows on which it is the strongest, (n_rules,)
     rule_alone: np.ndarray  # RMS of f_r - yhat on these or NaN, (n_rules, n_outputs)
-    alone: np.ndarray  # the same of the strongest rule of every row, (n_outputs,)
+    alone: np.ndarray  # RMS of f_r* - yhat on all rows, (n_outputs,)
     rule_errors: np.ndarray  # RMS of f_r - y on its rows or NaN, (n_rules, n_outputs)
     rule_spreads: np.ndarray  # standard deviation of y there or NaN, (n_rules, n_outputs)
     errors: np.ndarray  # RMSE of the model, (n_outputs,)
-    printed_errors: np.ndarray  # the same of the model as it is printed
+    printed_errors: np.ndarray  # RMSE of the model as printed, (n_outputs,)
 
 
 def measure(model, X, y=None, sample_weight=None):
-    """Measure the rules on rows; y None is the predictions."""
+    """Measure the rules on rows; if y is None, the predictions are the target."""
     if y is None:
         y = model.with_out_of_bounds("clip").predict(X)
     y = np.asarray(y, dtype=float)
@@ -51,7 +51,7 @@ def measure(model, X, y=None, sample_weight=None):
 
 
 def rule_sums(model, printed, target, rows, y, weight):
-    """What :func:`measures_of` takes, of some rows; the sums over more rows add up.
+    """The sums that :func:`measures_of` takes, over some rows; those of more rows are added.
 
     ``target`` is the scale of all of them; ``printed`` the model as it is printed.
     """
@@ -108,6 +108,6 @@ def _standardised(model, offset, scale):
 
 
 def _outputs(by_rule, strengths, basis):
-    """What every rule says at a block of rows, and their sum by strength."""
+    """The value of every rule at a block of rows, and their mean by strength."""
     values = by_rule @ basis
     return values, np.einsum("rn,rn->n", strengths, values)

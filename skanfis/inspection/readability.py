@@ -17,14 +17,14 @@ from .rules import has_training_data, premise_texts
 from .sentences import Sentences
 from .text import MOST_NAMED, counted
 
-# In deviations of the target: the strongest rule alone is then as far from the model as one that
-# explains three quarters of the variance is from the target; beyond, it says too little.
+# Largest distance of the strongest rule alone from the model, in deviations of the target: that of
+# a model from a target of which it explains three quarters of the variance.
 GREATEST_ALONE = 0.5
 # Largest ratio of the error of the text as printed to the model's, and of a rule's to a constant's.
 GREATEST_ERROR = 1.05
-# Smaller errors are rounding, as where the target is the prediction itself.
+# Smaller errors are rounding errors, as if the target is the prediction itself.
 _ROUNDING = np.sqrt(np.finfo(float).eps)
-# A slope has a sign if it is so many deviations from zero, in a rule of this part of the weight.
+# A slope has a sign if it is this many deviations from zero, in a rule of at least this weight.
 _DEVIATIONS, _LEAST_WEIGHT = 2.0, 0.05
 
 
@@ -32,7 +32,7 @@ _DEVIATIONS, _LEAST_WEIGHT = 2.0, 0.05
 class Readability:
     """Whether the rules of a model can be read one by one, and what speaks against it.
 
-    :func:`skanfis.inspection.readability` makes it; ``print`` says what was found.
+    :func:`skanfis.inspection.readability` makes it; ``print`` shows the findings.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Readability:
     measures : Measures
         The figures as arrays.
     is_of_chunk : bool, default=False
-        Whether the rows are those of the latest ``partial_fit`` alone, which is then said.
+        Whether the rows are those of the latest ``partial_fit`` alone; ``print`` then says so.
 
     Attributes
     ----------
@@ -51,16 +51,16 @@ class Readability:
         "alone", the RMS of its value less the model on these, in sd of the target; "error", the
         RMSE of its value there, in units of the target; "numbers" in its sentence.
     reading_cost : int
-        Numerals that a person reads in the rules' sentences, as ``structures_`` counts them, but
-        for slopes that are too small to be written.
+        Numerals that a person reads in the rules' sentences, as ``structures_`` counts them, less
+        the slopes that are too small to be written.
     summary : Series
         The worst "strongest_alone", and "text_over_model", the RMSE of the text as printed over
         the model's; NaN where the model has no error to compare with.
     findings, on_rules : list of str
-        What speaks against reading the rules one by one, in sentences, empty if nothing does; and
-        those of them that stay, however many digits are printed.
+        Sentences on what speaks against reading the rules one by one, empty if nothing does; and
+        those that stay, however many digits are printed.
     line : str
-        How many numbers there are to read, and what the text as printed errs.
+        How many numbers there are to read, and the error of the text as printed.
 
     Examples
     --------
@@ -119,7 +119,7 @@ class Readability:
 
     @property
     def findings(self) -> list[str]:
-        """What speaks against reading the rules one by one, in sentences; empty if nothing does."""
+        """Sentences on what speaks against reading the rules one by one; empty if nothing does."""
         ratio = self.summary["text_over_model"]
         if not ratio > GREATEST_ERROR:
             return self.on_rules
@@ -156,7 +156,7 @@ class Readability:
         """Rules that err more on the rows on which they are the strongest than a constant would."""
         found, outputs, named = self.measures, self.model.output_names, []
         is_poor = found.rule_errors > np.maximum(GREATEST_ERROR * found.rule_spreads, _ROUNDING)
-        # Through a few rows a constant may go itself.
+        # On a few rows, even a constant may be exact: these rules are not compared.
         is_poor &= ~self._is_on_few[:, None]
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
@@ -168,7 +168,7 @@ class Readability:
 
     @property
     def line(self) -> str:
-        """How many numbers there are to read, and what the text as printed errs."""
+        """How many numbers there are to read, and the error of the text as printed."""
         ratio, numbers = self.summary["text_over_model"], counted(self.reading_cost, "number")
         if np.isnan(ratio):
             return numbers
@@ -192,10 +192,10 @@ def readability(
     *,
     sample_weight: ArrayLike | None = None,
 ) -> Readability:
-    """Measure whether the rules can be read one by one, and say what speaks against it.
+    """Measure whether the rules can be read one by one, and list what speaks against it.
 
-    Measured are how far the strongest rule of a row lies from the model and from the target, and
-    what the text as printed errs; see :doc:`/reading_rules`.
+    It measures how far the strongest rule of a row lies from the model and from the target, and
+    the error of the text as printed; see :doc:`/reading_rules`.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def readability(
     y : array-like of shape (n_samples,) or (n_samples, n_outputs), default=None
         The target, whose standard deviation is the unit; None takes the predictions.
     sample_weight : array-like of shape (n_samples,), default=None
-        Weights, zero or positive; a whole number counts as so many copies of the row.
+        Weights, zero or positive; a whole number counts as that many copies of the row.
 
     Returns
     -------
@@ -250,7 +250,7 @@ def readability_of_rows(model, X, y=None, sample_weight=None):
 
 
 def _on_signs(said):
-    """Inputs whose slopes are up in some rules and down in others, all beyond chance."""
+    """Inputs whose slopes are positive in some rules and negative in others, beyond chance."""
     model = said.model
     if model.posterior is None or not model.order:
         return []

@@ -1,4 +1,4 @@
-"""The rules in words and in tables: what they ask, what they say, what fired on a row."""
+"""The rules in words and in tables: conditions, values, and which of them fired on a row."""
 
 from dataclasses import replace
 from typing import Any
@@ -15,7 +15,7 @@ from .sentences import Sentences
 
 
 def conditions(model):
-    """What each rule asks, a dict from the place of an input to its terms: "low", "> 6.8 ± 0.3"."""
+    """The conditions of each rule, from the position of an input to its terms, "> 6.8 ± 0.3"."""
     inputs, names = model.antecedent.term_inputs, model.term_names
     rules: list[dict[int, str]] = [{} for _ in range(model.n_rules)]
     for rule, terms in zip(rules, model.antecedent.rule_terms.tolist(), strict=True):
@@ -27,7 +27,7 @@ def conditions(model):
 
 
 def premise_texts(model):
-    """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" of a rule that asks nothing."""
+    """Say "temperature is low AND rate > 6.8 ± 0.3"; "anything" for a rule without conditions."""
     return [
         " AND ".join(condition(model, j, term) for j, term in rule.items()) or "anything"
         for rule in conditions(model)
@@ -35,7 +35,7 @@ def premise_texts(model):
 
 
 def condition(model, j, term):
-    """Say "temperature is low", "rate > 6.8 ± 0.3", or "fibre is not PM" of an indicator."""
+    """Say "temperature is low", "rate > 6.8 ± 0.3", or, for an indicator, "fibre is not PM"."""
     name = model.input_names[j]
     if term in ("0", "1") and name in model.levels:
         return model.levels[name].said(term == "1")
@@ -43,36 +43,36 @@ def condition(model, j, term):
 
 
 def shown_rules(model, max_shown):
-    """The rules to show: first those that are the strongest on most rows."""
+    """The rules to show, first those that are the strongest on most rows."""
     if max_shown is not None:
         check_count("max_shown", max_shown, 1)
-    # Rounded, so that rules alike but for rounding errors stay in the order of their numbers.
+    # Rounded, so that rounding errors do not change the order of rules that are alike.
     keys = [-np.round(key, 9) for key in (model.rule_weights, parts_led(model))]
     return np.lexsort(keys)[:max_shown].tolist()
 
 
 def has_training_data(model):
-    """Whether the model remembers training data; one read from a .fis file has none."""
+    """Whether the model knows its training data; one from a .fis file does not."""
     return bool(np.any(model.rule_rows))
 
 
 def parts_led(model):
-    """Of the training rows, on which each rule is the strongest; without data, its weight."""
+    """Part of the training rows on which each rule is the strongest; without data, its weight."""
     rows = model.rule_rows
     return rows / rows.sum() if has_training_data(model) else model.rule_weights
 
 
 def readability_in_training(estimator, model):
-    """The fit's ``readability_`` for ``model``, which is the estimator folded and renamed; or None.
+    """The fit's ``readability_`` for ``model``, the estimator folded and renamed; None if unknown.
 
-    Behind a scaler the numbers are rounded in other units, and what the text errs is not known.
+    Behind a scaler, numbers are rounded in other units, so the error of the text is not known.
     """
     found = getattr(last_step(estimator), "readability_", None)
     if found is None:
         return None
     scale = 1.0 if model.target is None else model.target.spread / found.model.target.spread
     measures = replace(found.measures, deviation=scale * found.measures.deviation)
-    # Sorted: columns that were only moved keep their numbers.
+    # Compare sorted numbers: moving columns does not change them.
     own, fitted = (
         np.append(np.sort(one.coefficients, axis=1), np.sort(one.antecedent.parameters))
         for one in (model, found.model)
@@ -83,7 +83,7 @@ def readability_in_training(estimator, model):
 
 
 def rename(model, feature_names, output_names):
-    """The model with other names of inputs and outputs, where given."""
+    """The model with other names of inputs and outputs, if given."""
     for kind, parameter, names in (
         ("input_names", "feature_names", feature_names),
         ("output_names", "output_names", output_names),
@@ -100,7 +100,7 @@ def rename(model, feature_names, output_names):
 
 
 def rules_table(estimator: Any) -> Any:
-    """Tabulate the rules: what they ask, how much of the data they hold for, what they say.
+    """Tabulate the rules: their conditions, their part of the data, and their values.
 
     Parameters
     ----------
@@ -111,10 +111,10 @@ def rules_table(estimator: Any) -> Any:
     -------
     table : DataFrame
         One row per rule, by its number, with two levels of columns. ``"if"``: the term on each
-        input, missing where the rule does not look at it. ``"data"``: "weight", the part of the
-        training data on which it fires, and "rows", the number of rows on which it is the
-        strongest. ``"at"``: its centre, the mean of the rows by its strength, or a place near it.
-        ``"then y"``, per output: the "value" that it says there, and the slope by each input.
+        input, missing if the rule has none. ``"data"``: "weight", the part of the training data on
+        which it fires, and "rows", the number of rows on which it is the strongest. ``"at"``: its
+        centre, the mean of the rows weighted by its strength, or a place near it. ``"then y"``, per
+        output: the rule's "value" there, and its slope by each input.
 
     Raises
     ------
@@ -159,11 +159,11 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     Returns
     -------
     table : DataFrame
-        For each row and output the strongest rule first: "row", its position in X; "output";
-        "rule", its number; "if", its terms; "strength", its part in the row; "value", what it says
-        there; "contribution", strength times value. **The sum of the contributions is the
-        prediction**. Lines without a number are "held" at the limits of training, and "beyond x",
-        the way from the nearest point of the range along the tangent. With
+        One line per row, output and rule, the strongest rule first: "row", the position in X;
+        "output"; "rule", its number; "if", its terms; "strength", its normalised strength; "value",
+        its value there; "contribution", strength times value. **The sum of the contributions is the
+        prediction**. Lines without a rule are "beyond x", the change along the tangent from the
+        nearest point of the range, and "held", the change by the limits of outputs. With
         ``out_of_bounds="nan"`` rows outside have missing values.
 
     Raises
@@ -200,14 +200,14 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     beyond = way[:, :, None] * slopes
     said = np.einsum("nr,nro->no", strengths, values) + beyond.sum(axis=1)
     held = np.nan_to_num(np.clip(said, *model.output_limits) - said)
-    # By row, all that may have a line there: the rules, the way beyond each input, what is held.
+    # All possible lines of a row: the rules, the way beyond each input, and "held".
     strength = np.hstack([strengths, np.full((n_rows, n_inputs + 1), np.nan)])
     value = np.hstack([values, slopes, np.full((n_rows, 1, model.n_outputs), np.nan)])
     contribution = np.hstack([strengths[:, :, None] * values, beyond, held[:, None]])
     has_line = np.ones(contribution.shape, dtype=bool)
     has_line[:, n_rules:-1] = way[:, :, None] != 0.0
     has_line[:, -1] = held != 0.0
-    # The strongest first, and last what has no strength.
+    # The strongest rule first; lines without a strength last.
     order = np.argsort(-strength, axis=1, kind="stable")
     has_line = np.take_along_axis(has_line, order[:, :, None], axis=1)
     row, output, place = np.nonzero(has_line.transpose(0, 2, 1))

@@ -1,16 +1,16 @@
-r"""What the rules say, number by number, in the digits that matter.
+r"""The sentences of the rules: all of their numbers, in the digits that matter.
 
 Every rule r has a centre c_r, the mean of the training rows weighted by its strength, and says
 
     f_r(x) = v_r + sum_(j in common) b_j (x_j - c_rj) + sum_(j its own) b_rj (x_j - c_rj) ,
 
-its own value v_r there, slopes that it has in common with other rules, and slopes of its own. What
-is common is said once, as a line about the mean x0 of all rows. Of v_r the part
+its own value v_r there, slopes that it shares with other rules, and slopes of its own. The shared
+slopes are written once, as a line about the mean x0 of all rows. The part of v_r
 
     sum_(j in common) b_j (c_rj - x0_j)
 
-is that line's at the centre, so that f_r is also v_r less this part, plus the line at x, plus the
-rule's own slopes. Text, HTML, tables, and the model as it is printed are made of these numbers.
+is the line's value at the centre. So f_r is also v_r less this part, plus the line at x, plus the
+rule's own slopes. Text, HTML, tables, and the model as printed consist of these numbers.
 """
 
 from dataclasses import dataclass, replace
@@ -25,33 +25,33 @@ from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..reading_cost import UNSAID
 
-# Digits of the noise's deviation to which numbers are written.
+# Numbers are written to this many digits of the noise's deviation.
 PRECISION = 2
-# Digits of a deviation of an input to which the places are written that slopes count from.
+# Places that slopes count from are written to this many digits of the input's deviation.
 _DIGITS_OF_PLACE = 2
-# As rounding leaves a 0 or a 1.
+# Decimals to which a mean is 0 or 1, rounding errors apart.
 _DIGITS_OF_CASE = 6
-# Of an output's deviation: numbers are written no finer, and so fine where the noise is not known.
+# Least deviation of the noise, relative to the output's, for the digits; also if it is not known.
 _FINEST = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Sentences:
-    """What the rules of a model say; built by :meth:`of`."""
+    """The numbers in the sentences of a model's rules; built by :meth:`of`."""
 
-    model: TSKModel  # whose rules these are; its terms as they are written
-    says_where: np.ndarray  # terms whose name says where they turn, (n_terms,)
-    places: np.ndarray  # centers, to few digits; 0 or 1 where these are all, (n_rules, n_inputs)
-    values: np.ndarray  # what each rule says there, (n_rules, n_outputs)
-    of_common: np.ndarray  # what of it is the common line's part
-    slopes: np.ndarray  # those in common as well, (n_rules, n_inputs, n_outputs)
-    is_own: np.ndarray  # which of them the rule states itself
-    common_place: np.ndarray  # (n_inputs,)
-    common: np.ndarray  # the common line; zero where nothing is in common, (n_inputs, n_outputs)
+    model: TSKModel  # with its terms as written
+    says_where: np.ndarray  # terms whose name tells their place, (n_terms,)
+    places: np.ndarray  # centres, to few digits; 0 or 1 for two-valued inputs, (n_rules, n_inputs)
+    values: np.ndarray  # value of each rule at its place, (n_rules, n_outputs)
+    of_common: np.ndarray  # the common line's part in it
+    slopes: np.ndarray  # shared ones included, (n_rules, n_inputs, n_outputs)
+    is_own: np.ndarray  # which of the slopes are in the rule's own sentence
+    common_place: np.ndarray  # x0, to few digits, (n_inputs,)
+    common: np.ndarray  # slopes of the common line; zero if not shared, (n_inputs, n_outputs)
 
     @classmethod
     def of(cls, model: TSKModel, precision: int = PRECISION):
-        """What a model says; of 17 digits nothing is lost."""
+        """The sentences of a model; with a precision of 17 digits nothing is lost."""
         slopes = model.consequents[:, 1:]
         scale, noise = _resolution(model, slopes)
         two_valued = model.two_valued
@@ -63,7 +63,7 @@ class Sentences:
         is_common, told = model.common_slopes, slopes
         is_fixed = np.zeros(places.shape, dtype=bool)
         if precision < MOST_DIGITS:
-            # A case that all rows of a rule are, or none is, changes nothing there.
+            # An indicator that is 0 or 1 on all rows of a rule needs no slope there.
             is_fixed = two_valued & np.isin(np.round(centers, _DIGITS_OF_CASE), (0.0, 1.0))
             told, places, is_common = _from_a_level(model, slopes, places, is_common, ~is_fixed)
         values = np.einsum("rj,rjo->ro", places - model.reference, slopes)
@@ -74,9 +74,9 @@ class Sentences:
         part = np.where(is_common[:, :, None], common, 0.0)
         slopes[is_fixed[:, :, None] & (common == 0.0)] = 0.0
         of_common = np.einsum("rj,rjo->ro", places - common_place, part)
-        # Beside a common slope that of nothing is to be said as well.
+        # If others share a slope, a rule without one has to say so.
         is_own = ~is_common[:, :, None] & ((slopes != 0.0) | (common != 0.0))
-        # What terms may be off by is a part of the output's deviation, not of the noise.
+        # Digits of terms refer to the output's deviation, not to that of the noise.
         more = int(np.floor(np.log10(scale / noise)).max(initial=0.0))
         digits = min(precision + more, MOST_DIGITS)
         written, says_where = _written_terms(model, digits)
@@ -86,7 +86,7 @@ class Sentences:
 
     @property
     def printed(self) -> TSKModel:
-        """The model that the written numbers are."""
+        """The model with the numbers as written."""
         model = self.model
         own = np.where(self.is_own, self.slopes, 0.0)
         part = np.where(self.is_own, 0.0, self.common)
@@ -109,11 +109,11 @@ class Sentences:
 
 
 def _from_a_level(model, slopes, places, is_common, is_told):
-    """Slopes and places of rules that say their value at one level of a category; what is common.
+    """Slopes, places and shared slopes if rules give their value at one level of a category.
 
-    Where all rows have a level their slopes are known but for a constant, and that level has none.
-    It is the commonest one of the rule; of two levels, of which one has a common slope, the other:
-    the slope that is left then stands in its place. All of it where that is no more to say.
+    If every row has one of the levels, their slopes are known up to a constant, so that one level
+    needs none: the commonest of the rule. If one of two levels has a shared slope, the other needs
+    none, and the difference replaces the shared slope. It must not add to the numbers.
     """
     slopes, places, is_common = slopes.copy(), places.copy(), is_common.copy()
     whole = [one.inputs for one in categories(model).values() if not one.others]
@@ -130,7 +130,7 @@ def _from_a_level(model, slopes, places, is_common, is_told):
 
 
 def _resolution(model, slopes):
-    """Deviation of every output, and of the noise about it, (n_outputs,) each; positive."""
+    """Deviations of every output, and of its noise, (n_outputs,) each; positive."""
     if model.target is None:
         change = np.abs(slopes) * (model.maximum - model.minimum)[:, None]
         scale = np.ptp(model.coefficients[:, 0], axis=0) + change.max(axis=(0, 1))
@@ -142,11 +142,11 @@ def _resolution(model, slopes):
 
 
 def _written_terms(model, digits):
-    """The model with its terms as they are written, and which of them say by name where they turn.
+    """The model with its terms as written, and which of their names tell their place.
 
-    A name that somebody has given stays. Where every training row is on one side of a cut, to so
-    many digits but not to all, the width is left out, and the cut is crisp. So are conditions that
-    others of the same rule imply, as that it is no other level of a category.
+    A name that the user has given stays. Unless all digits are written, two things are left out:
+    the width of a cut that has every training row on one side, within the digits, which becomes
+    crisp; and conditions that others of the rule imply, as "no other level of a category".
     """
     antecedent = model.antecedent
     default, of_digits = default_term_names(model), default_term_names(model, digits)
@@ -177,7 +177,7 @@ def _written_terms(model, digits):
 
 
 def _rounded_theta(group, digits):
-    """Parameters of terms: places to digits of the width, all others to so many digits."""
+    """Rounded parameters of terms: places to digits of the width, others to their own digits."""
     natural = group.family.natural(group.theta)
     parameters = group.family.parameters
     width = natural[[one.kind for one in parameters].index("log_width")]

@@ -1,4 +1,4 @@
-"""A picture of what a search compared: error of every candidate against what it costs to read."""
+"""A picture of a search: the error of every candidate against its reading cost."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ _FAR_APART = 5.0
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class StructureDisplay:
-    """Error expected of new rows against reading cost, of every structure that was compared.
+    """Expected error on new rows against reading cost, for every structure that was compared.
 
-    The one that was chosen is ringed; below the dashed line errors are surely within the tolerance
-    of ``simplicity``. What stands there further to the left has more rules than the best, or is
-    crossed out: its rules are worse than the mean one by one. ``ax_`` and ``figure_`` are
+    The chosen one is ringed. Below the dashed line, errors are surely within the tolerance of
+    ``simplicity``. A candidate further to the left there has more rules than the best, or is
+    crossed out because its rules are worse than the mean one by one. ``ax_`` and ``figure_`` are
     matplotlib's, once drawn.
 
     Parameters
@@ -33,10 +33,10 @@ class StructureDisplay:
         "expected_error", whether "rules_beat_mean" and whether it was "chosen".
     tolerance : float
         Error, in standard deviations of the target, up to which a candidate is near enough to the
-        best. The search takes for the best what is better by more than chance, and may tolerate a
+        best. The best of the search must win by more than chance, so that the search may tolerate a
         little more.
     simplicity : float
-        Of the estimator.
+        That of the estimator.
 
     Examples
     --------
@@ -55,7 +55,7 @@ class StructureDisplay:
 
     @classmethod
     def from_estimator(cls, estimator: Any, *, ax: Any = None) -> Self:
-        """Draw what the search of a fitted estimator has compared.
+        """Draw the structures that the search of a fitted estimator has compared.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class StructureDisplay:
             )
         least = min(one["expected_error"] for one in structures) ** 2
         taken = next(one["expected_error"] for one in structures if one["chosen"]) ** 2
-        # The mean's squared error is one of each output, which are standardised.
+        # The mean's squared error is one for each output, because outputs are standardised.
         most = max(tolerated(least, float(last.model_.n_outputs), last.simplicity), taken)
         tolerance = float(np.sqrt(most))
         display = cls(structures=structures, tolerance=tolerance, simplicity=last.simplicity)

@@ -28,18 +28,18 @@ from .sentences import PRECISION, Sentences
 
 # Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 4
-# A sentence names so many, and counts others.
+# A sentence names this many things at most, and counts the others.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
-_DECIMALS_OF_PERCENT = 9  # the others are rounding's
-# How to compute a prediction; the parts in braces are left out where there is no such thing.
+_DECIMALS_OF_PERCENT = 9  # further ones are rounding errors
+# How to compute a prediction; parts in braces that do not apply are left out.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
     "AND multiplies. {terms}A rule says its value{line}{slopes}.{errs}"
 )
 _ERRS = " What a rule errs by is its RMSE, used alone, on the rows on which it is the strongest."
 _HOW_OF_ONE = "A prediction is what the rule says: its value{slopes}."
-# How true a condition is that is written out, by what stands before its place.
+# The membership of a condition that names its place, by the sign before the place.
 _WRITTEN = {
     ">": "x > c ± h is 1 / (1 + 9^((c - x) / h)) true, half at c and 0.9 at c + h; x < c ± h is "
     "what that lacks of 1. ",
@@ -64,17 +64,17 @@ def export_text(
 ) -> str:
     """Write the rules as IF-THEN sentences in the units of the data.
 
-    A rule says what it is about on its own rows, and by how much that changes with an input, and
-    from where. Sentences and terms are the whole model: :doc:`/inspection`.
+    A rule gives its value on its own rows, and by how much that changes with an input, and from
+    where. Sentences and terms are the whole model: :doc:`/inspection`.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
         As :func:`skanfis.export.fold` takes it; scalers are folded into the rules.
     precision : int, default=2
-        Numbers are written to so many digits of what the noise's standard deviation makes of them,
-        from 1 to 17: with noise of 3.2, values to 0.1. Slopes that make no such digit over a
-        standard deviation of their input are left out.
+        Numbers are written to this many digits of the noise's standard deviation, from 1 to 17:
+        with noise of 3.2, values to 0.1. Slopes that change no such digit over a standard deviation
+        of their input are left out.
     max_shown : int, default=None
         Most rules to write, first those that are the strongest on most rows; None for all.
     show_terms : bool, default=True
@@ -85,10 +85,10 @@ def export_text(
     Returns
     -------
     text : str
-        First by how much the outputs vary, and about the rules. Then the rules by their number,
-        with the part of the rows on which each is the strongest, and the RMSE of the rule alone
-        there. Last how many numbers there are, what the text as printed errs over the model (with
-        the default precision), and what the fit found against reading the rules one by one.
+        First, the standard deviations of the outputs, and of the noise about the rules. Then the
+        rules by their number, with the part of the rows on which each is the strongest, and the
+        RMSE of the rule alone there. Last, how many numbers there are, the error of the text as
+        printed (with the default precision), and what speaks against reading rules one by one.
 
     Raises
     ------
@@ -155,8 +155,8 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     Returns
     -------
     html : str
-        One ``<div>``, with names escaped, and nothing to run or to load; what speaks against
-        reading the rules one by one is folded away below them.
+        One ``<div>``, with names escaped, and nothing to run or to load. The findings against
+        reading the rules one by one are folded away below them.
 
     Raises
     ------
@@ -201,14 +201,14 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
 
 
 def _said(estimator, precision=PRECISION, feature_names=None, output_names=None):
-    """What the rules say in so many digits, and what the fit found of them, if it is known."""
+    """The sentences of the rules, and the readability that the fit has found, or None."""
     check_count("precision", precision, 1, MOST_DIGITS)
     model = rename(fold(estimator), feature_names, output_names)
     return Sentences.of(model, precision), readability_in_training(estimator, model)
 
 
 def _inputs_and_rows(model):
-    """Say "3 inputs, 506 rows"; rows that were trained on, if they are known."""
+    """Say "3 inputs, 506 rows"; the number of training rows only if it is known."""
     inputs, n_rows = counted(model.n_inputs, "input"), round(model.rule_rows.sum())
     return f"{inputs}, {counted(f'{n_rows:,}', 'row')}" if has_training_data(model) else inputs
 
@@ -216,8 +216,8 @@ def _inputs_and_rows(model):
 def _deviations(model, found, precision=PRECISION):
     """Say "y varies by 27, about the rules by 11 (standard deviation).", as far as it is known."""
     lines, target = [], model.target
-    # The noise is of a free fit: one with constraints, or a robust one, errs by more. The target's
-    # scale is, of a robust one, that of rows that are not far off.
+    # The noise is that of a free fit: a constrained or robust one has larger errors. The target's
+    # scale of a robust fit leaves outliers out.
     is_known = found is not None and not found.is_of_chunk
     errors = found.measures.deviation * found.measures.errors if is_known else 0.0
     for k, name in enumerate(model.output_names if target else ()):
@@ -232,14 +232,14 @@ def _deviations(model, found, precision=PRECISION):
 
 
 def _common_lines(said):
-    """Of every output that has one: "y: -0.12 per rate from 20, ..."."""
+    """The common line of every output that has one: "y: -0.12 per rate from 20, ..."."""
     slopes = [_slopes(said, own, said.common_place, own != 0.0) for own in said.common.T]
     pairs = zip(said.model.output_names, slopes, strict=True)
     return [f"{name}: {', '.join(own)}" for name, own in pairs if own]
 
 
 def _conclusion(said, r, k):
-    """What rule r says of output k: "about 33.6, of it +4.2 from the common line: ..."."""
+    """The THEN part of rule r for output k: "about 33.6, of it +4.2 from the common line: ..."."""
     own = _slopes(said, said.slopes[r, :, k], said.places[r], said.is_own[r, :, k])
     has_common = np.any(~said.is_own[r, :, k] & (said.common[:, k] != 0.0))
     text = f"{'about ' if own or has_common else ''}{plain(said.values[r, k])}"
@@ -249,9 +249,9 @@ def _conclusion(said, r, k):
 
 
 def _slopes(said, slopes, places, is_said):
-    """Say "+5.8 per rooms from 6.3", "-2.1 if private is 1"; what does most comes first.
+    """Say "+5.8 per rooms from 6.3", "-2.1 if private is 1"; the largest effects come first.
 
-    Levels of a category stand together; none in place of a common one is "no change with rooms".
+    Levels of a category stand together. "No change with rooms" replaces a common slope by none.
     """
     model, parts, does = said.model, [], np.abs(slopes) * said.model.spread
     called = columns_of(model)
@@ -273,7 +273,7 @@ def _slopes(said, slopes, places, is_said):
 
 
 def _on_rows(model, found, r):
-    """On which part of the rows a rule is the strongest, and what it errs there alone."""
+    """On which part of the rows a rule is the strongest, and its error alone there."""
     if not has_training_data(model):
         return []
     if not model.rule_rows[r]:
@@ -284,13 +284,13 @@ def _on_rows(model, found, r):
 
 
 def percent(part):
-    """Write "48 %", "6.5 %", and of what is not all "99.5 %"."""
+    """Write "48 %", "6.5 %", and never "100 %" of a part that is less."""
     share = round(100.0 * part, _DECIMALS_OF_PERCENT)
     return f"{told_apart([share, 100.0], 2)[0]} %"
 
 
 def _errors(found, r):
-    """What a rule errs alone; nothing where it leads none of the rows that were measured."""
+    """The error of a rule alone; empty if it is the strongest on none of the measured rows."""
     if found is None or not found.measures.rule_rows[r]:
         return ""
     errors, names = found.rule_errors[r], found.model.output_names
@@ -300,7 +300,7 @@ def _errors(found, r):
 
 
 def _last_lines(said, found, precision=PRECISION):
-    """How many numbers there are to read, and, after a fit, what speaks against reading them."""
+    """How many numbers there are to read, and, if known, what speaks against reading the rules."""
     if found is None or precision != PRECISION:
         return [f"{counted(said.reading_cost, 'number')}."]
     return str(found).splitlines()
@@ -315,7 +315,7 @@ def _legend(said, found, precision):
     called = columns_of(model)
     has_part = said.is_own.any(axis=(0, 2)) | said.common.any(axis=1)
     has_part[model.antecedent.term_inputs] = True
-    # Where nothing is predicted outside the range of any input, all of them have.
+    # If nothing is predicted outside the range of any input, all inputs have a part.
     with_part = set(called if model.out_of_bounds in SILENT else compress(called, has_part))
     listed = []
     for j, name in enumerate(model.input_names):
@@ -362,7 +362,7 @@ def _legend(said, found, precision):
 def _term_text(term, locations):
     """Write "gaussian, center 21.3, width 4.2" of an entry of TSKModel.memberships."""
     numbers = {k: v for k, v in term.items() if k not in ("input", "name", "function")}
-    # Of a logarithm the last digits are rounding's.
+    # The last digits of a parameter held as a logarithm are rounding errors.
     told = (f"{k} {plain(v) if k in locations else in_digits(v, 14)}" for k, v in numbers.items())
     return ", ".join([term["function"], *told])
 
@@ -374,7 +374,7 @@ def _left_out(model, chosen):
 
 
 def _wrapped(text, first="", later=""):
-    """The text in lines, the first and the later ones indented; none is broken at a ±."""
+    """The text in lines, with indents for the first and the later ones; no line breaks at a ±."""
     text = text.replace(" ± ", _UNBROKEN)
     lines = fill(text, _WIDTH, initial_indent=first, subsequent_indent=later)
     return lines.replace(_UNBROKEN, " ± ")

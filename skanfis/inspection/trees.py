@@ -1,4 +1,4 @@
-"""Pictures of a tree: its cuts and what stands at the leaves, and the plane that they cut."""
+"""Pictures of a tree: its cuts and leaves, or the plane of two inputs that it cuts."""
 
 from dataclasses import dataclass
 from typing import Any, Self, cast
@@ -16,21 +16,21 @@ from .rules import condition, parts_led
 from .sentences import Sentences
 from .text import counted, percent
 
-# Inches: of a letter, of a leaf, around the tree.
+# Inches of a letter, of a leaf, and around the tree.
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
-# Line widths, in points, of a branch that no row takes and more of one that all do.
+# Line width, in points, of a branch that no row takes, and how much wider one is that all take.
 _THIN, _THICK = 0.6, 6.0
-# Points of the plane along each input; digits of what it spans, and where these may stand.
+# Points of the plane along each input; digits of values, and the part of it where they may stand.
 _N_POINTS, _DIGITS, _INSIDE = 200, 3, (0.06, 0.94)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class TreeDisplay:
-    """The rules of a tree: cuts, and at each leaf its value and on which part of the rows it leads.
+    """A tree of rules: its cuts, and at each leaf the rule's value and part of the rows.
 
-    A branch is the thicker the more rows take it. With ``kind="plane"`` it is the prediction over
-    the two inputs that are cut, as :class:`ResponseSurfaceDisplay` draws it, with lines where
-    another rule becomes the strongest, and what each rule says there in the middle of its rows.
+    A branch is thicker if more rows take it. With ``kind="plane"``, the picture is the prediction
+    over the two inputs that are cut, as :class:`ResponseSurfaceDisplay` draws it. Lines show where
+    another rule becomes the strongest, and each rule's value stands in the middle of its rows.
     ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
@@ -38,7 +38,7 @@ class TreeDisplay:
     model : TSKModel
         Its rule base is a tree.
     output : int, default=0
-        Whose values stand at the leaves.
+        The output whose values stand at the leaves.
     kind : {"tree", "plane"}, default="tree"
 
     Examples
@@ -67,7 +67,7 @@ class TreeDisplay:
         estimator : fitted estimator or TSKModel
             As :func:`skanfis.export.fold` takes it; scalers are folded into the cuts.
         kind : {"tree", "plane"}, default="tree"
-            "plane" is of trees that cut two inputs; the others are held as in
+            "plane" is for trees that cut two inputs; the others are held as in
             :class:`ResponseSurfaceDisplay`.
         output : int or str, default=0
             Which output, by position or name.
@@ -99,12 +99,12 @@ class TreeDisplay:
 
     @property
     def values(self) -> np.ndarray:
-        """Of every leaf, the rule's value where its rows lie, (n_rules,)."""
+        """For every leaf, the rule's value where its rows lie, (n_rules,)."""
         return self._said.values[:, self.output]
 
     @property
     def leaves(self) -> list[str]:
-        """Of every leaf, what stands at it."""
+        """The text at every leaf."""
         both = zip(self.values, parts_led(self.model), strict=True)
         return [f"{plain(value)}  ({percent(share)})" for value, share in both]
 
@@ -118,16 +118,16 @@ class TreeDisplay:
     def _draw_tree(self, ax):
         model, tree = self.model, cast(TreeAntecedent, self.model.antecedent)
         (order, ends), n_rules = tree.walk, model.n_rules
-        # Above and below each node.
+        # Conditions above and below each node.
         terms = zip(tree.term_inputs, self._said.model.term_names, strict=True)
         words = [as_label(condition(model, j, term)) for j, term in terms]
         words = np.reshape(words, (2, -1)).T[order]
-        # By place, leaves first: how high it stands, how far from the root, what comes to it.
+        # By position, leaves first: height in the picture, depth from the root, part of the rows.
         depth, height = np.zeros(2 * n_rules - 1), np.zeros(2 * n_rules - 1)
         share = np.concatenate([parts_led(model), np.zeros(n_rules - 1)])
         for k, pair in enumerate(ends):
             depth[pair] = depth[n_rules + k] + 1.0
-        # What is above a cut stands above what is below it.
+        # The branch above a cut is drawn above the branch below it.
         sides = [[is_above for _, is_above in path] for path in tree.paths]
         height[sorted(range(n_rules), key=sides.__getitem__)] = np.arange(n_rules)
         for k, pair in reversed(list(enumerate(ends))):
@@ -165,7 +165,7 @@ class TreeDisplay:
         ax.contour(*axes, strongest, levels=borders, colors="black", linewidths=1.0)
         box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "boxstyle": "round"}
         said, low, high = self._said, model.minimum[both], model.maximum[both]
-        # From the middle of its rows to where the other inputs are held.
+        # Move each rule's value from the middle of its rows to where the other inputs are held.
         away = rows[0] - said.places
         away[:, both] = 0.0
         values = self.values + np.sum(away * said.slopes[:, :, self.output], axis=1)

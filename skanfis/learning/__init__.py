@@ -1,6 +1,6 @@
 """Learning as one separable least-squares problem, and the solvers that find the premises.
 
-A string such as ``ANFISRegressor(solver="hybrid")`` stands for the object with its defaults.
+A string, as in ``ANFISRegressor(solver="hybrid")``, stands for the solver with its defaults.
 """
 
 from .descent import GradientDescent, Hybrid
@@ -18,7 +18,7 @@ __all__ = [
     "VariableProjection",
 ]
 
-# The words for them, as parameters have them.
+# The solvers by the strings that parameters take.
 SOLVERS = {
     "varpro": VariableProjection,
     "hybrid": Hybrid,

@@ -1,13 +1,13 @@
-r"""The posterior where a fit has ended, by Laplace's method.
+r"""The posterior at the end of a fit, by Laplace's method.
 
 The precision of consequents and displacements x of the premises is (docs/mathematics.rst)
 
     n / sigma^2  [ M   C' ]        M = Phi' S Phi / W + P ,
                  [ C   J  ] ,      J = (D' S D + lambda K) / W + kappa I .
 
-M is factored first, as in the fit; what is left of J is H + kappa I, H the reduced Gauss-Newton
-matrix. Every output has a sigma of its own for its noise and its consequents; the premises, which
-all outputs share, have the mean of them.
+M is factored first, as in the fit; the Schur complement of J is H + kappa I, H the reduced
+Gauss-Newton matrix. Every output has a sigma of its own for its noise and its consequents; the
+premises, which all outputs share, have the root mean square of them.
 """
 
 from dataclasses import replace
@@ -23,17 +23,17 @@ from .premise import Premise
 def posterior_of(
     problem: SeparableProblem, premise: Premise | None, evaluation: Evaluation, n_rows, robust=None
 ) -> Posterior | None:
-    """The posterior in the user's units; None of a model of more than ``MOST_PARAMETERS``.
+    """The posterior in the user's units; None for models of more than ``MOST_PARAMETERS``.
 
-    ``premise`` is None where the premises were not learnt; ``n_rows`` are rows by weight;
-    ``robust`` are the weights that Huber's loss has left the rows, and its epsilon.
+    ``premise`` is None if the premises were not learnt; ``n_rows`` counts rows by weight;
+    ``robust`` holds the weights that Huber's loss has left the rows, and its epsilon.
     """
     antecedent, rows = evaluation.antecedent, problem.rows
     n_columns, n_parameters = problem.n_columns, antecedent.parameters.size
     if n_columns + n_parameters > MOST_PARAMETERS:
         return None
     if evaluation.normal is None:
-        # Consequents that were stepped to and not solved for: their own, with that curvature.
+        # These consequents were not solved for: they stay, with the factor of a solve there.
         solved = problem.evaluate(antecedent.parameters, evaluation.coefficients)
         evaluation = replace(evaluation, normal=solved.normal)
     normal = evaluation.normal
@@ -46,11 +46,11 @@ def posterior_of(
     n_determined = 0.0
     if premise is not None and premise.size:
         premises, cross, n_determined = _premises(problem, premise, evaluation)
-    # Where rows leave no freedom, the noise is that of one.
+    # At least one degree of freedom, even if there are no more rows than parameters.
     freedom = max(n_rows - n_effective - n_determined / problem.n_varying, 1.0)
     noise *= np.sqrt(n_rows / freedom)
     shared = np.sqrt(np.sum(noise**2) / problem.n_varying)
-    # L^-1 T' is the factor of consequents on [1, z], T the local basis.
+    # L^-1 T' is the factor for consequents on [1, z], T the local basis.
     half = np.ascontiguousarray(problem.local.to_global(half.T).T)
     blocks = half.reshape(len(half), -1, problem.n_basis)
     blocks[:, :, 1:] /= rows.inputs.scale[problem.consequent_inputs]
@@ -64,7 +64,7 @@ def posterior_of(
 
 
 def _squared(half, cross):
-    """A lower triangle whose square is that of a half of fewer rows, and the cross terms by it."""
+    """A square lower triangle L with L' L = half' half, and the cross terms in its coordinates."""
     n_free, n_columns = half.shape
     turned, upper = np.linalg.qr(half[:, ::-1])
     triangle = np.zeros((n_columns, n_columns))
@@ -75,10 +75,10 @@ def _squared(half, cross):
 
 
 def _mean_squares(problem, evaluation, robust):
-    """Weighted mean square of the residual of every standardised output, or what outliers leave.
+    """Weighted mean square of the residual of every standardised output, robust if asked for.
 
-    By Huber's second proposal (1964): the mean of psi(r)^2, psi = w r, over what it is of a
-    standard normal r.
+    The robust one is Huber's second proposal (1964): the mean of psi(r)^2, psi = w r, over its
+    expectation for a standard normal r.
     """
     if robust is None:
         return evaluation.mean_squares
@@ -86,7 +86,7 @@ def _mean_squares(problem, evaluation, robust):
     total, total_weight = np.zeros(problem.n_outputs), 0.0
     for part, residual, weight in problem.residuals(evaluation):
         left = weights[part]
-        # The rows' weights have Huber's in them already.
+        # ``weight`` already contains Huber's weights.
         total += residual**2 @ (weight * left)
         total_weight += np.sum(weight / left)
     beyond = 2.0 * ndtr(-c)
@@ -95,16 +95,16 @@ def _mean_squares(problem, evaluation, robust):
 
 
 def _premises(problem, premise, evaluation):
-    """R^-1 by the standardised parameters, R^-1 C L'^-1, and how many data determine.
+    """R^-1 for the standardised parameters, R^-1 C L'^-1, and the number that the data determine.
 
-    All with sigma^2 / n equal to one.
+    R is a root of H + kappa I. sigma^2 / n is one in all of them.
     """
     x = premise.displacement(evaluation.antecedent.parameters)
     raw = problem.curvature(evaluation)
     jacobian, stiffness = premise.jacobian(x), problem.penalty.stiffness
     values, vectors = np.linalg.eigh(jacobian.T @ raw.gauss_newton @ jacobian)
-    # No eigenvalue is negative but for what rounding leaves of large numbers, as beside a row so
-    # far off that a rule is its own. What neither data nor stiffness tell from that is held.
+    # Negative eigenvalues are rounding errors of large numbers, as from a row so far off that it
+    # has a rule to itself. Directions that neither data nor stiffness tell from them are left out.
     told = np.maximum(values, stiffness) > -values[0]
     values = np.maximum(values[told], premise.size * np.finfo(float).eps * values[-1])
     inverse = vectors[:, told].T / np.sqrt(values + stiffness)[:, None]

@@ -2,8 +2,8 @@ r"""The data as the kernel sees it: standardised, transposed, one cache-sized bl
 
 Inputs and target are standardised here and nowhere else, by weighted mean and standard deviation,
 so that a fit does not depend on their units. A block is read as Z (n_inputs, n_rows) and the target
-(n_outputs, n_rows), and only one block per worker exists at any time: ``X`` may be memory-mapped
-and larger than memory.
+(n_outputs, n_rows). Only one block per worker exists at any time: ``X`` may be memory-mapped and
+larger than memory.
 """
 
 from dataclasses import dataclass
@@ -14,23 +14,23 @@ import numpy as np
 from ..blocks import BLOCK_ROWS, add_each, row_blocks
 from ..policies import ROUNDING
 
-# Blocks per unit of parallel work. It depends on nothing, so that sums are taken in the same order
-# whatever the number of workers.
+# Blocks per unit of parallel work. It is fixed, so that sums are taken in the same order whatever
+# the number of workers.
 _BLOCKS_PER_CHUNK = 16
 
-# The largest number of a column; and one over the least that it varies by. Squares, and slopes of
-# one column by another, neither overflow nor vanish.
+# The largest number of a column, and the inverse of the least deviation. Within these limits,
+# squares and slopes of one column by another neither overflow nor vanish.
 LARGEST_NUMBER = 1e100
 
-# Any fixed number would do.
+# Any fixed number does.
 _FINGERPRINT_SEED = 20090101
 
 
 def fingerprint(columns):
     """One number per row out of columns (n_columns, n_rows): a fixed random projection.
 
-    Equal rows have equal numbers to the last bit, because the columns are added one by one; unequal
-    rows have unequal numbers, all but surely.
+    Equal rows have equal numbers to the last bit, because the columns are added one by one. Unequal
+    rows almost surely have unequal numbers.
     """
     factors = np.random.default_rng(_FINGERPRINT_SEED).standard_normal(len(columns))
     numbers = np.zeros(columns.shape[1])
@@ -40,13 +40,13 @@ def fingerprint(columns):
 
 
 def place_in_sample(Z, target):
-    """One number per row [z, y] to draw it by, the same wherever its columns stand."""
+    """One number per row [z, y] to draw it by; the order of columns makes no difference."""
     return fingerprint(np.concatenate([np.sort(Z, axis=0), np.sort(target, axis=0)]))
 
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """z = (x - offset) / scale, per column; the range is that of the rows with weight."""
+    """z = (x - offset) / scale, per column, and the range of the column."""
 
     offset: np.ndarray
     scale: np.ndarray
@@ -59,7 +59,7 @@ class Scale:
         return never_changes(self.minimum, self.maximum)
 
     def varying(self, columns):
-        """Some columns as a list, with None in place of those that never change."""
+        """The ``columns`` as a list, with None in place of constant ones."""
         is_constant = self.is_constant
         return [None if is_constant[j] else int(j) for j in columns]
 
@@ -79,8 +79,8 @@ class Scale:
 def column_statistics(values, sample_weight=None):
     """The :class:`Scale` of every column of ``values`` (n_rows, n_columns), in two passes.
 
-    Differences are summed, from the first row and then from the mean: columns far from the origin
-    lose no digits. A constant column has scale one.
+    The first sums differences from the first row, the second those from the mean, so that columns
+    far from the origin lose no digits. A constant column has scale one.
     """
     weight = np.ones(len(values)) if sample_weight is None else sample_weight
     minimum, maximum = np.full((2, values.shape[1]), [[np.inf], [-np.inf]])
@@ -94,7 +94,7 @@ def column_statistics(values, sample_weight=None):
         first += (block - origin) @ weight[part]
     mean = origin + (first / total)[:, None]
     constant = never_changes(minimum, maximum)
-    # In parts of the range: else squares of what varies by next to nothing would vanish, unseen.
+    # Relative to the range: else squares of tiny deviations would vanish unseen.
     span = np.where(constant, 1.0, maximum - minimum)
     for part in row_blocks(values.shape[0], BLOCK_ROWS):
         deviations = (_columns(values, part) - mean) / span[:, None]
@@ -109,17 +109,17 @@ def column_statistics(values, sample_weight=None):
 
 
 def never_changes(minimum, maximum):
-    """Whether columns between these are constant, but for rounding errors."""
+    """Whether columns with these extremes are constant, but for rounding errors."""
     return maximum <= minimum + ROUNDING * np.maximum(np.abs(minimum), np.abs(maximum))
 
 
 def _columns(values, part):
-    """Some rows as columns of their own, which sums run along."""
+    """Some rows, transposed and contiguous, so that sums run along memory."""
     return np.array(values[part].T, dtype=float, order="C")
 
 
 def check_scales(inputs, targets, input_names, output_names):
-    """Raise ValueError, with the name of the column, where floats do not hold what is learnt."""
+    """Raise ValueError, naming the column, where numbers are too large or vary too little."""
     for what, scale, names in (("X", inputs, input_names), ("y", targets, output_names)):
         sizes = np.maximum(np.abs(scale.minimum), np.abs(scale.maximum))
         for size, spread, constant, name in zip(
@@ -142,7 +142,7 @@ def check_scales(inputs, targets, input_names, output_names):
 class StandardisedData:
     """X (n_rows, n_inputs), y (n_rows, n_outputs), weights or None, the scales of both, groups.
 
-    Of many rows there may be a ``sample`` on which to begin, see ``sampling``.
+    If there are many rows, a fit begins on a ``sample`` of them, see ``sampling``.
     """
 
     X: np.ndarray
@@ -173,23 +173,23 @@ class StandardisedData:
 
     @property
     def weights(self):
-        """The weights; ones where there are none."""
+        """The weights; all ones if there are none."""
         return np.ones(self.n_rows) if self.sample_weight is None else self.sample_weight
 
     @property
     def total_weight(self):
-        """Their sum."""
+        """Sum of the weights."""
         return float(np.sum(self.weights))
 
     @property
     def effective_weight(self):
-        """Rows by weight: their sum, or as many as their spread leaves, whichever are more.
+        """Number of rows by weight: the sum of weights s, or Kish's effective size, if larger.
 
-        A whole weight is so many copies of a row. Weights that are less than whole cannot be
-        copies; then the size of an unweighted sample of the same precision stands for it,
-        W^2 / sum s^2 (Kish 1965), where that is more.
+        A row of weight 3 counts as three copies, so the sum counts the rows. Weights below one
+        cannot be copies. Then the size of an unweighted sample of the same precision,
+        (sum s)^2 / sum s^2 (Kish 1965), is usually larger, and is taken.
         """
-        # By the largest: squares of tiny weights would vanish.
+        # Relative to the largest: squares of tiny weights would vanish.
         largest = float(np.max(self.weights))
         share = self.weights / largest
         return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
@@ -201,10 +201,10 @@ class StandardisedData:
         return [blocks[start : start + step] for start in range(0, len(blocks), step)]
 
     def sum(self, one_pass, block_rows, map_ordered=map):
-        """Sums of a pass (see ``passes``) over all rows, in blocks of at most so many of them.
+        """Sums of a pass (see ``passes``) over all rows, in blocks of at most ``block_rows``.
 
-        ``map_ordered`` is ``map``, or what spreads chunks over workers; sums are added in the
-        chunks' order, so that they do not depend on it.
+        ``map_ordered`` is ``map``, or a function that spreads chunks over workers. Sums are added
+        in the order of chunks, so that they do not depend on it.
         """
 
         def of_chunk(chunk):
@@ -213,29 +213,29 @@ class StandardisedData:
         return reduce(add_each, map_ordered(of_chunk, self.chunks(block_rows)), [])
 
     def reduce(self, of_rows, merge):
-        """What ``of_rows`` makes of the rows; where they are in parts, merged two by two."""
+        """The result of ``of_rows``; rows that are in parts merge the results two by two."""
         del merge
         return of_rows(self)
 
     def table(self, part):
-        """Standardised [z, y] of some rows, (n_rows, n_inputs + n_outputs), weights left out."""
+        """Standardised [z, y] of some rows, (n_rows, n_inputs + n_outputs), without weights."""
         inputs = (self.X[part] - self.inputs.offset) / self.inputs.scale
         return np.hstack([inputs, (self.y[part] - self.targets.offset) / self.targets.scale])
 
     def numbers(self, of_block):
-        """One number for every row, which a function makes of Z and the target of a block."""
+        """One number for every row; ``of_block`` computes them from Z and the target of a block."""
         numbers = np.empty(self.n_rows)
         for part, Z, target, _ in self.blocks():
             numbers[part] = of_block(Z, target)
         return numbers
 
     def blocks(self, block_rows=BLOCK_ROWS):
-        """Blocks of at most so many rows, in order: slice, and what is read of it."""
+        """Blocks of at most ``block_rows`` rows, in order: slice, Z, target and weights."""
         for part in row_blocks(self.n_rows, block_rows):
             yield part, *self.read(part)
 
     def read(self, part):
-        """Z, standardised target, and weights, of one block."""
+        """Z, standardised target and weights of one block."""
         Z, target = self.inputs.apply(self.X[part].T), self.targets.apply(self.y[part].T)
         weight = np.ones(Z.shape[1]) if self.sample_weight is None else self.sample_weight[part]
         return Z, target, weight

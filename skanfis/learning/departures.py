@@ -1,18 +1,18 @@
-r"""How rules depart from their common line, in parts that each concern some inputs alone.
+r"""How rules depart from their common line, in components that each concern few inputs.
 
-The departures delta = N u of all rules, in the value at their own centre and in their slopes, are a
-table over the rules of a grid, (m_1, ..., m_d), and the functions of the basis. Along the axis of
-every input with terms it is split by orthonormal contrasts, the first of which is the mean. What
-varies along the axes of the inputs S, in the slope by input j, is a function of S and j together.
-So each contrast belongs to one *component*,
+The departures delta = N u of all rules, in the value at their own centre and in their slopes, form
+a table over the rules of a grid, (m_1, ..., m_d), and the basis functions. Orthonormal contrasts
+split it along the axis of every input with terms; the first contrast is the mean. A contrast that
+varies along the axes of the inputs S, in the slope by input j, concerns S and j together. So it
+belongs to one *component*,
 
-    (j,)      how a rule's part of the output changes with input j alone,
+    (j,)      how the rules' part in the output changes with input j alone,
     (i, j)    how that change depends on input i,
-    ()        the rest: what concerns three inputs and more,
+    ()        the rest, which concerns three inputs and more,
 
-and |delta|^2 is the sum of the components' own. Scattered rules have no axes: there a component is
-the values at the centres, (), or the slopes by an input, (j,). With a pull alpha_c on each, they
-pay u' D' diag(alpha) D u, D = H N, H the contrasts.
+and |delta|^2 is the sum over components. Scattered rules have no axes: there the components are the
+values at the centres, (), and the slopes by each input, (j,). With a pull alpha_c on each, the
+penalty is u' D' diag(alpha) D u, D = H N, H the contrasts.
 """
 
 from functools import lru_cache
@@ -23,16 +23,16 @@ from scipy import linalg
 
 from ..antecedent import Antecedent
 
-# Beyond pairs nobody tells one interaction from another.
+# Interactions of more inputs than a pair are not told apart: no reader would.
 _MOST_INPUTS = 2
 
 
 def departures(matrix, antecedent: Antecedent, slopes):
-    """D, a departure in each row; all components; and which of these each row belongs to, by place.
+    """D, with a departure in each row; all components; and the position of each row's component.
 
-    ``matrix`` (n_columns, n_columns) is N; ``slopes`` are the inputs that the functions of the
-    basis but the first are slopes by, None where one is constant, and there is nothing to learn.
-    A component is the inputs that it concerns, () for the rest.
+    ``matrix`` (n_columns, n_columns) is N. ``slopes`` are the inputs of all basis functions but the
+    first, with None for a constant one, by which no slope can be learnt. A component is the tuple
+    of inputs that it concerns, () for the rest.
     """
     counts, axes = antecedent.grid_counts, antecedent.inputs_with_terms
     components, component = _components(counts, axes, antecedent.n_rules, tuple(slopes))
@@ -47,10 +47,10 @@ def departures(matrix, antecedent: Antecedent, slopes):
 
 @lru_cache(maxsize=64)
 def _components(counts, axes, n_rules, slopes):
-    """All components, and which of them each row of D belongs to; not to be changed."""
+    """All components, and the position of each row's component; cached, so not to be changed."""
     functions = [(), *((j,) for j in slopes)]
     if counts is None:
-        # Of scattered rules; by an input that is constant there is nothing to learn.
+        # Scattered rules. A slope by a constant input cannot be learnt.
         inputs = [() if None in by else by for by in functions] * n_rules
     else:
         contrasts = product(*map(range, counts))
@@ -66,6 +66,6 @@ def _concerned(axes, contrast, by):
         return ()
     along = {j for j, varies in zip(axes, contrast, strict=True) if varies}
     inputs = along.union(by)
-    # A slope by an input without terms, the same for all rules, is the line's but for rounding.
+    # If all rules have one slope by an input without terms, they depart from it by rounding alone.
     is_own = len(inputs) <= _MOST_INPUTS and (along or inputs <= set(axes))
     return tuple(sorted(inputs)) if is_own else ()

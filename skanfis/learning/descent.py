@@ -1,20 +1,20 @@
 r"""Steepest descent, Jang's way: his hybrid rule, and plain back-propagation.
 
-**Hybrid.** An epoch (Jang 1993, section III) takes one step of the premises' natural parameters n
-(center c, width a or sigma, slope b of a membership) down the gradient of the cost at the
-consequents that least squares gives, and solves for these again. The step's length is given,
+**Hybrid.** An epoch (Jang 1993, section III) moves the premises' natural parameters n (center c,
+width a or sigma, slope b of a membership) one step down the gradient of the cost at the
+least-squares consequents, and solves for these again. The length kappa of the step is given,
 
     n -> n - kappa g / |g| ,    g = dF / dn ,
 
-and follows the error (``StepSize``). Centers and widths are in standard deviations of their input,
-so that a fit does not depend on units. His rule has no bounds: a step can make a width negative.
-Here a step that would leave the premises' box ends on its edge, displacement by displacement. By
-the envelope theorem the gradient at solved consequents is that of the joint cost, which a pass
-without square matrices gives (``SeparableProblem.joint``).
+and adapts to the course of the error (``StepSize``). Centers and widths are in standard deviations
+of their input, so that a fit does not depend on units. Jang's rule has no bounds: a step can make a
+width negative. Here each displacement that would leave the premises' box ends on its edge. By the
+envelope theorem the gradient at solved consequents is that of the joint cost, which a pass without
+square matrices gives (``SeparableProblem.joint``).
 
 **Gradient.** Premises and consequents beta on [1, z] take one such step together, down the gradient
-(dE / dn, dE / dbeta) of the cost E at these consequents (Liu et al. 2009). They start as the
-solution of least squares and are never solved for again (the second of the four methods in Jang
+(dE / dn, dE / dbeta) of the cost E at these consequents (Liu et al. 2009). The consequents start as
+the least-squares solution and are never solved for again (the second of the four methods in Jang
 1993).
 """
 
@@ -31,17 +31,18 @@ from .solver import LeastSquares, Solver, SolverResult
 from .varpro import GRADIENT_FACTOR, TOLERANCE, VariableProjection
 
 _RISE, _FALL = 1.0, -1.0
-# His own numbers (1993, section III): by 10 %, after four decreases, or two rises and falls.
+# Jang's numbers (1993, section III): 10 % more after four falls, 10 % less after two rises and
+# falls in turn.
 _CHANGES = [([_FALL, _FALL, _FALL, _FALL], 1.1), ([_RISE, _FALL, _RISE, _FALL], 0.9)]
 
 
 class StepSize:
-    """The length of a step, by the course of the error."""
+    """The length of a step, which adapts to the course of the error."""
 
     def __init__(self, size, error):
         self.size = size
         self._error = error
-        # One course for each: neither counts a change again that has once changed the length.
+        # A course for each change of the length, which starts afresh after that change.
         self._courses: list[deque] = [deque(maxlen=len(course)) for course, _ in _CHANGES]
 
     def follow(self, error):
@@ -55,9 +56,9 @@ class StepSize:
 
 
 class NaturalPremise:
-    """A premise whose parameters are the numbers that a paper writes: no logarithms.
+    """A premise in natural parameters n, those of the papers, without logarithms.
 
-    Displacements and natural parameters n are one to one: a step is taken in n.
+    Displacements and natural parameters map one to one, and steps are taken in n.
     """
 
     def __init__(self, premise):
@@ -66,22 +67,22 @@ class NaturalPremise:
             np.repeat([p.kind for p in group.family.parameters], group.n_terms)
             for group in premise.antecedent.groups
         ]
-        # Of what is tied, one stands for all.
+        # Of tied parameters, the first stands for all.
         self._tied = premise.antecedent.tied
         self._first = np.unique(self._tied, return_index=True)[1]
         self._is_log = (np.concatenate(kinds) != "location")[self._first]
 
     def _natural(self, x):
-        """n."""
+        """The natural parameters n at a displacement."""
         parameters = self.premise.parameters(x)[self._first]
         return np.where(self._is_log, np.exp(parameters * self._is_log), parameters)
 
     def slope(self, x, by_parameters, stiffness):
-        """Gradient of F + stiffness/2 |x|^2 by n, out of dF / d parameters.
+        """Gradient of F + stiffness/2 |x|^2 by n, from dF / d parameters.
 
         Also the largest entry of the gradient by x, projected on the box.
         """
-        # The derivatives of n by the antecedent's parameters, each by its own alone.
+        # Derivative of each n by its own parameter of the antecedent.
         natural = np.where(self._is_log, self._natural(x), 1.0)
         jacobian = natural[:, None] * self.premise.jacobian(x)[self._first]  # dn / dx
         gradient = np.bincount(self._tied, by_parameters) / natural
@@ -91,8 +92,8 @@ class NaturalPremise:
         return gradient, np.abs(x - inside).max()
 
     def move(self, x, step):
-        """The displacement at n + ``step``, or on the edge where that is out of the box."""
-        # What would not be positive, a width or the distance of two terms, goes to its lower bound.
+        """The displacement at n + ``step``, on the edge of the box where that lies outside."""
+        # A width, or distance of two terms, that would not be positive goes to its lower bound.
         natural = self._natural(x) + step
         logs = np.log(np.where(self._is_log, np.maximum(natural, np.finfo(float).tiny), 1.0))
         moved = self.premise.displacement(np.where(self._is_log, logs, natural)[self._tied])
@@ -101,22 +102,22 @@ class NaturalPremise:
 
 @dataclass(frozen=True, eq=False)
 class _Point:
-    """Where a descent is: displacements, the evaluation there, its cost with the stiffness'."""
+    """Where a descent is: displacements x, and the evaluation there."""
 
     x: np.ndarray
     evaluation: Evaluation
-    cost: float
-    by_parameters: np.ndarray  # the slope of the evaluation's cost by those of the antecedent
-    by_coefficients: np.ndarray  # and by those of the consequents, if these take steps
+    cost: float  # with that of the stiffness
+    by_parameters: np.ndarray  # gradient of the evaluation's cost by the antecedent's parameters
+    by_coefficients: np.ndarray  # and by the consequents; empty if these do not take steps
 
 
 class _Descent(Solver):
     """A solver whose epochs are steps of steepest descent, with its settings.
 
-    There is no other end than ``max_iter``, ``error_goal`` and a projected gradient of zero;
-    without the last the error may rise and fall for ever. The result is the epoch of least cost.
+    It ends at ``max_iter``, at ``error_goal``, or where the projected gradient is zero; the error
+    may rise and fall for ever. The result is the epoch of least cost.
 
-    ``_evaluated`` gives the evaluation at some parameters, and the two slopes of a ``_Point``.
+    ``_evaluated`` gives the evaluation at some parameters, and the two gradients of a ``_Point``.
     """
 
     _evaluated: ClassVar[Any]
@@ -193,7 +194,7 @@ class Hybrid(_Descent):
         Stop at this root mean square error, in standard deviations of the target; zero or positive.
         None: all ``max_iter`` epochs are run.
     tol : float, default=1e-3
-        Stop where the projected gradient is zero for all that ``tol`` can tell. Zero or positive.
+        Stop where the projected gradient is zero as far as ``tol`` can tell. Zero or positive.
     stiffness : "auto" or float, default="auto"
         Pull of the premises to their start, zero or positive; see
         :class:`~skanfis.learning.VariableProjection`.
@@ -223,8 +224,8 @@ class Hybrid(_Descent):
 class GradientDescent(_Descent):
     """Back-propagation: steepest descent on premises and consequents together.
 
-    Slow, for no single length of step suits all parameters. It is here for comparison with what it
-    is the ancestor of.
+    It is slow, because no single length of step suits all parameters. It is here for comparison
+    with its successors.
 
     Parameters
     ----------

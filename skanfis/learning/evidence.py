@@ -1,6 +1,6 @@
-r"""The evidence of a model: how probable the data are, with all that was learnt averaged out.
+r"""The evidence of a model: the probability of the data, with all parameters integrated out.
 
-By Laplace's method, up to what is the same for all models of the same data,
+By Laplace's method, up to a constant that all models of the same data share,
 
     -2 log p = (n - 1) m log 2F + m [log |M| - log |P|+ + log R] + log |I + H / kappa| ,
 
@@ -10,11 +10,12 @@ n is the number of rows by weight, m that of outputs, R that of rules; x are the
 the premises, kappa is their stiffness, H the reduced Gauss-Newton matrix by x. |P|+ leaves out the
 one direction on which no penalty acts, that in which all rules rise alike.
 
-A weight is the largest evidence's where as much is paid for it as it determines; each is multiplied
-by the ratio of the two (Fellner and Schall; Wood and Fasiolo 2017). At fixed premises this takes no
-pass over the rows: for any weights, beta is one solve away. docs/mathematics.rst has the whole of
-it, with the priors of the stiffness, which is expected as if nu displacements of size x0 had been
-seen before, and of the alpha_c and the rho_j, which are expected to be alike.
+At the largest evidence, n / sigma^2 times the penalty that a weight causes equals the number of
+parameters that the data determine against it. A step multiplies each weight by the ratio of that
+number to the penalty (Fellner and Schall; Wood and Fasiolo 2017). At fixed premises it takes no
+pass over the rows, only a new solve for beta. docs/mathematics.rst has the details, and the priors:
+of the stiffness, as if nu displacements of size x0 had been seen before, and of the alpha_c and the
+rho_j, which are expected to be alike.
 """
 
 from dataclasses import dataclass, replace
@@ -30,55 +31,55 @@ from .penalty import WEIGHTS, CommonLine, Penalty, mean_and_parts
 
 # The weights that the evidence can find.
 FREE = ("agreement", "alpha", "slope", "stiffness")
-# Beyond these the weights mean nothing: rounding, and rules that are one line to every digit.
+# Limits of the weights: below, only rounding acts; above, all rules are one line to every digit.
 SMALLEST = Penalty(agreement=1e-12, alpha=1e-12, slope=1e-12, stiffness=1e-10)
 LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
 _AGREEMENT, _STIFFNESS = range(len(WEIGHTS))
 _OTHERS = slice(len(WEIGHTS), None)
-# x0 and nu: a fifth of a spacing is what a term is expected to move.
+# x0 and nu: a term is expected to move by a fifth of a spacing.
 PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
-# One standard deviation s of alpha_c, and of rho_j, is a factor of three of their mean: 1 / s^2.
+# 1 / s^2, s the prior's standard deviation of log alpha_c, and of log rho_j: a factor of three.
 _LIKENESS = 1.0 / np.log(3.0) ** 2
-# Distinct rows per consequent from which on freedom is tried, and rows left out are trusted alone;
-# and slopes have a weight each. With three rows per input, planes of which a tenth of the slopes
-# count leave half of the error, and planes of which all count 5 % more; with fewer rows than inputs
-# noise is fitted.
+# From this many distinct rows per consequent on, unbounded terms are tried, and every slope has a
+# weight of its own. With three rows per input, such weights halve the error of planes of which a
+# tenth of the slopes count, and add 5 % to that of planes of which all count. With fewer rows than
+# inputs, they fit noise.
 ROWS_PER_CONSEQUENT = 2
-# With fewer, no weight is less than this.
+# With fewer rows per consequent, no weight is less than this.
 _LEAST = 1e-6
-# Most of a target lies within so many standard deviations of its mean.
+# Most of a target lies within this many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
 _LONGEST_STEP = np.log(100.0)
-# Successive steps of a weight are alike from this ratio on.
+# Successive steps of a weight count as alike from this ratio on.
 _ALIKE = 0.5
-# Below all weights: a logarithm can be taken of it.
+# A number below all weights that has a logarithm.
 _NOTHING = np.finfo(float).tiny
-# Of a number of parameters, of what is paid for them, and of steps: less has no sign of its own.
+# Numbers of parameters, penalties and products of steps below this are rounding errors.
 _ROUNDING = 1e-12
-# What changes a weight by less leaves its second digit as it is.
+# A weight that changes by less, relative to itself, keeps its second digit.
 _SETTLED = 5e-3
-# What a number, or another turn, must be worth of the evidence, in -2 log p: as much as a parameter
-# costs by Akaike's criterion.
+# What a number to read, or another turn, must gain in -2 log p: as much as a parameter costs by
+# Akaike's criterion.
 WORTH = 2.0
-# The target of a fit that is exact to rounding has no more digits than this, squared.
+# Least 2F, in variances of the target: more exact than to rounding no fit can be.
 _LEAST_ERROR = 1e-22
 
 
 @dataclass(frozen=True, eq=False)
 class Laplace:
-    """The posterior at a point: all that the evidence and its derivatives are made of."""
+    """The posterior at a point: everything that the evidence and its derivatives are made of."""
 
     penalty: Penalty
     n_rows: float  # by weight
     twice_cost: float  # 2F
-    n_outputs: int  # those that vary
+    n_outputs: int  # outputs that vary
     determinants: float  # log |M| - log |P|+ + log R
-    paid: np.ndarray  # beta' tau P beta, or kappa |x|^2, of each of ``CommonLine.weights``
-    disagreement: np.ndarray  # Q, which makes the penalty together with the line
+    paid: np.ndarray  # its part of beta' P beta + kappa |x|^2, for each of ``CommonLine.weights``
+    disagreement: np.ndarray  # Q, which makes up P together with the line
     line: CommonLine
-    prior: NormalFactor  # of P, its null space joined in at P's own size
+    prior: NormalFactor  # of P, its null space filled in at the size of P
     factor: NormalFactor  # of M
     curvature: np.ndarray  # eigenvalues of H
 
@@ -89,18 +90,18 @@ class Laplace:
 
     @cached_property
     def trace_before(self):
-        """Of each part of the penalty, by its weight, the trace in the prior.
+        """For each weight, the trace of its part of the penalty in the prior.
 
-        These and ``trace_after`` take as long as all the rest, and are seldom asked of the last of
-        several posteriors.
+        It is found on demand, like ``trace_after``: both take as long as all the rest, and the last
+        of several posteriors seldom needs them.
         """
         return self._traces(self.prior, float(self.curvature.size))
 
     @cached_property
     def trace_after(self):
-        """The same in the posterior: how many parameters each part holds."""
+        """The same in the posterior: the number of parameters that each part holds."""
         stiffness = self.penalty.stiffness
-        # Without stiffness nothing is held, not even where there is no curvature either.
+        # Without stiffness nothing is held, even if there is no curvature, where this is 0 / 0.
         held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
         return self._traces(self.factor, held)
 
@@ -113,17 +114,17 @@ class Laplace:
 
     @property
     def freedom(self):
-        """Rows by weight times outputs, less what a constant takes."""
+        """Degrees of freedom: rows by weight, less one for a constant, times outputs."""
         return max(self.n_rows - 1.0, 0.5) * self.n_outputs
 
     @property
     def noise_variance(self):
-        """sigma^2 of the standardised target, the mean over outputs."""
+        """sigma^2 of the standardised target, averaged over outputs."""
         return self.n_rows * self.twice_cost / self.freedom
 
     @property
     def prior_precision(self):
-        """N kappa / sigma^2, in units of what is expected of it."""
+        """Prior precision n kappa / sigma^2 of the displacements, in units of the expected one."""
         return self.n_rows / self.noise_variance * self.penalty.stiffness * PRIOR_DISPLACEMENT**2
 
     @property
@@ -144,24 +145,24 @@ class Laplace:
 
     @property
     def n_effective(self):
-        """Effective number of all parameters: those that no part of the penalty holds."""
+        """Effective number of all parameters: all, less those that the penalty holds."""
         return self.n_columns + self.curvature.size - float(np.sum(self.trace_after))
 
     @property
     def n_effective_premises(self):
-        """Effective number of the displacements: of each, the part that the data decide on."""
+        """Effective number of the displacements: all, less those that the stiffness holds."""
         return self.curvature.size - float(self.trace_after[_STIFFNESS])
 
 
 def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), curvature=()):
-    """The posterior at fixed premises; the ``evaluation`` is solved with the problem's penalty."""
+    """The posterior at fixed premises; ``evaluation`` must be solved with the problem's penalty."""
     normal, line, penalty = evaluation.normal, problem.common_line, problem.penalty
     assert normal is not None
     matrix, factor, solved = normal.penalty, normal.factor, normal.coefficients
-    # Of one constant there is no penalty at all, but for the shift: any size will do.
+    # A model of one constant has no penalty but the shift: any size will do.
     size = np.trace(matrix) / matrix.shape[0]
     size = size if size > 2.0 * factor.shift else 1.0
-    # The null space of P joins in at P's own size, so that what is left has a Cholesky factor.
+    # P is singular. Its null space is filled in at P's own size, so that it has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), normal.free)
     paid = line.weights(penalty)
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
@@ -183,13 +184,13 @@ def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), 
 
 
 def least_weights(posterior: Laplace, n_distinct):
-    """The penalty below whose weights the prior expects what no rule that can be read does.
+    """The least weights: with smaller ones, the prior expects rules far beyond the target.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
-    from the common line to have the variance sigma^2 / (n alpha): neither is to exceed the square
-    of what is far for a target. Where there are hardly more distinct rows than consequents, a model
-    that passes through every row explains them without noise, and rounding errors grow by 1 / alpha
-    along what the data leave open: there the weights are never next to nothing.
+    from the common line has the variance sigma^2 / (n alpha). Neither may exceed the square of what
+    is far for a target. With hardly more distinct rows than consequents, a model can pass through
+    every row without noise, and rounding errors grow by 1 / alpha in directions that the data leave
+    open. So no weight may be next to nothing then.
     """
     least = _LEAST if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns else 0.0
     if posterior.line.n_rules == 1:
@@ -202,15 +203,15 @@ def least_weights(posterior: Laplace, n_distinct):
 def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
     """The penalty after one step of every free weight, none below ``least``.
 
-    With too few distinct rows for so many consequents, one weight is found for all slopes: a weight
-    for each would make room for those that chance asks for, until noise is explained by them.
+    If distinct rows are few for the number of consequents, all slopes share one weight. Weights of
+    their own would give way to slopes that fit noise by chance.
     """
     penalty, line = posterior.penalty, posterior.line
     now = line.weights(penalty)
     before, outputs = posterior.trace_before, np.full(now.size, posterior.n_outputs)
     outputs[_STIFFNESS] = 1
     determined = outputs * np.maximum(before - posterior.trace_after, 0.0)
-    # What next to nothing is paid for may come out negative.
+    # Rounding may make a tiny penalty negative.
     cost = posterior.n_rows / posterior.noise_variance * np.maximum(posterior.paid, 0.0)
     if posterior.curvature.size:
         determined[_STIFFNESS] += _PRIOR_NUMBER
@@ -228,14 +229,15 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
 
 
 def _log_ratio(determined, cost):
-    # What is neither determined nor paid for stays as it is.
+    # If both are nothing, the weight stays as it is.
     return np.log((determined + _ROUNDING) / (cost + _ROUNDING))
 
 
 def _step_to_likeness(cost, determined, weights):
-    """The root t of cost e^t - determined + 2 (log pulls + t) / s^2, for every weight.
+    """Steps t of log weights that are expected to be alike.
 
-    Pulls are weights over their geometric mean. With z = determined s^2 / 2 - log pulls,
+    t is the root of cost e^t - determined + 2 (log pulls + t) / s^2; pulls are weights over their
+    geometric mean. With z = determined s^2 / 2 - log pulls and the Wright omega function,
     t = z - omega(z + log(cost s^2 / 2)).
     """
     if weights.size <= 1 or weights[0] == 0.0:
@@ -246,9 +248,9 @@ def _step_to_likeness(cost, determined, weights):
 
 
 def _limited(penalty, line, weights, moves, others, least):
-    """The penalty of weights within their limits where they move, and of others where not."""
+    """The penalty of ``weights`` within their limits where ``moves``, of ``others`` elsewhere."""
     slopes, components = line.kinds == "slope", line.kinds == "alpha"
-    # All of a kind, or none.
+    # All weights of a kind move, or none.
     moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
     low = np.maximum(line.weights(SMALLEST), line.weights(least))
     found = np.where(moves, np.clip(weights, low, line.weights(LARGEST)), others)
@@ -261,12 +263,12 @@ def _limited(penalty, line, weights, moves, others, least):
 
 
 def extrapolated(line, before, now, after, free, least):
-    """Where steps that follow one another lead: ``after``, and beyond it where they are alike.
+    """The limit of successive steps by Aitken's rule: ``after``, or beyond it if they are alike.
 
-    Where data hardly decide on a weight, as with more columns than rows, every step is a small part
-    of the way. By Aitken's rule, the logarithms being a geometric sequence, the rest of the way is
-    1 / (1 - r) last steps, r the ratio of one to that before; never more than the largest step,
-    which is taken too where r is one or more. ``before`` is None where there is no such step.
+    If data hardly decide on a weight, as with more columns than rows, every step is a small part of
+    the way. If log weights form a geometric sequence, the rest of the way is 1 / (1 - r) last
+    steps, r the ratio of a step to the one before. It is at most the longest step, which is also
+    taken if r is one or more. ``before`` is None if there was no step before.
     """
     if before is None:
         return after

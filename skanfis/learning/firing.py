@@ -13,7 +13,7 @@ from ..support import RuleSupport
 from .data import StandardisedData, fingerprint
 from .gram import pair_index, pairs
 
-# A rule fires on the rows on which it has at least this part of the strongest rule's strength.
+# A rule fires on a row if it has at least this part of the strongest rule's strength there.
 FIRES = 0.5
 
 
@@ -25,11 +25,11 @@ class RuleFiring:
     second: np.ndarray  # sums of s w_r [1, z] [1, z]', (n_rules, 1 + n_inputs, 1 + n_inputs)
     strongest: np.ndarray  # weight of the rows on which each rule is the strongest
     peak: np.ndarray  # largest strength of each rule on any row
-    n_distinct: np.ndarray  # inputs on which each rule is the strongest, up to a limit
+    n_distinct: np.ndarray  # distinct inputs on which each rule is the strongest, up to a limit
 
     @classmethod
     def of(cls, rows: StandardisedData, antecedent: Antecedent, enough: int):
-        """Of rows; distinct inputs are counted up to ``enough`` of each rule."""
+        """From rows; distinct inputs are counted up to ``enough`` for each rule."""
         (overlap, products, strongest), peak, distinct = rows.reduce(
             partial(_sums, antecedent=antecedent, enough=enough), partial(_added, enough=enough)
         )
@@ -51,23 +51,23 @@ def rule_support(rows: StandardisedData, antecedent: Antecedent, n_coefficients:
 
 
 def places(second, is_known):
-    """Means of the rows of rules, and lower triangular W, W' W the inverse of their covariances.
+    """Means of the rows of each rule, and lower triangular W, W' W the inverse of their covariance.
 
-    ``second`` are sums of s w_r [1, z] [1, z]'; covariances are thickened. Both are zero for rules
-    that are not known.
+    ``second`` are sums of s w_r [1, z] [1, z]'. A small variance is added in all directions. Both
+    results are zero for rules that are not known.
     """
     known = np.asarray(is_known)[:, None, None]
     moments = known * second / np.maximum(second[:, :1, :1], np.finfo(float).tiny)
     center = moments[:, 0, 1:].copy()
     covariance = moments[:, 1:, 1:] - center[:, :, None] * center[:, None, :]
-    # Rows on a line or a surface (two thermometers on one gyro) keep some thickness, and the
-    # distance stays finite off it.
+    # Rows may lie on a line or surface (two thermometers on one gyro). With some thickness, the
+    # distance of a point off it stays finite.
     covariance += TOLD_APART**2 * np.eye(center.shape[1])
     return center, known * np.tril(np.linalg.inv(np.linalg.cholesky(covariance)))
 
 
 def _sums(rows, antecedent, enough):
-    """Sums over rows, largest strengths, and for every rule so many distinct inputs."""
+    """Sums over rows, largest strengths, and up to ``enough`` distinct inputs for every rule."""
     n_rules, n_basis = antecedent.n_rules, 1 + rows.X.shape[1]
     overlap, strongest, peak = np.zeros((n_rules, n_rules)), np.zeros(n_rules), np.zeros(n_rules)
     products = np.zeros((n_rules, n_basis * (n_basis + 1) // 2))
@@ -88,7 +88,7 @@ def _sums(rows, antecedent, enough):
 
 
 def _added(one, other, enough):
-    """Both together, each distinct input once."""
+    """The results of two sets of rows merged, each distinct input once."""
     distinct = [np.union1d(a, b)[:enough] for a, b in zip(one[2], other[2], strict=True)]
     return add_each(one[0], other[0]), np.maximum(one[1], other[1]), distinct
 
@@ -96,8 +96,8 @@ def _added(one, other, enough):
 def _radii(rows, antecedent, center, factor):
     """The largest distance at which each rule fires.
 
-    The farthest row of a block is found by quadratic forms in [1, z], one product for all rules,
-    and measured by the factor itself: what the product rounds away is not lost.
+    Quadratic forms in [1, z], one product for all rules, find the farthest row of a block. The
+    factor itself measures its distance, without the rounding errors of the product.
     """
     n_rules, n_inputs = center.shape
     affine = np.concatenate([-factor @ center[:, :, None], factor], axis=2)

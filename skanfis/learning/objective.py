@@ -1,23 +1,23 @@
 r"""Training as a separable least-squares problem: cost, gradient and Gauss-Newton matrix.
 
-With premise parameters theta, design Phi(theta), weights S of sum W and consequents beta,
+With premise parameters theta, design Phi(theta), row weights S of sum W, and consequents beta,
 
     F(theta) = min_beta  1/2 [ |y - Phi beta|_S^2 / W + beta' P beta ] ,   P = lambda Q(theta) + A ,
 
-where Q gives the disagreement V of rules that fire together, A what else pulls on the consequents
-(see ``penalty``). With r the residual and D = (d Phi / d theta) beta,
+where Q is the matrix of the disagreement V of rules that fire together, and A that of the other
+penalties on the consequents (see ``penalty``). With r the residual and D = (d Phi / d theta) beta,
 
     grad F = [- D' S r + lambda/2 dV] / W ,
     H      = [D' S D + lambda K - C (Phi' S Phi + W P)^-1 C'] / W ,    C = D' S Phi + lambda L .
 
-docs/mathematics.rst derives them, with dV, K and L.
+docs/mathematics.rst derives them, and dV, K and L, the derivatives of V.
 
-Two passes over the rows make one iteration (``passes``): :meth:`SeparableProblem.evaluate` sums
-Phi' S [Phi, r] and gives cost and beta, which is all that a rejected step needs;
-:meth:`SeparableProblem.linearise` sums the rest at that very beta. The right side is the residual
-of *reference* coefficients, those of the last accepted point, not y.
+One iteration takes two passes over the rows (``passes``). :meth:`SeparableProblem.evaluate` sums
+Phi' S [Phi, r] and gives cost and beta, which is all that a rejected step needs.
+:meth:`SeparableProblem.linearise` sums the rest at this beta. An evaluation solves for the change
+from *reference* coefficients, those of the last accepted point: r is their residual, and not y.
 
-Theta here is the vector :attr:`Antecedent.parameters`; what solvers move is in ``premise``.
+Theta here is the vector :attr:`Antecedent.parameters`; solvers move it through ``premise``.
 """
 
 import copy
@@ -35,49 +35,49 @@ from .gram import DesignMoments
 from .passes import Design, FirstPass, JointPass, SecondPass, own_parameters
 from .penalty import CommonLine, Penalty, disagreement_matrix
 
-# A row that a rule has to itself leaves 1 - h = 0 but for rounding, and an error without bound.
+# Least 1 - h: for a row with a rule to itself it is a rounding error, and r / (1 - h) unbounded.
 _SMALLEST_FREEDOM = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """The problem at one theta, and at the coefficients solved for there or given."""
+    """The problem at one theta, and at coefficients that were solved for there, or given."""
 
     antecedent: Antecedent
     cost: float
     coefficients: np.ndarray  # on [1, z], (n_columns, n_outputs)
     masses: np.ndarray  # part of the weight on which each rule fires
-    mean_squares: np.ndarray  # of the residual of every standardised output, weighted
-    normal: "NormalEquations | None"  # None where the coefficients were given, not solved for
+    mean_squares: np.ndarray  # weighted, of the residual of every standardised output
+    normal: "NormalEquations | None"  # None if the coefficients were given, not solved for
 
     @property
     def mean_squared_error(self):
-        """Of the standardised target, summed over outputs."""
+        """Mean squared error of the standardised target, summed over outputs."""
         return float(self.mean_squares.sum())
 
 
 @dataclass(frozen=True, eq=False)
 class NormalEquations:
-    """What the consequents were solved with, in the local basis."""
+    """The normal equations that the consequents were solved by, in the local basis."""
 
     gram: np.ndarray  # Phi' S Phi / W
     disagreement: np.ndarray  # Q
     penalty: np.ndarray  # P
     factor: NormalFactor  # of Phi' S Phi / W + P
     coefficients: np.ndarray  # local, (n_columns, n_outputs)
-    free: np.ndarray | None  # what these are made of, see ``CommonLine.free``
+    free: np.ndarray | None  # columns that span the allowed coefficients, see ``CommonLine.free``
 
     def with_penalty(self, penalty, squares, free):
         """The same with another penalty, the change of the coefficients, and the new mean squares.
 
-        ``squares`` are those of here. No pass over the rows is taken; the factor's shift is added
-        to ``penalty`` itself.
+        ``squares`` are the mean squares before. It takes no pass over the rows, and adds the
+        factor's shift to ``penalty`` in place.
         """
         factor = NormalFactor(self.gram + penalty, free)
         penalty.flat[:: penalty.shape[0] + 1] += factor.shift
-        # The normal equations say that Phi' S r / W = P_0 u_0, with P_0 and u_0 those of here.
+        # By the normal equations, Phi' S r / W = P_0 u_0, with penalty P_0 and solution u_0 before.
         before, slope = self.coefficients, self.penalty @ self.coefficients
-        # From coefficients that are of the form that is asked for.
+        # Start from the nearest coefficients that ``free`` allows.
         start = before if free is None else free @ (free.T @ before)
         solved = start + factor.solve(slope + self.gram @ (before - start) - penalty @ start)
         change = solved - before
@@ -92,15 +92,15 @@ class Linearisation:
 
     gradient: np.ndarray
     gauss_newton: np.ndarray
-    cross: tuple[np.ndarray, ...]  # L^-1 C' / W of every output, L the factor of the consequents
+    cross: tuple[np.ndarray, ...]  # L^-1 C' / W for every output, L the factor of the consequents
 
 
 class SeparableProblem:
     """The reduced problem of one set of rows.
 
-    ``antecedent`` is the rule base at the start, which freezes the consequents' local basis;
-    ``map_ordered`` is ``map``, or what spreads chunks over workers, with results in order;
-    ``consequent_inputs`` are the inputs that the consequents are linear in: all, unless given.
+    ``antecedent`` is the rule base at the start; the consequents' local basis is fixed by it.
+    ``map_ordered`` is ``map``, or a function that spreads chunks over workers and keeps results in
+    order. ``consequent_inputs`` are the inputs that the consequents are linear in, all by default.
     """
 
     def __init__(
@@ -130,9 +130,9 @@ class SeparableProblem:
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
         self._weight, self.n_rows = rows.total_weight, rows.effective_weight
-        # glibc hands back what is freed beyond limits that grow with the largest piece freed so
-        # far; without one of this size, every block gets its arrays page by page again, and a pass
-        # takes up to twice as long. Nothing is written to it.
+        # glibc returns freed memory to the system beyond limits that grow with the largest piece
+        # freed so far. Without a piece of this size, every block gets its arrays page by page
+        # again, and a pass takes up to twice as long. The array itself is not used.
         np.empty(2 * BLOCK_BYTES // 8)
         no_coefficients = np.zeros((self.n_columns, self.n_outputs))
         self._sums_at_start: tuple | None = self._first_pass(antecedent, no_coefficients)
@@ -143,7 +143,10 @@ class SeparableProblem:
         self.common_line = CommonLine(self.local, self._extent(antecedent), antecedent, slopes)
 
     def _extent(self, antecedent):
-        """How far from its centre each rule stands for the rows, (n_rules, n_basis - 1)."""
+        """Distance from each rule's centre to the farthest row it stands for, along every input.
+
+        It is weighted by the root of the strength, and at least one; (n_rules, n_basis - 1).
+        """
         farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))
         for _, Z, _, _ in self._blocks():
             root = np.sqrt(antecedent.strengths(Z))
@@ -154,7 +157,7 @@ class SeparableProblem:
 
     @property
     def n_varying(self):
-        """Outputs that vary, one at least: a constant one says nothing of the noise of others."""
+        """Outputs that vary, at least one: a constant one does not tell of the noise of others."""
         return max(int(np.count_nonzero(~self.rows.targets.is_constant)), 1)
 
     def with_penalty(self, penalty):
@@ -165,11 +168,11 @@ class SeparableProblem:
         return other
 
     def on_all(self, rows):
-        """Return the problem of all rows of which this one's are a sample; no pass over them.
+        """Return the problem of all rows, of which this one's are a sample; no pass over them.
 
         The local basis stays that of the sample. Cost, consequents and gradient are those of all
-        rows, the Gauss-Newton matrix is the sample's (subsampled Newton: Byrd et al. 2011): it
-        decides how long a step is and not where steps end, and of all sums it is the dearest.
+        rows, the Gauss-Newton matrix is the sample's (subsampled Newton: Byrd et al. 2011). It is
+        the dearest sum, and decides on the length of steps but not on where they end.
         """
         other = copy.copy(self)
         other.rows, other._weight, other.on_sample = rows, rows.total_weight, self
@@ -178,7 +181,7 @@ class SeparableProblem:
         return other
 
     def penalty_matrix(self, disagreement):
-        """P in the local basis, where Q is ``disagreement``."""
+        """P in the local basis, from Q, the ``disagreement``."""
         return self.penalty.agreement * disagreement + self._pull
 
     @cached_property
@@ -189,7 +192,7 @@ class SeparableProblem:
         return self.rows.blocks(self._block_rows)
 
     def _sum(self, one_pass):
-        """Means over the weight of what a pass sums."""
+        """The sums of a pass, over the total weight."""
         totals = self.rows.sum(one_pass, self._block_rows, self.map_ordered)
         return [total / self._weight for total in totals]
 
@@ -199,7 +202,7 @@ class SeparableProblem:
         return self._design.moments.gram(moments), np.ascontiguousarray(slope), square
 
     def evaluate(self, parameters, reference=None):
-        """Cost and coefficients at ``parameters``; ``reference`` coefficients on [1, z]."""
+        """Cost and coefficients at ``parameters``; the coefficients ``reference`` are on [1, z]."""
         antecedent = self.antecedent.with_parameters(parameters)
         known = None
         if reference is None:
@@ -230,7 +233,7 @@ class SeparableProblem:
         )
 
     def solved_again(self, evaluation):
-        """An evaluation of the same rows under this penalty; no pass over them."""
+        """An evaluation of this problem's rows, solved for this penalty; no pass over them."""
         before = evaluation.normal
         normal, change, squares = before.with_penalty(
             self.penalty_matrix(before.disagreement),
@@ -263,16 +266,16 @@ class SeparableProblem:
         return Linearisation(-slope, gauss_newton, tuple(halves))
 
     def curvature(self, evaluation):
-        """As :meth:`linearise`, the gradient not being asked for; of a sample if there is one."""
+        """As :meth:`linearise`, but of a sample, if there is one; do not use the gradient."""
         if self.on_sample is None:
             return self.linearise(evaluation)
-        # The sample's own normal equations: D' S D and what is taken off are of the same rows.
+        # With the sample's own normal equations, both parts of H are of the same rows.
         sample, coefficients = self.on_sample, evaluation.coefficients
         own = sample.evaluate(evaluation.antecedent.parameters, coefficients)
         return sample.linearise(replace(own, coefficients=coefficients))
 
     def joint(self, parameters, coefficients):
-        """Evaluation, and slopes by both, at ``parameters`` and any ``coefficients`` on [1, z]."""
+        """Evaluation and both gradients, at ``parameters`` and any ``coefficients`` on [1, z]."""
         antecedent = self.antecedent.with_parameters(parameters)
         premises, slope, square, apart, masses = self._sum(
             JointPass(self._design, antecedent, coefficients, self.penalty.agreement)
@@ -289,7 +292,7 @@ class SeparableProblem:
             yield part, residual, weight
 
     def _fired(self, evaluation):
-        """The same with strengths of the rules and functions of the basis, after the slice."""
+        """The same, with strengths of the rules and basis functions after the slice."""
         by_output = self._design.by_output(evaluation.coefficients)
         for part, Z, target, weight in self._blocks():
             strengths, basis_rows = evaluation.antecedent.strengths(Z), self._design.basis(Z)
@@ -299,11 +302,11 @@ class SeparableProblem:
     def leave_one_out_error(self, evaluation):
         """Mean squared error of leaving out each row, at fixed premises (Allen 1974).
 
-        The mean of (r_i / (1 - h_i))^2, h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. Of a
-        row that stands for several, one is left out.
+        It is the mean of (r_i / (1 - h_i))^2, with the leverage
+        h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. Of a row that stands for several, one is left out.
         """
         total, unit = 0.0, self._weight / self.n_rows
-        # L^-1 T': what is changed is a matrix of few rows, and not the design.
+        # L^-1 T', so that the basis of this small matrix changes, and not that of the design.
         root = self.local.to_global(evaluation.normal.factor.root.T).T
         for _, strengths, basis_rows, residual, weight in self._fired(evaluation):
             half = root @ (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)

@@ -1,14 +1,14 @@
-r"""The terms of one input, one after another: the gaps between them, and widths that go with these.
+r"""The ordered terms of one input: they move by the gaps between them, and widths follow the gaps.
 
-* *In order, and where there are data.* The m terms that an input has, where no two are in the same
-  place, divide its range, and a little beyond, into m + 1 gaps g. What moves are the ratios of
+* *In order, and where there are data.* The m terms of an input, if no two share a place, divide its
+  range and a margin on either side into m + 1 gaps g. The displacements change the ratios of
   neighbouring gaps, within bounds.
-* *Of a width that goes with their distance.* A term's widths grow with the mean of the gaps beside
-  it. What moves besides is a factor, between the one at which the term is half true half-way to a
-  neighbour, and the one at which it is 0.9 true there.
+* *As wide as they are far apart.* A term's widths grow with the mean of the gaps beside it. Another
+  displacement multiplies them by a factor. It is bounded so that the membership half-way to a
+  neighbour is at least 0.5 and at most 0.9.
 
-``is_unbounded`` is the classic ANFIS: terms stay in order, but may leave the data by their
-distance, and be four times as wide. It fits exact data better, by rules that cannot be read.
+``is_unbounded`` is the classic ANFIS: terms stay in order, but may leave the data by the distance
+between them, and be four times as wide. It fits exact data better, by rules that cannot be read.
 """
 
 from dataclasses import dataclass
@@ -16,32 +16,33 @@ from functools import cached_property
 
 import numpy as np
 
-# Neighbouring gaps differ at most by this factor, the outer ones by the second from the next.
+# Neighbouring gaps differ at most by the first factor. The gap beyond an outermost term is at most
+# the second factor times the next gap.
 _LOG_RATIO, _LOG_OUTER = np.log(2.2), np.log(1.45)
-# A ratio of gaps changes by so much, as a logarithm, per displacement: a term between two others
-# that moves by some part of a gap then pays about as much as a width that changes by it.
+# Change of the log ratio of two gaps per unit of displacement. By this unit, a term that moves by
+# some part of a gap pays about as much stiffness as a width that changes by the same part.
 _LOG_UNIT = 3.0**0.5
-# What is free to move has room to, wherever it starts.
+# Least room to move, even for a displacement that starts on a bound.
 _MOBILE = 0.01
-# Shapes, and widths of terms that share their place with others, may change by this one.
+# Shapes, and widths of terms that are not ordered, may change by this factor.
 LOG_FACTOR = np.log(4.0)
-# A shape that makes the top of an ordered term flat, and so truer next to a neighbour, by this.
+# Shapes of ordered terms may grow by this factor: a flatter top is higher next to a neighbour.
 _LOG_FLATTER = np.log(1.5)
-# Terms may leave the data by this part of their mean distance: a term as narrow as may be is still
-# more than half true at the edge. Where they are free, by all of it.
+# Terms may leave the data by this part of their mean distance: even the narrowest has a membership
+# above 0.5 at the edge of the data then. Unbounded terms may leave by the whole distance.
 _BEYOND = 0.25
-# Displacements, and gaps as parts of the range, that are less are nothing but rounding.
+# Displacements, and gaps as parts of the range, below this are rounding errors.
 NEXT_TO_NOTHING = 1e-9
-# Between two terms one is at least so true, and at most so true is the smaller: more, and no reader
-# can say which of the two is meant.
+# Limits of a membership half-way between two terms: above the second, no reader can tell which of
+# the two is meant.
 _LEAST_TRUTH, _GREATEST_CROSSING = 0.5, 0.9
-# Factors of a width that are looked at for the least and the most.
+# Factors of a width that are tried to find the least and the largest.
 _CHANGES = 256
 
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """Where one term's parameters are in the vector of all."""
+    """A term, and the positions of its parameters in the vector of all parameters."""
 
     family: type
     input: int
@@ -49,7 +50,7 @@ class Term:
     location: int
     widths: np.ndarray
     shapes: np.ndarray
-    is_width: np.ndarray  # of every position
+    is_width: np.ndarray  # for every position
 
 
 def terms_of(antecedent):
@@ -69,18 +70,18 @@ def terms_of(antecedent):
 class OrderedTerms:
     """The terms of one input, one after another."""
 
-    locations: np.ndarray  # their positions in the vector of all parameters
-    widths: np.ndarray  # those of all their widths
-    terms: np.ndarray  # which term each of these belongs to
-    low: float  # the ends of the range
+    locations: np.ndarray  # positions of the locations in the vector of all parameters
+    widths: np.ndarray  # positions of all widths
+    terms: np.ndarray  # the term of each width
+    low: float  # the ends of the range, margins included
     high: float
     log_gaps: np.ndarray  # at the start
-    basis: np.ndarray  # from displacements to logarithms of gaps, but for a constant
-    inverse: np.ndarray  # and back
+    basis: np.ndarray  # maps displacements to log gaps, up to a constant
+    inverse: np.ndarray  # maps log gaps to displacements
 
     @classmethod
     def of(cls, own, parameters, low, high, is_unbounded):
-        """Of terms from left to right, with all parameters; ``low`` to ``high`` are the data."""
+        """From terms in order, and the vector of all parameters; data lie in ``low``..``high``."""
         locations = np.array([term.location for term in own])
         widths = np.concatenate([term.widths for term in own])
         terms = np.repeat(np.arange(len(own)), [term.widths.size for term in own])
@@ -88,7 +89,7 @@ class OrderedTerms:
         spacing = (values[-1] - values[0]) / (values.size - 1)
         low, high = min(low, values[0]), max(high, values[-1])
         if not is_unbounded:
-            # Where the data go on further, as in a heavy tail, there is hardly a row.
+            # No further beyond the outermost term than the next one: in a tail there are few rows.
             low = max(low, 2.0 * values[0] - values[1])
             high = min(high, 2.0 * values[-1] - values[-2])
         margin = spacing if is_unbounded else _BEYOND * spacing
@@ -114,30 +115,30 @@ class OrderedTerms:
         upper[np.concatenate([term.shapes for term in own])] = _LOG_FLATTER
 
     def _bounds_of_gaps(self):
-        """Least and most of the displacements of the gaps: neighbouring gaps stay of one size."""
+        """Bounds of the displacements of the gaps, which keep neighbouring gaps of similar size."""
         ratios = np.diff(self.log_gaps)
         lower, upper = np.full(ratios.size, -_LOG_RATIO), np.full(ratios.size, _LOG_RATIO)
-        # Beyond the outermost term there is no other to share a gap with; nor is there need of one.
+        # An outer gap has no term on its other side: it may shrink, but hardly exceed the next gap.
         lower[0], upper[-1] = -_LOG_OUTER, _LOG_OUTER
         upper[0], lower[-1] = ratios[0] + LOG_FACTOR, ratios[-1] - LOG_FACTOR
         lower, upper = np.minimum(lower - ratios, -_MOBILE), np.maximum(upper - ratios, _MOBILE)
         return lower / _LOG_UNIT, upper / _LOG_UNIT
 
     def gaps(self, displacement):
-        """The gaps at a displacement, of all entries of the vector."""
+        """The gaps at a displacement, the vector of all entries."""
         logs = self.log_gaps + self.basis @ displacement[self.locations]
         gaps = np.exp(logs - logs.max())
         return gaps * ((self.high - self.low) / gaps.sum())
 
     def of_locations(self, values):
-        """Gaps of any locations, next to nothing where out of order; displacements at these."""
+        """Gaps and displacements of any locations; gaps are tiny where these are out of order."""
         gaps = np.diff(np.concatenate([[self.low], values, [self.high]]))
         gaps = np.maximum(gaps, NEXT_TO_NOTHING * (self.high - self.low))
         return gaps, self.inverse @ (np.log(gaps) - self.log_gaps)
 
     @staticmethod
     def _beside(gaps):
-        """The gaps to the left and to the right neighbour; an outermost term has one, twice."""
+        """The gaps to the left and right neighbour; an outermost term has its only one twice."""
         left, right = gaps[:-1].copy(), gaps[1:].copy()
         left[0], right[-1] = right[0], left[-1]
         return left, right
@@ -151,7 +152,7 @@ class OrderedTerms:
         return self._reach(np.exp(self.log_gaps))
 
     def widening(self, gaps):
-        """What the logarithms of the widths change by, beside their displacements."""
+        """Change of the log widths with the gaps, on top of the widths' own displacements."""
         return (self._reach(gaps) - self._start)[self.terms]
 
     def jacobian(self, displacement):
@@ -164,7 +165,7 @@ class OrderedTerms:
 
 
 def _range(term, raw, reach):
-    """The least and the most change of a term's log widths: half true and 0.9 true half way."""
+    """Least and largest change of a term's log widths: membership 0.5 and 0.9 half-way."""
     theta = raw[term.positions].copy()
     theta[term.is_width] -= np.log(reach)
     theta[term.positions == term.location] = 0.0
@@ -172,7 +173,7 @@ def _range(term, raw, reach):
     moved = theta[:, None] + term.is_width[:, None] * changes
     places = np.array([[[-0.5]], [[0.5]]]).repeat(_CHANGES, axis=1)
     truth = np.exp([term.family.log_value(place, moved)[:, 0] for place in places])
-    # A term that is true to one side for good has its flank on the other.
+    # A shoulder stays near one on one side: its flank is the other side.
     flanks = [side for side in truth if side[0] < _GREATEST_CROSSING] or [truth[0]]
     is_true = np.min(flanks, axis=0) >= _LEAST_TRUTH
     is_distinct = np.max(flanks, axis=0) <= _GREATEST_CROSSING

@@ -1,8 +1,8 @@
 r"""What one pass adds up over the rows, a block at a time: the sums behind ``objective``.
 
 A pass is a function of a block, Z (n_inputs, n_rows), target (n_outputs, n_rows) and weights, that
-returns its sums, a list of arrays. It holds the point at which it is taken and nothing of the rows:
-it can be sent to where the rows are (``StandardisedData.sum``), and only the sums come back.
+returns a list of arrays, its sums. It holds the point at which it is taken and no rows: it can be
+sent to where the rows are (``StandardisedData.sum``), and only the sums come back.
 """
 
 from dataclasses import dataclass
@@ -19,11 +19,11 @@ _TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """The columns of the design: its basis functions, and what its Gram matrix is made of."""
+    """The columns of the design: its basis functions, and the moments of its Gram matrix."""
 
-    consequent_inputs: np.ndarray  # that the consequents are linear in
+    consequent_inputs: np.ndarray  # inputs that the consequents are linear in
     moments: DesignMoments
-    own_parameters: np.ndarray  # of the premises, see the function of this name
+    own_parameters: np.ndarray  # see the function of this name
 
     def basis(self, Z):
         """Basis functions of the consequents at a block of rows."""
@@ -36,7 +36,7 @@ class Design:
 
 
 def normal_sums(moments, strengths, shares, basis_rows, weight, residual):
-    """Of a block of rows: the moments of Phi' S Phi, then Phi' S r and r' S r of every output."""
+    """Sums of a block: the moments of Phi' S Phi, then Phi' S r and r' S r of every output."""
     weighted = basis_rows * weight
     slopes = [(strengths @ (weighted * own).T).ravel() for own in residual]
     found = moments.of(shares, basis_rows, weighted)
@@ -45,7 +45,7 @@ def normal_sums(moments, strengths, shares, basis_rows, weight, residual):
 
 @dataclass(frozen=True, eq=False)
 class _Pass:
-    """A pass at a point: premises, and consequents."""
+    """A pass at a point: an antecedent, and coefficients of the consequents."""
 
     design: Design
     antecedent: Antecedent
@@ -54,7 +54,7 @@ class _Pass:
 
 
 class FirstPass(_Pass):
-    """Phi' S Phi (its moments), Phi' S r and r' S r, r the residual of reference coefficients."""
+    """Moments of Phi' S Phi, Phi' S r and r' S r, r the residual of the coefficients."""
 
     def __call__(self, Z, target, weight):
         design, basis_rows = self.design, self.design.basis(Z)
@@ -65,7 +65,7 @@ class FirstPass(_Pass):
 
 
 class SecondPass(_Pass):
-    """D' S D + lambda K, the slope, and C of every output, at coefficients that were solved for."""
+    """D' S D + lambda K, minus the gradient, and C of every output, at solved coefficients."""
 
     def __call__(self, Z, target, weight):
         antecedent, agreement = self.antecedent, self.agreement
@@ -93,14 +93,14 @@ class SecondPass(_Pass):
         return [square, slope, *every_cross]
 
     def _disagree(self, square, slope, cross, excess, strengths, gradients, weighted_basis):
-        """Add the part of V: its dV, K and L.
+        """Add the part of the disagreement V: dV, K and L.
 
-        With g_r the derivatives of rule r's own log-strength (those of the terms it has) and
-        N = sum_r w_r g_r, d log w_r = g_r - N: K and L are sums over the few terms of each rule and
-        products with N.
+        Let g_r be the derivatives of the log-strength of rule r before normalisation, which depends
+        on its own terms alone, and N = sum_r w_r g_r. Then d log w_r = g_r - N, so that K and L are
+        sums over the few terms of each rule, and products with N. e_r is f_r less the output.
         """
         antecedent, half, n_raw = self.antecedent, 0.5 * self.agreement, slope.size
-        # w_r e_r^2, where w_r may be next to nothing.
+        # w_r e_r^2; w_r may be next to nothing.
         squares = excess**2
         squares /= np.maximum(strengths, _TINY)
         weight, (n_rules, n_rows) = weighted_basis[0], excess.shape
@@ -114,7 +114,7 @@ class SecondPass(_Pass):
         square -= product + product.T
         columns = (half * excess)[:, None] * weighted_basis
         cross -= mean @ columns.reshape(-1, n_rows).T
-        # Of every rule, its own parameters; those that it lacks are a row of nothing at the end.
+        # g_r by the own parameters of every rule; padding positions point to the zeros at the end.
         own, size = self.design.own_parameters, n_raw + 1
         every = [gradient.reshape(-1, n_rows) for gradient in gradients]
         of_rule = np.concatenate([*every, np.zeros((1, n_rows))])[own]
@@ -129,7 +129,7 @@ class SecondPass(_Pass):
 
 
 class JointPass(_Pass):
-    """Slopes by theta and beta but for A, r' S r and V (per output), and the rules' masses."""
+    """Minus the gradients by theta and beta, without A; r' S r and V per output; rules' masses."""
 
     def __call__(self, Z, target, weight):
         antecedent, agreement = self.antecedent, self.agreement
@@ -161,14 +161,14 @@ class JointPass(_Pass):
 
 
 def own_parameters(antecedent):
-    """Of every rule, the positions of its terms' parameters in the vector of all.
+    """For every rule, the positions of its terms' parameters in the vector of all.
 
-    Shape (n_rules, the most that a rule has); of rules that have fewer, the rest is one position
-    beyond the vector.
+    Shape (n_rules, the most that a rule has). Rules that have fewer are padded with the position
+    just beyond the vector.
     """
     positions = [term.positions for term in terms_of(antecedent)]
     most = max(map(len, positions), default=0)
-    # No term is the last.
+    # The last row, which index -1 finds, stands for no term.
     of_term = np.full((len(positions) + 1, most), antecedent.parameters.size)
     for row, own in zip(of_term, positions, strict=False):
         row[: own.size] = own

@@ -1,14 +1,14 @@
 r"""What a solver moves: premises as a vector of displacements from their start, within bounds.
 
-Every entry is without unit and zero at the start, and one means much the same for all of them, a
-change of some length by a factor of e. Terms stay what a person can read, by construction:
+Every displacement is without unit and zero at the start. One means much the same for all of them: a
+change of some length by a factor of e. By construction, terms stay readable:
 
-* Terms that an input has in different places stay in order and where there are data, and of a width
-  that goes with their distance (``ordered_terms``).
+* Terms of one input in different places stay in order, where there are data, and of widths that go
+  with their distance (``ordered_terms``).
 * Terms of scattered rules, and terms that share their place, move by themselves: a location by its
   shift in units of the term's own width, at most one width beyond the data.
 
-Shape parameters are logarithms, and move as these.
+Shape parameters are logarithms, and their displacements add to these.
 """
 
 from dataclasses import dataclass
@@ -27,14 +27,14 @@ class Premise:
     antecedent: Antecedent
     lower: np.ndarray
     upper: np.ndarray
-    _unit: np.ndarray  # raw units per unit of displacement of what moves by itself
-    _tied: np.ndarray  # the displacement by which each parameter moves
+    _unit: np.ndarray  # change per unit of displacement, of parameters that move by themselves
+    _tied: np.ndarray  # index of the displacement that moves each parameter
     _ordered: tuple[OrderedTerms, ...]
-    is_unbounded: bool = False  # whether terms in order have no bounds
+    is_unbounded: bool = False  # whether ordered terms have no bounds
 
     @classmethod
     def of(cls, antecedent, minimum, maximum, is_unbounded=False):
-        """The premise of an antecedent; ``minimum`` and ``maximum`` of each input's data."""
+        """The premise of an antecedent; each input's data lie in ``minimum`` to ``maximum``."""
         raw = antecedent.parameters
         lower, upper = np.full(raw.size, -LOG_FACTOR), np.full(raw.size, LOG_FACTOR)
         unit, ordered = np.ones(raw.size), []
@@ -62,7 +62,7 @@ class Premise:
     def parameters(self, displacement):
         """The antecedent's parameters at a displacement."""
         if not np.any(displacement):
-            # What is not moved is as it was given, to the last bit.
+            # Parameters that do not move stay the same to the last bit.
             return self.antecedent.parameters
         raw = self.antecedent.parameters + self._unit * displacement[self._tied]
         for row in self._ordered:
@@ -77,7 +77,7 @@ class Premise:
         for row in self._ordered:
             gaps, x[row.locations] = row.of_locations(parameters[row.locations])
             x[row.widths] -= row.widening(gaps)
-        # What stands on an edge stays there whatever rounding says: it is what does not move.
+        # A displacement on an edge stays exactly there: solvers take it as fixed.
         for edge in (self.lower, self.upper):
             x = np.where(np.abs(x - edge) < NEXT_TO_NOTHING, edge, x)
         return x
@@ -103,20 +103,20 @@ def _bound_alone(terms, raw, low, high, unit, lower, upper):
     locations = [term.location for term in terms]
     places, widths = raw[locations], np.exp(raw[[term.widths[0] for term in terms]])
     unit[locations] = widths
-    # Up to one width beyond the data, or where the term stands already.
+    # Up to one width beyond the data, or as far as the term already is.
     lower[locations] = np.minimum((low - places) / widths - 1.0, 0.0)
     upper[locations] = np.maximum((high - places) / widths + 1.0, 0.0)
 
 
 def _bound_cuts(terms, raw, least_width, lower, upper):
-    """Set bounds of the widths of cuts, and of crisp cuts altogether."""
+    """Set bounds of the widths of cuts, and of all parameters of crisp cuts."""
     locations = np.array([term.location for term in terms])
     widths = np.array([term.widths[0] for term in terms])
-    # A cut may become sharper, and no softer: a rule is to be told from the next.
+    # A cut may become sharper but not softer, so that rules stay distinct.
     least = np.log(least_width) - raw[widths]
     lower[widths] = np.minimum(np.maximum(lower[widths], least), 0.0)
     upper[widths] = 0.0
-    # A crisp cut, at most half as wide as the least, stays; half-way is far from both.
+    # A crisp cut stays as it is. It is at most half as wide as the least; 0.75 lies in between.
     is_crisp = np.exp(raw[widths]) < 0.75 * least_width
     for still in (locations[is_crisp], widths[is_crisp]):
         lower[still] = upper[still] = 0.0

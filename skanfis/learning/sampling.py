@@ -1,13 +1,13 @@
-r"""A sample of many rows that can be drawn anywhere: the same whatever their order and their parts.
+r"""A sample of many rows that does not depend on their order, or on how they are split into parts.
 
-Every distinct row [z, y] draws a number from 0 to 1 out of its own values, and the rows of the
+Every distinct row [z, y] gets a number from 0 to 1 that its values determine. The rows with the
 smallest numbers are the sample, each with the weight of all its repeats (a bottom-k sketch: Cohen
-and Kaplan 2007). Samples of parts merge into the sample of the whole, exactly: a row that is among
-the k smallest of all is so in every part that has it. No row is drawn twice, and nothing is random:
-the same rows give the same sample, on one machine or on many, wherever their columns stand.
+and Kaplan 2007). Samples of parts merge exactly into the sample of the whole: a row among the k
+smallest of all is also so in every part that has it. No row is drawn twice, and nothing is random:
+the same rows give the same sample, on one machine or on many, in any order of columns.
 
-The number is the fractional part of a multiple of ``place_in_sample``, continuous in the row:
-rounding errors of the standardisation move it by about 1e-11, and with it no row past another.
+The number is the fractional part of a multiple of ``place_in_sample``, which is continuous in the
+row: rounding errors of the standardisation move it by about 1e-11, too little to reorder rows.
 """
 
 from dataclasses import replace
@@ -19,25 +19,25 @@ from .._validation import group_numbers
 from ..blocks import BLOCK_ROWS, row_blocks
 from .data import StandardisedData, fingerprint, place_in_sample
 
-# Beyond so many rows the premises are found on a sample of so many of them. At the minimum of a
-# sample of m rows, q parameters cost a part q / m of the error's square: for 18 of them and 20,000
-# rows a thousandth, before all rows have their say.
+# Beyond MANY_ROWS, the premises are first found on a sample of SAMPLE_ROWS. At the minimum of a
+# sample of m rows, q parameters add a part q / m to the squared error: a thousandth for 18 of them
+# and 20,000 rows. Then all rows have their say.
 MANY_ROWS, SAMPLE_ROWS = 100_000, 20_000
-# So many turns of the wheel per unit of the place; times a power of two nothing is rounded.
+# Factor of the place before its fractional part is taken. A power of two rounds nothing.
 _TURNS = 8192.0
-# More are drawn than are wanted, so that enough come: the standard deviation is below one percent.
+# More rows are drawn than wanted, so that enough come: the standard deviation is below one percent.
 _MARGIN = 1.25
 
 
 def is_many(rows):
-    """Whether the premises are found on a sample."""
+    """Whether the premises are first found on a sample."""
     return rows.n_rows > MANY_ROWS
 
 
 def with_sample(rows, most=None):
     """Return the same rows with a ``sample`` of them, on the same scales."""
     most = SAMPLE_ROWS if most is None else most
-    # The second limit is for rows that repeat each other, of which the first brings too few.
+    # The first limit brings too few distinct rows if many repeat; then all rows may be drawn.
     for limit in (_MARGIN * most / rows.n_rows, 1.0):
         drawn = rows.reduce(partial(_draw, most=most, limit=limit), partial(_smallest, most=most))
         if len(drawn[0]) == most:
@@ -49,9 +49,9 @@ def with_sample(rows, most=None):
 
 
 def _draw(rows, most, limit):
-    """Of some rows in memory, those of the smallest numbers, below ``limit``.
+    """The ``most`` rows with the smallest numbers below ``limit``, of rows in memory.
 
-    A list of raw X, y, weights, fingerprints and numbers, and groups where the rows have some.
+    A list of raw X, y, weights, fingerprints and numbers, and of groups if the rows have some.
     """
     found, n_found = [_of_block(rows, slice(0, 0), limit)], 0
     for part in row_blocks(rows.n_rows, BLOCK_ROWS):
@@ -63,7 +63,7 @@ def _draw(rows, most, limit):
 
 
 def _smallest(*parts, most):
-    """Each row of all parts once, with the weight of all; at most so many, by their numbers."""
+    """The distinct rows with the ``most`` smallest numbers, each with the weight of its repeats."""
     columns = [np.concatenate(of_all) for of_all in zip(*parts, strict=True)]
     order = np.argsort(columns[3], kind="stable")
     columns = [column[order] for column in columns]

@@ -1,6 +1,6 @@
-"""What a solver is, an object with settings of its own that finds the premises; what it returns.
+"""The interface of solvers, objects with settings of their own that find the premises.
 
-The simplest is here too: least squares alone, which leaves the premises where they start.
+The simplest solver is here too: least squares alone, which leaves the premises where they start.
 """
 
 from abc import ABC, abstractmethod
@@ -29,7 +29,7 @@ MESSAGES = {
 
 @dataclass(frozen=True, eq=False)
 class SolverResult:
-    """The best point found and how the solver came to it.
+    """The best point found, and how the solver came to it.
 
     Parameters
     ----------
@@ -42,8 +42,8 @@ class SolverResult:
     status : str
         Why it stopped, a key of ``skanfis.learning.MESSAGES``.
     gauss_newton : ndarray of shape (n_displacements, n_displacements) or None
-        Curvature of the cost by the premises' displacements, their pull left out, at most one
-        iteration before the end. None of solvers that never ask for it.
+        Curvature of the cost by the premises' displacements, without the stiffness, at most one
+        iteration before the end. None for solvers that do not compute it.
 
     Examples
     --------
@@ -73,18 +73,18 @@ class SolverResult:
 class Solver(BaseEstimator, ABC):
     """A solver; a subclass is one more value of ``ANFISRegressor(solver=...)``.
 
-    Parameters of ``__init__`` are assigned and no more, as in every scikit-learn estimator: they
-    are then found by ``get_params``, copied by ``clone`` and searched for as ``solver__name``.
+    As in every scikit-learn estimator, ``__init__`` only assigns its parameters. ``get_params``
+    finds them, ``clone`` copies them, and a search varies them as ``solver__name``.
 
     Attributes
     ----------
     moves_premises : bool
         Whether the premises move at all.
     goes_on_from_tuning : bool
-        Whether a run starts where the search for the weights of the penalty has moved the premises,
-        by variable projection, or afresh from where the partition has them.
+        Whether a run starts where the search for the penalty's weights has moved the premises, by
+        variable projection. Else it starts afresh from the partition.
     stiffness : "auto" or float
-        Weight of the pull of the premises to their start, where they move.
+        Weight of the pull of the premises to their start, if they move.
 
     Examples
     --------
@@ -128,11 +128,11 @@ class Solver(BaseEstimator, ABC):
         max_iter : int
             Most iterations.
         stiffness : float
-            The weight itself: what ``self.stiffness`` says, or what the evidence found for "auto".
+            The weight itself: that of ``self.stiffness``, or for "auto" the evidence's.
         start : ndarray of shape (premise.size,), optional
             Displacements to start from, inside the box; zero if not given.
         on_iteration : callable, optional
-            Called with (n_iter, evaluation) after every iteration; what is true ends the run.
+            Called with (n_iter, evaluation) after every iteration; a true result ends the run.
 
         Returns
         -------
@@ -141,7 +141,7 @@ class Solver(BaseEstimator, ABC):
 
 
 class LeastSquares(Solver):
-    """Least squares alone: the premises stay as they start, the consequents are solved for once.
+    """Least squares alone: the premises stay at their start, the consequents are solved for once.
 
     Examples
     --------

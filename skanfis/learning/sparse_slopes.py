@@ -1,13 +1,13 @@
-r"""Slopes that several rules have in common, and slopes of zero: where the evidence asks no more.
+r"""Slopes that several rules share, and slopes of zero, wherever the evidence asks for no more.
 
-The consequents of an output have the posterior N(m, V), and before the data N(0, V0). That some
-rules have one slope by an input says C u = 0, C contrasts of their slopes; with C one slope, it
-says that there is none. What it takes from the evidence (docs/mathematics.rst) is
+The consequents of an output have the prior N(0, V0) and the posterior N(m, V). Some rules share one
+slope by an input if C u = 0, where C are contrasts of their slopes; with C a single slope, that
+slope is zero. This hypothesis takes from the evidence (docs/mathematics.rst)
 
     (C m)' (C V C')^-1 C m + log |C V C'| - log |C V0 C'| ,
 
-so that one factorisation tells of every input and of every set of rules. What is found is
-conditioned on before the next is asked for; the inputs of which the rules say least come first.
+so that one factorisation serves every input and every set of rules. Inputs whose slopes are worth
+least come first; the posterior is conditioned on what is found before the next one is tested.
 """
 
 import numpy as np
@@ -15,15 +15,15 @@ from scipy import linalg
 
 from .evidence import WORTH, Laplace
 
-# What a slope that is kept must be worth, in -2 log p: anything, or as much as other numbers.
+# Worth, in -2 log p, from which on a slope is kept: anything above zero, or that of other numbers.
 SLOPE_WORTHS = (0.0, WORTH)
 
 
 def sparse_slopes(posterior: Laplace, coefficients, worth):
-    """Inputs, and the rules that have one slope by each; and those that have none.
+    """Inputs with the rules that share a slope, and with those that have none.
 
-    They are ``Penalty.common`` and ``Penalty.absent``; ``coefficients`` are the local ones,
-    (n_columns, n_outputs), and ``worth`` is what a slope that is kept must be worth.
+    They become ``Penalty.common`` and ``Penalty.absent``. ``coefficients`` are the local ones,
+    (n_columns, n_outputs). A slope is kept if it is worth at least ``worth``.
     """
     line, unit = posterior.line, posterior.noise_variance / posterior.n_rows
     identity, n_outputs = np.eye(len(coefficients)), coefficients.shape[1]
@@ -44,7 +44,7 @@ def sparse_slopes(posterior: Laplace, coefficients, worth):
         if rules.size > 1:
             state = _given(state, contrasts)
         else:
-            # Of two that differ neither is the farther one: the rule that can do without it best.
+            # Nothing is shared. The rule that can do best without its slope is the one to test.
             alone = [_loss(state, line.own_slopes(j, rule)) for rule in every[:, None]]
             rules = every[[int(np.argmin(alone))]]
         slope = line.own_slopes(j, rules[:1])
@@ -57,7 +57,7 @@ def sparse_slopes(posterior: Laplace, coefficients, worth):
 
 
 def _loss(state, contrasts):
-    """What it takes from the evidence that these are zero, in -2 log p."""
+    """What the evidence loses, in -2 log p, if these contrasts are zero."""
     mean, after, before = state
     root, of_prior = (linalg.cholesky(contrasts @ one @ contrasts.T) for one in (after, before))
     misfit = linalg.solve_triangular(root, contrasts @ mean, trans="T")
@@ -66,7 +66,7 @@ def _loss(state, contrasts):
 
 
 def _given(state, contrasts):
-    """Mean and covariances given that these are zero."""
+    """Mean and covariances, given that these contrasts are zero."""
     mean, *covariances = state
     gains = [
         linalg.solve(contrasts @ one @ contrasts.T, contrasts @ one, assume_a="pos").T

@@ -1,11 +1,11 @@
 r"""Variable projection: trust-region Gauss-Newton steps on the reduced problem, within a box.
 
-With g and H the gradient and Gauss-Newton matrix of the reduced cost by the premises' displacements
-x, a step s minimises g's + s'Hs / 2 over |s| <= radius, exactly, from the eigenvalues of H, among
-the displacements that are free to move; what would then leave the box is put on its edge. The
-radius follows Nocedal and Wright (2006, algorithm 4.1). docs/mathematics.rst has the whole of it,
-and why a little is added to the curvature: two fits to the same data in other units so take the
-same path (tests/test_invariance.py).
+Let g and H be the gradient and Gauss-Newton matrix of the reduced cost by the premises'
+displacements x. A step s of the displacements that are free to move minimises g's + s'Hs / 2 over
+|s| <= radius, exactly, from the eigenvalues of H. Displacements that would then leave the box end
+on its edge. The radius follows Nocedal and Wright (2006, algorithm 4.1). docs/mathematics.rst has
+the details. It says why a little is added to the curvature: so two fits to the same data in other
+units take the same path (tests/test_invariance.py).
 
 A rejected step costs one pass over the data, an accepted one two (see ``objective``).
 """
@@ -19,16 +19,16 @@ from .._sklearn import Interval, StrOptions
 from .ordered_terms import NEXT_TO_NOTHING
 from .solver import Solver, SolverResult
 
-# Displacements are in spacings and logarithms: steps beyond about a third of a spacing skip from
-# one arrangement of the terms to another, and the bad minima are met that way.
+# Displacements are in spacings and logarithms. Steps beyond about a third of a spacing skip from
+# one arrangement of the terms to another, and may end in bad minima.
 _FIRST_RADIUS = 0.3
-# However well the steps before have done: a whole spacing.
+# A whole spacing, however good the steps before were.
 _LARGEST_RADIUS = 1.0
-# Steps up to this much longer than the radius count as on its edge: the radius itself is a guess.
-# So do those that the box has shortened, down to the second part of it.
+# Steps up to the first factor longer than the radius are accepted: the radius itself is a guess.
+# Steps longer than the second part of it, as after the box has cut them, count as on its edge.
 _LENGTH_SLACK, _ON_EDGE = 1.01, 0.9
-# Added to every curvature: this part of the largest, far above what rounding leaves where there is
-# none and far below what data give; and this part of the cost, which a step of one must pay for.
+# Added to every curvature: this part of the largest, far above rounding errors and far below the
+# curvature that data give; and this part of the cost, which a step of length one has to earn.
 _SMALLEST_CURVATURE = 1e-6
 _COST_PART = 0.1
 # The cost is quadratic in the gradient: a gradient of tol^(1/2) would do; this is on the safe side.
@@ -43,14 +43,14 @@ def trust_region_step(gradient, hessian, radius, damping=0.0):
     size = np.linalg.norm(slope)
     if size == 0.0:
         return np.zeros_like(gradient)
-    # A step is no shorter than |g| over the largest curvature with what is added to it: less than
-    # this cannot keep it within the radius.
+    # A step is no shorter than |g| over the largest curvature, damping included. So at least this
+    # damping is needed to keep it within the radius.
     values = np.maximum(values, 0.0)
     values += damping + _SMALLEST_CURVATURE * max(values[-1], np.finfo(float).tiny)
     values += max(size / radius - values[-1], 0.0)
     step = slope / values
     while (length := np.linalg.norm(step)) > _LENGTH_SLACK * radius:
-        # Newton on 1 / |s(damping)| = 1 / radius, which converges from this side without overshoot.
+        # Newton on 1 / |s(damping)| = 1 / radius, which converges from below without overshoot.
         values += (length / radius - 1.0) * length**2 / np.sum(step**2 / values)
         step = slope / values
     return -vectors @ step
@@ -70,9 +70,9 @@ def varpro(
 ):
     """Minimise the reduced cost over the premises, as :meth:`Solver.solve` does.
 
-    An iteration is an accepted step. Expected and actual relative decrease of the cost are to stay
-    below ``tol`` for ``patience`` of them: two, where nothing is known of the start, one, where a
-    sample of the rows has settled. ``evaluation`` is that of the start, where it is known.
+    An iteration is an accepted step. The run ends when expected and actual relative decrease of the
+    cost stay below ``tol`` for ``patience`` iterations: two in general, one if a sample of the rows
+    has already settled. ``evaluation`` is that of the start, if it is known.
     """
     x = np.zeros(premise.size) if start is None else start
     current = problem.evaluate(premise.parameters(x)) if evaluation is None else evaluation
@@ -86,7 +86,7 @@ def varpro(
         gradient, curvature = premise.pull_back(x, raw.gradient, raw.gauss_newton)
         gradient = gradient + stiffness * x
         hessian = curvature + stiffness * np.eye(x.size)
-        # What a descent may move without leaving the box.
+        # Displacements that a step down the gradient leaves in the box.
         free = np.where(gradient > 0.0, x > premise.lower, x < premise.upper) | (gradient == 0.0)
         steepest = float(np.max(np.abs(gradient[free]), initial=0.0))
         if steepest <= GRADIENT_FACTOR * tol * cost:
@@ -95,7 +95,7 @@ def varpro(
         while True:
             step, own = np.zeros_like(x), hessian[np.ix_(free, free)]
             step[free] = trust_region_step(gradient[free], own, radius, _COST_PART * cost)
-            # The point and not the step is what meets an edge of the box to the last bit.
+            # Clip the point, not the step: it then lies on the edge of the box to the last bit.
             trial_x = np.clip(x + step, premise.lower, premise.upper)
             step = trial_x - x
             length = float(np.linalg.norm(step))
@@ -108,7 +108,7 @@ def varpro(
                 radius = 0.25 * min(length, radius)
             elif ratio > 0.75 and length > _ON_EDGE * radius:
                 radius = min(2.0 * radius, _LARGEST_RADIUS)
-            # What a smaller step promises is lost in the rounding of the cost.
+            # The decrease that a smaller step promises is lost in the rounding of the cost.
             if accepted or radius < NEXT_TO_NOTHING:
                 break
         if not accepted:
@@ -136,7 +136,7 @@ class VariableProjection(Solver):
     ----------
     tol : float, default=1e-3
         Stop when the relative decrease of the cost, expected and found, stays below ``tol`` twice,
-        or when the gradient says as much. Zero or positive.
+        or when the gradient implies that it would. Zero or positive.
     stiffness : "auto" or float, default="auto"
         Pull of the premises to their start, zero or positive: stiffness / 2 times the squared norm
         of their displacements (in spacings of terms and logarithms of widths) is added to the cost.
@@ -175,6 +175,6 @@ class VariableProjection(Solver):
         self.stiffness = stiffness
 
     def solve(self, problem, premise, **settings) -> SolverResult:
-        # What a sample of the rows has settled is settled at once.
+        # After a sample of the rows has settled, one settled step suffices.
         patience = 2 if problem.on_sample is None else 1
         return varpro(problem, premise, tol=self.tol, patience=patience, **settings)

@@ -36,7 +36,7 @@ __all__ = [
     "membership_families",
 ]
 
-# By the name that a user gives.
+# The families by the names that users give.
 MEMBERSHIPS: dict[str, type[Membership]] = {
     family.name: family
     for family in (
@@ -53,15 +53,15 @@ MEMBERSHIPS: dict[str, type[Membership]] = {
     )
 }
 
-# Above and below a cut, and products of two of these: what the paths of a tree say of an input.
+# Sides of a cut, above and below it, and products of two: conditions on the paths of a tree.
 SIDES = {side.side: side for side in (SigmoidRising, SigmoidFalling)}
 PRODUCTS = {
     product.signs: product for product in (SigmoidProduct, BothRising, BothFalling, FallingRising)
 }
-# All of them: those of a tree are not for whole inputs.
+# All families. Those of a tree are left out of MEMBERSHIPS, as they do not suit a whole input.
 FAMILIES = MEMBERSHIPS | {one.name: one for one in (*SIDES.values(), *PRODUCTS.values())}
 
-# What MATLAB's Fuzzy Logic Toolbox calls them: named in errors, and in the pages on files.
+# The names in MATLAB's Fuzzy Logic Toolbox, for error messages and the pages on files.
 NAMES_IN_MATLAB = {
     "gaussmf": "gaussian",
     "gbellmf": "bell",

@@ -1,12 +1,12 @@
-r"""What a family of membership functions is: how strongly a value belongs to a linguistic term.
+r"""The interface of families of membership functions: how strongly a value belongs to a term.
 
 Conventions
 -----------
 A family works on many terms at once. ``x`` has shape (n_terms, n_rows), or anything that
 broadcasts to it; ``theta`` has shape (n_parameters, n_terms), its rows in the order of
 :attr:`Membership.parameters`. Every parameter is unconstrained, so that no step of a solver can
-leave the set of valid memberships: what must be positive is held as its logarithm, and corners that
-must be in order are a point and the logarithms of distances.
+leave the set of valid memberships: a positive number is held as its logarithm, and corners in order
+as a point and the logarithms of distances.
 
 Each parameter has a *kind*, which says how it changes when the unit of the input changes,
 x -> offset + scale * x:
@@ -15,12 +15,12 @@ x -> offset + scale * x:
 * ``"log_width"``: the logarithm of a length on it, s -> s + log(scale);
 * ``"log_shape"``: the logarithm of a number without unit, unchanged.
 
-A family has one location, its first parameter, and at least one width. It is by the first of its
-widths that a shift of the term is measured where rules are scattered (see ``premise``).
+A family has one location, its first parameter, and at least one width. Terms of scattered rules
+shift in units of the first of their widths (see ``premise``).
 
-Everything is in log space, because normalised firing strengths are a softmax of log mu: it is then
-defined, and its sum is one, however far a row lies from every term. So log mu must be finite
-everywhere, also for families whose mu is zero beyond a foot (``profiles`` says how).
+Everything is in log space, because normalised firing strengths are a softmax of log mu. So they are
+defined, and sum to one, however far a row lies from every term. This needs a finite log mu
+everywhere, also for families whose mu is zero beyond a foot (see ``profiles``).
 """
 
 from abc import ABC, abstractmethod
@@ -47,18 +47,18 @@ class Membership(ABC):
 
     name: ClassVar[str]
     parameters: ClassVar[tuple[Parameter, ...]]
-    # mu(x), and its floor, in the parameters' names, as texts print it; empty is not printed.
+    # mu(x), and its floor, in the names of the parameters, for texts; not printed if empty.
     formula: ClassVar[str] = ""
-    # Whether its slope jumps anywhere.
+    # Whether the slope of mu jumps anywhere.
     has_corners: ClassVar[bool] = False
 
     @staticmethod
     @abstractmethod
     def value(x, theta) -> np.ndarray:
-        """mu(x) by the textbook formula: the oracle of the rest.
+        """mu(x) by the textbook formula, which tests compare the rest with.
 
-        For real and complex ``theta``, analytic in it between the corners that the formula has, so
-        that a derivative is the imaginary part at a complex step.
+        ``theta`` may be complex; between corners of the formula it is analytic in theta, so that
+        the imaginary part at a complex step gives a derivative.
         """
 
     @classmethod
@@ -76,20 +76,20 @@ class Membership(ABC):
     def start(center, spacing, overlap):
         """Theta of terms at ``center``, ``spacing`` apart; neighbours cross at mu = ``overlap``.
 
-        The arguments may have any one shape; theta has one axis more in front.
+        The arguments have one common shape; theta has one more axis in front.
         """
 
     @classmethod
     def from_center_and_width(cls, center, width):
         """Theta of terms at ``center`` as wide at half height as a Gaussian of deviation ``width``.
 
-        The two may have any one shape; theta has one axis more in front.
+        The arguments have one common shape; theta has one more axis in front.
         """
         return cls.start(center, 2.0 * _HALF_HEIGHT * width, 0.5)
 
     @classmethod
     def change_units(cls, theta, offset, scale):
-        """Theta after the inputs' change of unit x -> offset + scale * x (per term)."""
+        """Theta after a change of the inputs' units, x -> offset + scale * x, per term."""
         moved = np.array(theta, dtype=float)
         for row, parameter in zip(moved, cls.parameters, strict=True):
             if parameter.kind == "location":
@@ -100,7 +100,7 @@ class Membership(ABC):
 
     @classmethod
     def natural(cls, theta):
-        """Theta with every logarithm undone: what a person reads."""
+        """Theta with every logarithm undone, for people to read."""
         natural = np.array(theta, dtype=float)
         is_log = [parameter.kind != "location" for parameter in cls.parameters]
         natural[is_log] = np.exp(natural[is_log])

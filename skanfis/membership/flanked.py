@@ -1,14 +1,14 @@
-r"""Families with flanks: one on a plateau, which may be a point, and falling to its sides.
+r"""Families with flanks: mu is one on a plateau, which may be a point, and falls to its sides.
 
-A family is a geometry and a profile. With b and c the shoulders and the profile a function of the
-distance from the nearer shoulder in lengths of that side's flank,
+A family is a geometry and a profile. b and c are the shoulders, and the profile is a function of t,
+the distance from the nearer shoulder in lengths of the flank on that side,
 
     mu(x) = profile(t) ,    t = (b - x) / left   for x < b ,
                             t = 0                for b <= x <= c ,
                             t = (x - c) / right  for x > c .
 
-The feet are at a = b - left and d = c + right. Since center, plateau c - b and the logarithms of
-the lengths are what is learnt, a <= b <= c <= d holds for every value of the parameters.
+The feet are at a = b - left and d = c + right. The parameters are the center and the logarithms of
+the lengths, the plateau c - b among them. So a <= b <= c <= d holds for all of their values.
 """
 
 from typing import Any, ClassVar
@@ -28,10 +28,10 @@ _FIRST_PLATEAU = 0.25
 
 
 class _Flanked(Membership):
-    """A ``profile``, and a geometry.
+    """A ``profile`` and a geometry.
 
-    ``_distance(x, theta)`` gives t and details, from which ``_chain(slope, t, *details)`` gives the
-    derivatives by theta where that by t is ``slope``.
+    ``_distance(x, theta)`` gives t and details. From these and ``slope``, the derivative by t,
+    ``_chain(slope, t, *details)`` gives the derivatives by theta.
     """
 
     profile: ClassVar[Any]
@@ -131,7 +131,7 @@ class TwoSidedGaussian(_TwoSided):
 
 
 class _OneSided(_Flanked):
-    """One from the shoulder on to one side; theta = (shoulder, log width)."""
+    """Mu is one to one side of a shoulder and falls on the other; theta = (shoulder, log width)."""
 
     parameters = (Parameter("shoulder", "location"), Parameter("width", "log_width"))
     side: ClassVar[float]  # on which the flank lies: -1 left, 1 right
@@ -149,7 +149,7 @@ class _OneSided(_Flanked):
 
     @classmethod
     def start(cls, center, spacing, overlap):
-        # The flank crosses half-way to the neighbour on its side, as those of other families do.
+        # The flank reaches ``overlap`` half-way to its neighbour, as in other families.
         return np.stack([center, np.log(0.5 * spacing / cls.profile.reach(overlap))])
 
 

@@ -1,27 +1,27 @@
 r"""Profiles: how a flank falls from one, as a function of t, the distance in lengths of the flank.
 
-t is zero at the shoulder and below it. Straight and S-shaped flanks reach zero at their foot,
-t = 1, where log mu would be minus infinity: rows that lie on no term would have no strengths. The
-logarithm of these two therefore has a floor,
+t is zero on the plateau. Straight and S-shaped flanks reach zero at their foot, t = 1, where log mu
+would be minus infinity, and rows that lie on no term would have no strengths. The logarithm of
+these two therefore has a floor,
 
-    log mu = log[(1 - e) mu + e exp(-t^2 / 2)] ,    e = 1e-10 :
+    log mu = log[(1 - e) mu + e exp(-t^2 / 2)] ,    e = 1e-10 .
 
-a term of the family's shape, mixed with 1e-10 of a Gaussian of the same place and flank.
+It mixes the family's shape with 1e-10 of a Gaussian of the same place and flank.
 
-* Normalised strengths are the textbook's to 1e-10 over the largest membership at the row.
-* Where all are zero, they are those of the Gaussians: the nearest term in lengths of its flank
-  wins, and strengths change over such a length, not at once.
+* Normalised strengths equal the textbook's up to 1e-10 over the largest membership at the row.
+* Where all memberships are zero, strengths are those of the Gaussians: the nearest term, in lengths
+  of its flank, wins, and strengths change over such a length, not at once.
 * Mu stays one at the shoulder; log mu falls from there on without end, as smooth as the profile.
 
-e is so small because the least ridge, 1e-12, must outweigh its square: consequents cannot then be
-bent to make use of a rule where it fires by its floor alone.
+e is so small that the least ridge, 1e-12, outweighs its square. So consequents cannot be bent to
+make use of a rule where it fires by its floor alone.
 """
 
 from typing import Any, ClassVar
 
 import numpy as np
 
-# Part of a Gaussian that is mixed in, so that no logarithm is infinite beyond the foot.
+# Share of the Gaussian in the mixture, e.
 _FLOOR = 1e-10
 
 
@@ -47,7 +47,7 @@ class GaussianProfile:
 
 
 class _ProfileWithFoot:
-    """A ``value`` that is zero from t = 1 on, with ``slope``; in log space a floor under it."""
+    """A ``value`` with a ``slope`` that is zero from t = 1 on; its logarithm gets the floor."""
 
     value: ClassVar[Any]
     slope: ClassVar[Any]
@@ -58,7 +58,7 @@ class _ProfileWithFoot:
         gaussian, mu = np.exp(-0.5 * near**2), cls.value(t)
         mixture = mu + _FLOOR * (gaussian - mu)
         slope = (1.0 - _FLOOR) * cls.slope(t) - _FLOOR * near * gaussian
-        # Beyond the foot the mixture is e exp(-1/2) here, and -t^2 / 2 goes on outside.
+        # Beyond the foot, the mixture is that of t = 1, and the last term continues -t^2 / 2.
         log_mu = np.log(mixture) - 0.5 * (t - near) * (t + near)
         return log_mu, slope / mixture - (t - near)
 

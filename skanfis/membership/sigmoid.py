@@ -3,11 +3,11 @@ r"""Families of two sigmoids, s(u) = 1 / (1 + exp(-u)).
 One rises at center - width, the other falls at center + width, over lengths called flanks. With
 one length for both, u = (x - center) / flank and v = width / flank,
 
-    s(u + v) - s(u - v) = [1 - exp(-2 v)] s(u + v) s(v - u) :
+    s(u + v) - s(u - v) = [1 - exp(-2 v)] s(u + v) s(v - u) ,
 
-difference and product differ by a factor that does not depend on x. With two lengths the product
-stays a membership, which may be steeper on one side than on the other. The difference does not: it
-is negative in the tail on the less steep side. So the difference has one flank, the product two.
+so that difference and product differ by a factor that does not depend on x. With two lengths, the
+product is still a membership, steeper on one side than on the other. The difference is not: it is
+negative in the tail on the less steep side. So the difference has one flank, the product two.
 
 The top, at u = 0, is below one: tanh(v / 2) for the difference, s(v)^2 for the product.
 """
@@ -22,12 +22,12 @@ _WHERE = " where s(u) = 1 / (1 + exp(-u))"
 
 
 def _log_sigmoid(u):
-    # A quarter of the time of -logaddexp(0, -u).
+    # This takes a quarter of the time of -logaddexp(0, -u).
     return np.minimum(u, 0.0) - np.log1p(np.exp(-np.abs(u)))
 
 
 def _first_ratio(overlap):
-    """V at the start: about that of a bell of slope 2, and tops well above ``overlap``."""
+    """The v of the start: a shape like that of a bell of slope 2, a top well above ``overlap``."""
     return 3.0 + np.log((1.0 + overlap) / (1.0 - overlap))
 
 
@@ -47,12 +47,12 @@ class SigmoidDifference(Membership):
         center, log_width, log_flank = theta[:, :, None]
         u = (x - center) * np.exp(-log_flank)
         v = np.exp(log_width - log_flank)
-        # The difference of the two as it stands would lose its digits in the tails.
+        # The difference itself would lose its digits in the tails.
         return (1.0 - np.exp(-2.0 * v)) / ((1.0 + np.exp(-u - v)) * (1.0 + np.exp(u - v)))
 
     @staticmethod
     def log_value_and_gradient(x, theta):
-        # The product with equal flanks, but for a factor.
+        # The product with equal flanks, times a factor.
         log_mu, by = SigmoidProduct.log_value_and_gradient(x, theta[[0, 1, 2, 2]])
         v = np.exp(theta[1] - theta[2])[:, None]
         gain = -np.expm1(-2.0 * v)
@@ -78,7 +78,7 @@ class SigmoidProduct(Membership):
         Parameter("right", "log_width"),
     )
     formula = "s((x - center + width) / left) * s((center + width - x) / right)" + _WHERE
-    signs: ClassVar[tuple[float, float]] = (1.0, -1.0)  # whether each rises or falls, from the left
+    signs: ClassVar[tuple[float, float]] = (1.0, -1.0)  # 1 rising, -1 falling, from left to right
 
     @classmethod
     def value(cls, x, theta):
@@ -115,7 +115,7 @@ class SigmoidProduct(Membership):
 
 
 class BothRising(SigmoidProduct):
-    """Above two cuts, c - a and c + a, over lengths of their own."""
+    """Above both cuts, c - a and c + a, each over a length of its own."""
 
     name = "sigmoids_rising"
     formula = "s((x - center + width) / left) * s((x - center - width) / right)" + _WHERE
@@ -123,7 +123,7 @@ class BothRising(SigmoidProduct):
 
 
 class BothFalling(SigmoidProduct):
-    """Below two cuts."""
+    """Below both cuts."""
 
     name = "sigmoids_falling"
     formula = "s((center - width - x) / left) * s((center + width - x) / right)" + _WHERE
@@ -131,7 +131,7 @@ class BothFalling(SigmoidProduct):
 
 
 class FallingRising(SigmoidProduct):
-    """Below the lesser of two cuts and above the greater one: true nowhere but for their widths."""
+    """Below the lower cut and above the upper one: not zero only because cuts have widths."""
 
     name = "sigmoids_apart"
     formula = "s((center - width - x) / left) * s((x - center - width) / right)" + _WHERE
@@ -142,7 +142,7 @@ class _Side(Membership):
     """One side of a cut."""
 
     parameters = (Parameter("center", "location"), Parameter("width", "log_width"))
-    side: ClassVar[float]  # on which it is true: 1 right, -1 left
+    side: ClassVar[float]  # where mu is near one: 1 right of the cut, -1 left
 
     @classmethod
     def value(cls, x, theta):
@@ -166,7 +166,7 @@ class _Side(Membership):
 
     @classmethod
     def start(cls, center, spacing, overlap):
-        # Over half a spacing log odds fall by three, to those of the overlap.
+        # Over half a spacing, the log odds fall by three to those of the overlap.
         width, odds = spacing / 6.0, 3.0 + np.log(overlap / (1.0 - overlap))
         return np.stack([center - cls.side * odds * width, np.log(width)])
 

@@ -1,4 +1,4 @@
-"""Structure: what decides on the rule base that training starts from, and on nothing else."""
+"""Structure search: it decides on the rule base that training starts from, and on nothing else."""
 
 from .request import StructureRequest, report_constant
 from .sample import representative_rows, weighted_quantile

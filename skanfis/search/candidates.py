@@ -1,10 +1,10 @@
 """What a search may try: kinds of rule bases, each a sequence from small to large.
 
-All kinds begin with one rule, a line. A grid grows by one term at a time, beside those that have
-learnt already (``trials`` knows on which input); an input that asks for no terms gets none. Of a
-tree, one leaf at a time is split, or a quarter of many (``splits``). Scattered rules are half as
-many again each time, on clusters of k-means where the residual of the others is, with terms on the
-inputs that smaller ones have asked for (``conditions`` says which of these may go).
+All kinds begin with one rule, a line. A grid gains one term at a time and keeps the terms that have
+learnt; ``trials`` chooses the input, and an input that needs no terms gets none. A tree splits one
+leaf at a time, or a quarter of its leaves once it has many (``splits``). Scattered rules grow by
+half: the new ones stand at k-means clusters of the rows with large residuals, with terms on all
+inputs that the search has found so far (``conditions`` removes those that are not needed).
 """
 
 import warnings
@@ -25,19 +25,19 @@ from .tuning import Tuned
 
 KINDS = ("grid", "tree", "scattered")
 _MORE_CLUSTERS = 1.5
-_RANK = 1e-10  # of squares: what is less beside the largest is rounding
+_RANK = 1e-10  # squares below this part of the largest are rounding errors
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """A structure to be tried: a grid of terms per input, a tree, or so many scattered rules."""
+    """A structure to be tried: a grid, a tree, or a number of scattered rules."""
 
-    counts: tuple[int, ...]
-    n_clusters: int = 0  # of scattered rules
-    inputs: tuple[int, ...] = ()  # on which these have terms
-    splits: tuple[Split, ...] = ()  # of a tree, one after the other
-    slope_worth: float | None = None  # of slopes that are kept (``sparse_slopes``); None: all are
-    has_all_slopes: bool = False  # also where rows are few (``lasso``)
+    counts: tuple[int, ...]  # terms per input of a grid, 1 for none
+    n_clusters: int = 0  # number of scattered rules
+    inputs: tuple[int, ...] = ()  # on which scattered rules have terms
+    splits: tuple[Split, ...] = ()  # of a tree, in order
+    slope_worth: float | None = None  # least worth of a slope (``sparse_slopes``); None keeps all
+    has_all_slopes: bool = False  # slopes by all inputs even if rows are few (``lasso``)
 
     @property
     def kind(self):
@@ -48,7 +48,7 @@ class Candidate:
 
     @property
     def is_grid(self):
-        """Whether rules are all combinations of terms; one rule is."""
+        """Whether rules are all combinations of terms; one rule counts as a grid."""
         return not (self.n_clusters or self.splits)
 
     @property
@@ -64,7 +64,7 @@ class Candidate:
         return self.n_clusters * len(self.inputs) or len(self.splits)
 
     def describe(self):
-        """In words."""
+        """The structure in words."""
         words = f"{self.kind} of {self.n_rules} rules"
         if self.n_clusters:
             words = f"{self.n_rules} scattered rules"
@@ -82,11 +82,11 @@ class Candidate:
         return replace(self, counts=tuple(counts))
 
     def with_more_splits(self, splits):
-        """The tree with these leaves split too; the last come first, which moves no other leaf."""
+        """The tree with these leaves split too, last leaf first: so no split renumbers another."""
         return replace(self, splits=(*self.splits, *sorted(splits, key=lambda one: -one.leaf)))
 
     def with_more_clusters(self, inputs):
-        """Half as many scattered rules again, two at least, with terms on these inputs too."""
+        """Half as many scattered rules again, two at least, with terms also on these inputs."""
         number = max(2, int(np.ceil(_MORE_CLUSTERS * self.n_clusters)))
         inputs = tuple(sorted({*self.inputs, *inputs}))
         return replace(self, n_clusters=number, inputs=inputs)
@@ -95,8 +95,8 @@ class Candidate:
 def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = None):
     """The antecedent that a candidate begins with.
 
-    All go on from what a ``smaller`` candidate has learnt, but for the first scattered rules, which
-    begin at clusters of the ``rows``.
+    It goes on from what a ``smaller`` candidate has learnt. Only the first scattered rules begin
+    afresh, at clusters of the ``rows``.
     """
     known: Any = None if smaller is None else smaller.evaluation.antecedent
     if candidate.splits:
@@ -111,11 +111,11 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
     clusterer = KMeans(candidate.n_clusters - n_known, n_init=1, random_state=seed)
 
     def label(table, weight):
-        # It begins at some of the rows: the order of columns is to have no part in which, and
-        # rounding none in what is near to two centres.
+        # k-means starts at randomly drawn rows. Sorting makes the draw independent of the order of
+        # columns; rounding keeps rounding errors from deciding between two equally near centres.
         table = np.round(table, DIGITS)
         order = np.lexsort(np.sort(table, axis=1).T)
-        # That there are fewer clusters shows.
+        # k-means warns of fewer clusters than asked for; ``Trials.larger`` checks their number.
         with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
             labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
         return labels[np.argsort(order)]
@@ -127,11 +127,11 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
 
 
 class TermScores:
-    """Score tests: how much of the residual of a model further terms on an input would explain.
+    """Score tests (Rao 1948): how much of a model's residual new terms on an input would explain.
 
-    The statistic of the splits of a tree (``splits``), with the shares nu_k of so many evenly
-    spaced Gaussian terms, less their means, in the place of h - p; z_i are those of the inputs
-    ``crossed``. What was projected out before does not count (Rao 1948).
+    The statistic is that of ``splits``, with h - p replaced by the shares nu_k of Gaussian terms,
+    placed by ``Spacing``, less their means. The z_i are the inputs ``crossed``. What
+    ``project_out`` has taken out does not count.
     """
 
     def __init__(self, tuned: Tuned, spacing: Spacing, crossed):
@@ -142,7 +142,7 @@ class TermScores:
         self.residual, self.known = root * (tuned.residual - mean), np.empty((rows.n_rows, 0))
 
     def project_out(self, j, count):
-        """Take out what so many terms on an input explain, of the residual and of functions."""
+        """Project what ``count`` terms on an input explain out of the residual and later scores."""
         pairs = self._shares(j, count)[:, :, None] * self.basis[:, None]
         functions = pairs.reshape(len(self.X), -1)
         least = _RANK * np.sum(functions**2, axis=0).max()
@@ -153,7 +153,7 @@ class TermScores:
         self.residual -= added @ (added.T @ self.residual)
 
     def of(self, pairs):
-        """Of every pair of an input and a number of terms, in deviations from chance."""
+        """Scores of pairs of an input and a number of terms, in deviations from chance."""
         scores, squared, n_known = [], self.basis**2, self.known.shape[1]
         products = (self.residual[:, :, None] * self.basis[:, None]).reshape(len(self.X), -1)
         part_free = max(1.0 - n_known / len(self.X), np.finfo(float).eps)
@@ -172,7 +172,7 @@ class TermScores:
         return np.array(scores)
 
     def _shares(self, j, count):
-        """Of Gaussian terms, neighbours of which cross at ``OVERLAP``, less their means."""
+        """Centred shares of Gaussian terms whose neighbours cross at membership ``OVERLAP``."""
         centers = self.spacing.centers(j, count)
         distance = np.mean(np.diff(centers)) or 1.0
         log_truth = 4.0 * np.log(OVERLAP) * ((self.X[:, [j]] - centers) / distance) ** 2

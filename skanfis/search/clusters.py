@@ -1,9 +1,9 @@
-r"""Scattered rules from clusters: one rule where the data gather.
+r"""Scattered rules from clusters: one rule for each.
 
-Clusters are sought in standardised inputs and target together. A rule's terms stand at the mean of
-its cluster; their widths are the cluster's standard deviations times sqrt(d), for the distance from
-the centre grows as sqrt(d) in d inputs and rules would otherwise hardly overlap. Rules are added to
-those that have learnt where these leave most.
+The first clusters are sought in standardised inputs and target together. A rule's terms stand at
+the mean of its cluster. Their widths are the cluster's standard deviations times sqrt(d): in d
+inputs, distances from the centre grow as sqrt(d), and rules would otherwise hardly overlap. Further
+rules are added where those that have learnt leave the largest residuals.
 """
 
 import numpy as np
@@ -18,9 +18,9 @@ from .sample import counting_weight, representative_rows
 def clustered_antecedent(families, rows: StandardisedData, label, premise_inputs):
     """A rule for every cluster that ``label(table, weight)`` finds in [z, y].
 
-    z are the ``premise_inputs`` alone, in whose terms the rules are; ``families`` has one entry per
-    input of the rows. ``label`` returns one integer per row; negative ones (noise) belong to no
-    rule. A single cluster is a single rule without terms: a linear model.
+    z are the ``premise_inputs`` alone, on which the rules have terms; ``families`` has one entry
+    per input of the rows. ``label`` returns one integer per row; a row with a negative one (noise)
+    belongs to no rule. A single cluster gives a single rule without terms: a linear model.
     """
     table, weight, _ = representative_rows(rows)
     n_inputs = rows.X.shape[1]
@@ -40,10 +40,10 @@ def clustered_antecedent(families, rows: StandardisedData, label, premise_inputs
 
 
 def grown_antecedent(families, tuned, label, premise_inputs):
-    """What a smaller rule base has learnt, and a rule for every cluster of what it has not.
+    """The rules of a smaller rule base, and a new rule for every cluster of its residual.
 
-    Clusters are sought on the ``premise_inputs``, rows being weighted by their squared residuals.
-    On inputs that none of its rules has a term on yet, these stand where the rules fire.
+    Clusters are sought on the ``premise_inputs``, with rows weighted by their squared residuals. If
+    an input has no terms yet, the old rules get terms on it where they fire.
     """
     rows, smaller = tuned.problem.rows, tuned.evaluation.antecedent
     weight = counting_weight(rows)
@@ -62,7 +62,7 @@ def grown_antecedent(families, tuned, label, premise_inputs):
 
 
 def _terms_at(families, inputs, table, masses):
-    """Of each input the parameters of a term for every row of ``masses`` (n_rules, n_rows)."""
+    """By input, the parameters of a term per rule; ``masses`` (n_rules, n_rows) weight the rows."""
     found, total = {}, masses.sum(axis=1)
     for j in inputs:
         centers = masses @ table[:, j] / total

@@ -1,8 +1,8 @@
-r"""Conditions that scattered rules can do without, as far as the evidence tells.
+r"""Conditions that scattered rules can do without, by the evidence.
 
-Without a condition of truth mu, rule r is 1 / mu times as strong before strengths are normalised:
-with q = 1 / mu - 1 the prediction changes by delta = q w_r (f_r - y) / (1 + q w_r). The cost of
-that, once the consequents are solved for anew, is what the condition is worth.
+Without a condition of membership mu, rule r is 1 / mu times as strong before strengths w_r are
+normalised. With q = 1 / mu - 1, output f_r and prediction y, the prediction changes by
+delta = q w_r (f_r - y) / (1 + q w_r). The condition is worth the evidence that this change loses.
 """
 
 from dataclasses import replace
@@ -15,15 +15,15 @@ from ..learning.objective import SeparableProblem
 from ..learning.premise import Premise
 from .tuning import Tuned, turned
 
-# 1 / mu stays finite.
+# Largest -log mu, so that 1 / mu stays finite.
 _FARTHEST = 300.0
 
 
 def with_fewer_conditions(tuned: Tuned) -> Tuned:
-    """The same without conditions that are worth less than a number, and trained on.
+    """The same without conditions that are worth less than a number to read, and trained on.
 
-    Half of them go at a time, as what is left is worth more then; every rule keeps one. If the
-    evidence is less in the end, all stay.
+    Only half of them go at a time: those that are left are worth more then. Every rule keeps one.
+    If the evidence is lower in the end, all conditions stay.
     """
     rows, inputs, found = tuned.problem.rows, tuned.problem.consequent_inputs, tuned
     while True:
@@ -39,7 +39,7 @@ def with_fewer_conditions(tuned: Tuned) -> Tuned:
         problem = SeparableProblem(rows, start, tuned.penalty, consequent_inputs=inputs)
         premise = Premise.of(start, *rows.inputs.box)
         there = Tuned.start(problem, premise, tuned.free, premise.displacement(now.parameters))
-        # The noise is that which all conditions have left.
+        # Keep the noise variance of the model with all conditions.
         found = replace(there, posterior=tuned.posterior)
     if found is tuned:
         return tuned
@@ -48,7 +48,7 @@ def with_fewer_conditions(tuned: Tuned) -> Tuned:
 
 
 def term_losses(tuned):
-    """What the evidence loses where each term is left out, in -2 log p, (n_terms,)."""
+    """By how much -2 log p rises if a term is left out, for each term, (n_terms,)."""
     problem, solved, rows = tuned.problem, tuned.solved, tuned.problem.rows
     antecedent, weight = solved.antecedent, rows.weights / rows.total_weight
     has_term = antecedent.rule_terms >= 0

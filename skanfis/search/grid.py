@@ -4,10 +4,10 @@ Terms stand at even steps of
 
     G(x) = sum of (gap between neighbouring values)^(2/3) up to x ,
 
-which is where the optimal quantiser has its points (Panter and Dite 1951): evenly spaced terms
-waste themselves on a range that is mostly empty. The outer terms stand at quantiles and not at the
-outermost row. No two neighbouring gaps differ by more than a factor: a term has one width, which
-has to reach into both.
+which is where the optimal quantiser has its points (Panter and Dite 1951). Evenly spaced terms
+would be wasted on a range that is mostly empty. The outer terms stand at quantiles, not at the
+outermost rows. Neighbouring gaps differ by a limited factor, because a term has one width, which
+has to reach into both gaps.
 """
 
 import numpy as np
@@ -16,21 +16,22 @@ from ..antecedent import GridAntecedent
 from ..learning.data import StandardisedData
 from .sample import DIGITS, representative_rows, weighted_quantile
 
-# Neighbouring terms cross at this membership at the start. From the customary 0.5, Jang's sinc gets
-# stuck; elsewhere it makes little difference.
+# Neighbouring terms cross at this membership at the start. With the customary 0.5, training on
+# Jang's sinc gets stuck; elsewhere it makes little difference.
 OVERLAP = 0.6
-# The outermost terms stand where this part of the rows lies beyond: a stray row is none to name a
-# term after, and a term at the very edge would be half empty.
+# This part of the rows lies beyond the outermost terms: a term should not stand at an outlier, and
+# a term at the very edge would be half empty.
 _EDGE = 0.02
 # Neighbouring gaps differ by this factor at most; ``ordered_terms`` allows them a little more.
 _RATIO = 1.8
-# Of a term's distances to its neighbours the nearer one counts by this part of its logarithm: where
-# an overlap of 0.6 at even distances stands between the least and the most of ``ordered_terms``.
+# A term's width goes with a geometric mean of its distances to both neighbours; this is the weight
+# of the nearer. At even distances, an overlap of 0.6 lies at this part of the way, in logarithms,
+# from the least to the largest width of ``ordered_terms``.
 _NEARER = 1.0 / 6.0
 
 
 class Spacing:
-    """Where the terms of every input stand, whatever their number."""
+    """Where the terms of an input stand, for any number of them."""
 
     def __init__(self, rows: StandardisedData):
         table, weight, _ = representative_rows(rows)
@@ -39,7 +40,7 @@ class Spacing:
         self._columns = [_levels(column, weight, own) for column, own in columns]
 
     def n_values(self, j):
-        """How many values an input has, between its outer quantiles: no use in more terms."""
+        """Distinct values of an input between its outer quantiles: more terms are of no use."""
         return self._columns[j][0].size
 
     def centers(self, j, count):
@@ -47,7 +48,7 @@ class Spacing:
         values, levels = self._columns[j]
         places = np.interp(np.linspace(0.0, 1.0, count), levels, values)
         gaps, k = np.diff(places), np.arange(count - 1)
-        # Next to any other gap, however far: a factor for every step on the way.
+        # Widen small gaps: a gap k steps from another is at least its size / _RATIO^k.
         gaps = np.max(gaps / _RATIO ** np.abs(k[:, None] - k), axis=1, initial=0.0)
         if not gaps.any():
             return places
@@ -57,11 +58,11 @@ class Spacing:
 
 def _levels(column, weight, ends):
     """Values between the outer quantiles, and G there, from 0 to 1; ``ends`` are of all rows."""
-    column = np.round(column, DIGITS)  # what differs by rounding alone is one value
+    column = np.round(column, DIGITS)  # values that differ by rounding alone are one
     low, high = (weighted_quantile(column, weight, _EDGE, side) for side in (1, -1))
     values = np.unique(column)
     if values.size == 1:
-        # What varies on few rows may not do so on those of a sample.
+        # An input that varies on few rows may be constant in the sample.
         values = np.unique(ends)
     if low == high:
         low, high = values[[0, -1]]
@@ -71,11 +72,11 @@ def _levels(column, weight, ends):
 
 
 def grid_antecedent(families, counts, spacing: Spacing, known=None):
-    """Terms by a :class:`Spacing`, of which neighbours cross at about membership ``OVERLAP``.
+    """Terms by a :class:`Spacing`; neighbours cross at about membership ``OVERLAP``.
 
-    Inputs with a count of one have no terms: they take part in the consequents alone. ``families``
-    and ``counts`` have one entry per input. Where a ``known`` rule base has as many terms on an
-    input, it has these; where it has terms, one more is asked for at most.
+    ``families`` and ``counts`` have one entry per input. Inputs with a count of one have no terms:
+    they take part in the consequents alone. If a ``known`` rule base has as many terms on an input,
+    these are taken. If it has one term less, the new term goes into the widest gap.
     """
     terms = {} if known is None else terms_by_input(known)
     inputs = [j for j, count in enumerate(counts) if count > 1]
@@ -95,13 +96,13 @@ def grid_antecedent(families, counts, spacing: Spacing, known=None):
 
 
 def _distance(gaps):
-    """Of every term to its neighbours: mostly to the farther one, so that no gap is left open."""
+    """Each term's distance to its neighbours: mostly the farther one, so that no gap stays open."""
     sides = np.append(gaps, gaps[-1]), np.append(gaps[0], gaps)
     return np.maximum(*sides) ** (1.0 - _NEARER) * np.minimum(*sides) ** _NEARER
 
 
 def terms_by_input(antecedent):
-    """Parameters of the terms of every input that has some."""
+    """Parameters of the terms, by input; inputs without terms are left out."""
     return {
         int(j): group.theta[:, group.inputs == j]
         for group in antecedent.groups

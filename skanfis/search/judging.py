@@ -1,13 +1,13 @@
-r"""What is expected of new rows: the error on rows that had no part in anything.
+r"""The error expected on new rows: that on rows which neither growth nor training have seen.
 
-A sequence of candidates is grown anew without some of the rows, and its members are judged on
-these, size by size. With few rows in five folds; with many, half of the rows are enough to grow and
-half to judge, once. Rows that come in groups, runs of an instrument say, are left out in whole
-groups, and of few groups each alone: the more runs are left out together, the wider the gaps. Rows
-beyond the range that a fold grows on do not judge, unless most are.
+A sequence of candidates is grown again without some of the rows, and judged on these, size by size.
+With few rows this is done in five folds. With many, half of the rows grow the candidates and half
+judge them, once. Rows that come in groups, say runs of an instrument, are left out in whole groups.
+If there are few groups, each is left out alone: leaving out several runs together would tear wider
+gaps. Rows beyond the range that a fold grows on do not judge, unless most are beyond it.
 
-Rows are dealt in the order of their target, so that neither the order in which they come nor that
-of the columns makes a difference; what is equal in all columns is one row with a weight.
+Rows are dealt in a random order that depends on their values alone: neither the order of rows nor
+that of columns makes a difference. Equal rows are one row with a weight.
 """
 
 import numpy as np
@@ -16,16 +16,16 @@ from sklearn.model_selection import GroupKFold
 from ..learning.data import StandardisedData
 from .sample import DIGITS, search_sample
 
-# Of few groups each is left out alone; of more, and of rows, a fifth at a time.
+# Number of folds; up to this number of groups, each group is a fold instead.
 FOLDS, FEW_GROUPS = 5, 10
-# Rows, and groups, that are enough to judge on.
+# Rows, and groups, that are enough to judge on: further folds are not needed.
 ENOUGH, ENOUGH_GROUPS = 200, 40
 
 
 def dealt_rows(rows: StandardisedData) -> StandardisedData:
     """Distinct rows in an order that is random and depends on their values alone."""
     sample = search_sample(rows)
-    # What is constant, and in which column a value stands, are no part of it.
+    # Constant columns, and the order of columns, do not count.
     parts = sample.X[:, ~rows.inputs.is_constant], sample.y
     values = np.hstack([np.sort(part, axis=1)[:, ::-1] for part in parts])
     order = np.lexsort(np.round(values, DIGITS).T)
@@ -33,12 +33,12 @@ def dealt_rows(rows: StandardisedData) -> StandardisedData:
 
 
 def n_groups(rows: StandardisedData) -> int:
-    """Number of groups; one where none are given, for a single group says as little."""
+    """Number of groups; one if none are given."""
     return 1 if rows.groups is None else np.unique(rows.groups).size
 
 
 def folds(rows: StandardisedData):
-    """Positions of the other rows and of its own, of every fold; whole groups, if there are any."""
+    """For every fold, positions of the rows outside and inside it; a fold holds whole groups."""
     found = n_groups(rows)
     if found > 1:
         n_folds = found if found <= FEW_GROUPS else FOLDS
@@ -48,9 +48,9 @@ def folds(rows: StandardisedData):
 
 
 def judging_folds(rows: StandardisedData):
-    """Positions to grow on and positions to judge on, of every fold that is needed.
+    """For every fold that is needed, positions to grow on and positions to judge on.
 
-    Then whether there are so many rows that half of them, the fold, are enough to grow on for good.
+    Also whether there are enough rows to grow the final candidates on half of them, the only fold.
     """
     n_rows, every = rows.n_rows, np.arange(rows.n_rows)
     if n_rows == 1:
@@ -68,9 +68,9 @@ def judging_folds(rows: StandardisedData):
 
 
 def _in_range(X, grow, judge):
-    """Those of the rows to judge that are within the range of the others.
+    """The rows to judge that lie within the range of the rows to grow on.
 
-    The model of all rows has seen their like; to this fold they are beyond the data.
+    The others are beyond the data for this fold, but not for the final model, which sees all rows.
     """
     X = np.round(X, DIGITS)
     low, high = X[grow].min(axis=0), X[grow].max(axis=0)

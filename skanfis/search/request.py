@@ -25,21 +25,21 @@ from .start import Start, imported_antecedent, tuned_start
 from .trials import Plan
 from .tuning import scaled
 
-# Columns that a warning names; it counts the others.
+# A warning names this many columns at most, and counts the others.
 _MOST_NAMED = 10
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StructureRequest(Plan):
-    """What was asked for."""
+    """What the user asked for."""
 
     n_mfs: Any
-    partition: Any  # as given; a model in place of the estimator that holds it
+    partition: Any  # as given; for an estimator, the model that it holds
     names: Sequence[str]  # of the inputs
-    simplicity: float  # what may be given up for a model that costs less to read
+    simplicity: float  # tolerated relative rise of the error, for a model that is easier to read
 
     def start(self, rows: StandardisedData) -> Start:
-        """Where to start from, for these rows."""
+        """The start that the request leads to on these rows."""
         self._check_combination()
         check_columns_fit(len(self.names))
         if isinstance(self.n_mfs, str) and isinstance(self.partition, str):
@@ -47,31 +47,31 @@ class StructureRequest(Plan):
         if isinstance(self.partition, TSKModel):
             model = self.partition
             antecedent = imported_antecedent(model, rows)
-            # Names that say where terms stand are made anew when these have moved.
+            # Default names tell where terms stand: they are made again after training moves terms.
             names = () if model.term_names == default_term_names(model) else model.term_names
             return replace(self._tuned(antecedent, rows), term_names=names)
         return self._tuned(self._antecedent(rows), rows)
 
     def _kinds(self):
-        """What is searched. A tree has sides of cuts, and no terms of a family that was given."""
+        """The kinds that are searched; a tree only for Gaussian terms: its cuts have no family."""
         if self.partition != "auto":
             return (self.partition,)
         left_out = ["tree"] if any(family is not Gaussian for family in self.families) else []
         if self.held is not None:
-            # Scattered rules fire all over the range: to be in order everywhere binds them hard.
+            # Scattered rules fire all over the range, so a monotonic constraint binds them hard.
             left_out.append("scattered")
         return [kind for kind in KINDS if kind not in left_out]
 
     def _plan(self, rows):
-        """The same for these rows: what never changes has no terms."""
+        """The same for these rows: constant inputs get no terms."""
         varying = self.premise_inputs[~rows.inputs.is_constant[self.premise_inputs]]
-        # Premises that stay pay nothing for moving.
+        # Fixed premises need no stiffness.
         weights = self.weights if self.premises_move else {"stiffness": 0.0} | self.weights
         n_all = rows.effective_weight
         return replace(self, premise_inputs=varying, weights=weights, n_all=n_all)
 
     def _antecedent(self, rows):
-        """The rules that were asked for."""
+        """The rule base that the user asked for: of a clusterer, or a grid."""
         if isinstance(self.n_mfs, str):
             label = partial(self._label, rows.y.shape[1])
             return clustered_antecedent(self.families, rows, label, self.premise_inputs)
@@ -85,7 +85,7 @@ class StructureRequest(Plan):
         return tuned_start(antecedent, rows, self._plan(rows), self.simplicity)
 
     def for_all(self, start: Start, sample: StandardisedData, rows: StandardisedData) -> Start:
-        """A start found on a sample, with the weights that were not given those of all rows."""
+        """A start found on a sample, with its free weights scaled to the number of all rows."""
         ratio = sample.effective_weight / rows.effective_weight
         penalty = scaled(start.penalty, self.free, ratio, start.agreement_is_raised)
         return replace(start, penalty=penalty)
@@ -101,7 +101,7 @@ class StructureRequest(Plan):
         )
 
     def _check_number(self, n_rules):
-        """Raise ValueError where more rules are given than may be."""
+        """Raise ValueError where the given rules are more than ``max_rules``."""
         if self.max_rules is not None and n_rules > self.max_rules:
             is_word = isinstance(self.n_mfs, str)
             given = f"partition={self.partition!r}" if is_word else f"n_mfs={self.n_mfs!r}"
@@ -111,7 +111,7 @@ class StructureRequest(Plan):
             )
 
     def _label(self, n_outputs, table, weight):
-        """Labels by the clusterer; the clusters are counted before any rule is made of them."""
+        """Labels by the clusterer; too many clusters raise before any rule is made of them."""
         labels = np.asarray(_labels(self.partition, self.seed, table, weight))
         n_rules = np.unique(labels[labels >= 0]).size
         self._check_number(n_rules)
@@ -146,7 +146,7 @@ class StructureRequest(Plan):
         return counts
 
     def _warn_if_underdetermined(self, n_rules, rows):
-        """Warn where there is less than one distinct row per consequent parameter."""
+        """Warn where distinct rows are fewer than consequent parameters."""
         n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant[self.consequent_inputs])
         n_columns = n_rules * n_basis
         n_distinct = np.unique(rows.numbers(lambda Z, _: fingerprint(Z))).size
@@ -161,7 +161,7 @@ class StructureRequest(Plan):
 
 
 def _labels(clusterer, seed, table, weight):
-    """Labels of weighted rows by a scikit-learn clusterer, with the seed where it has none."""
+    """Labels of weighted rows by a scikit-learn clusterer, seeded unless it has a seed."""
     seeded = clone(clusterer)
     for key, value in clusterer.get_params().items():
         if value is None and key.endswith("random_state"):

@@ -1,8 +1,8 @@
 r"""How many rows there are, and which of them a search looks at.
 
-*Weight* is what a criterion counts (``StandardisedData.effective_weight``). *Distinct inputs* bound
-what can be told apart: calibration tables repeat their inputs, and each repeat is information on
-the noise alone.
+A criterion counts rows by *weight* (``StandardisedData.effective_weight``). *Distinct inputs* limit
+what can be learnt of the curve: calibration tables repeat their inputs, and a repeat tells of the
+noise alone.
 """
 
 import numpy as np
@@ -10,21 +10,21 @@ import numpy as np
 from ..learning.data import Scale, StandardisedData, fingerprint, place_in_sample
 from ..learning.sampling import SAMPLE_ROWS
 
-# Of standardised rows, digits that rounding leaves alone where units change.
+# Decimals of standardised values that stay the same, whatever the units of the columns.
 DIGITS = 9
 
 
 def counting_weight(rows: StandardisedData):
-    """The weights of a search sample in rows, of which the sum is the effective weight."""
+    """The weights of a search sample, scaled so that they sum to the effective number of rows."""
     return rows.weights * (rows.effective_weight / rows.total_weight)
 
 
 def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
-    """Distinct rows [z, y] of each group, standardised, their weights and places; in lexical order.
+    """Distinct standardised rows [z, y] of each group, in lexical order; weights and positions.
 
-    Beyond ``most`` rows, those at evenly spaced quantiles of the weight, by ``place_in_sample``.
-    Neither the order of the rows, nor that of the columns, nor whether a row is repeated or
-    weighted makes any difference.
+    Beyond ``most`` rows, a sample: rows are ordered by ``place_in_sample``, and those at evenly
+    spaced quantiles of the weight are taken. The order of rows or columns makes no difference, nor
+    whether a row is repeated or weighted.
     """
     groups = np.zeros(rows.n_rows) if rows.groups is None else rows.groups
     numbers = rows.numbers(lambda *block: fingerprint(np.round(np.concatenate(block), DIGITS)))
@@ -43,31 +43,31 @@ def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
 
 
 def to_six_digits(value):
-    """Of columns that are alike, rounding is not to choose."""
+    """Round to six digits, so that rounding errors do not choose between columns that are alike."""
     return float(f"{value:.6g}")
 
 
 def in_deviations(squares, n_free):
-    """A sum of squares by how many deviations it exceeds so many of standard normal numbers'."""
+    """Deviations by which a sum of squares exceeds that of ``n_free`` standard normal numbers."""
     return (squares - n_free) / np.sqrt(2.0 * n_free)
 
 
 def weighted_quantile(column, weight, part, side):
-    """The first value, from below (side 1) or above (-1), with a part of the weight up to it."""
+    """The first value, from below (side 1) or above (-1), with ``part`` of the weight up to it."""
     order = np.argsort(column, kind="stable")[::side]
     upto = np.cumsum(weight[order])
-    # From either side alike, whatever the last bit of a sum.
+    # A little less than the part: rounding of the sum must not make the two sides differ.
     return column[order[np.searchsorted(upto, (1.0 - 1e-9) * part * upto[-1])]]
 
 
 def unit_scale(values):
-    """The scale of values that are standardised already."""
+    """The scale of values that are already standardised: no shift, unit one."""
     n_columns = values.shape[1]
     return Scale(np.zeros(n_columns), np.ones(n_columns), values.min(axis=0), values.max(axis=0))
 
 
 def search_sample(rows: StandardisedData, most=SAMPLE_ROWS):
-    """At most so many representative rows, already in the standardised units of all rows."""
+    """At most ``most`` representative rows, in the standardised units of all rows."""
     table, weight, indices = representative_rows(rows, most)
     n_inputs = rows.X.shape[1]
     X, y = table[:, :n_inputs], table[:, n_inputs:]

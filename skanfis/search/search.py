@@ -1,9 +1,9 @@
-"""Structure by itself: kinds of candidates, one expected error, one choice.
+"""The automatic search: kinds of candidates, one expected error, one choice.
 
-Every kind is a sequence from small to large (``candidates``). It is grown on all rows and, beside,
-anew without those that judge it (``judging``), all in step, while the error expected of new rows
-falls, and a step further. Where rows are few for so many inputs, there are two of every kind: with
-slopes by the inputs of the lasso (``lasso``), and by all.
+Every kind is a sequence from small to large (``candidates``). It is grown on all rows and, step by
+step beside it, for every fold without the rows that judge there (``judging``). It ends when two
+steps no longer lower the error expected on new rows. If rows are few for the number of inputs,
+every kind is grown twice: with slopes by the inputs of the lasso (``lasso``), and by all.
 """
 
 from collections.abc import Sequence
@@ -20,10 +20,10 @@ from .start import Start, described, started
 from .trials import Plan, Trials
 from .tuning import cost_of
 
-# Steps beyond the best of a kind, after which its sequence ends: a product of two inputs needs
-# terms on both before any helps.
+# A sequence ends this many steps beyond its best candidate. One would be too few: a product of two
+# inputs needs terms on both before either helps.
 _FURTHER = 2
-# With rows for fewer rules than so many, slopes by the inputs of the lasso are tried too.
+# If rows do not suffice for this many rules, slopes by the inputs of the lasso are tried too.
 _FEW_RULES = 3
 
 
@@ -43,20 +43,20 @@ class StructureSearch:
         self.judged: list[Judged] = []
 
     def run(self, kinds: Sequence[str]) -> Start:
-        """A start from the structure that is chosen."""
+        """A start from the chosen structure."""
         first, n_slopes = self.trials.one_rule, self.trials.slope_inputs.size
         is_part = n_slopes < self.plan.consequent_inputs.size
         for has_all in (False, True) if is_part else (False,):
             candidate = replace(first, has_all_slopes=has_all)
             one_rule = self._judge(candidate, [candidate] * len(self.folds))
-            # Where the lasso keeps no input, its one rule is the mean, which is compared alone.
+            # If the lasso keeps no input, its one rule is the mean: that is judged, but not grown.
             if n_slopes or has_all or not is_part:
                 for kind in kinds:
                     self._grow(kind, one_rule)
         best = best_of(self.judged, self.judges)
         variance = self._variance()
         most = tolerated(best.squared_error, variance, self.simplicity)
-        # Only there: with two looks at every size, chance would have two.
+        # Only within the tolerance: a second look at every size would give chance a second try.
         for one in within(self.judged, best, most):
             self._judge_sparse_slopes(one, variance)
         found = chosen(within(self.judged, best, most), variance)
@@ -70,8 +70,8 @@ class StructureSearch:
     def _grow(self, kind, one_rule):
         """Judge a kind from small to large, some steps further than the best.
 
-        Where outputs must rise or fall, a kind goes on while its rules gain either as they must or
-        as they would: what is held in order may gain a step later.
+        With monotonic constraints, a kind also goes on while its unconstrained rules gain: the
+        constrained ones may gain only a step later.
         """
         now, best, best_free, n_further = one_rule, one_rule, one_rule, 0
         while n_further < _FURTHER:
@@ -90,7 +90,7 @@ class StructureSearch:
                 best_free, n_further = now, 0
 
     def _judge_sparse_slopes(self, one, variance):
-        """Judge a candidate with fewer slopes; it counts if there are, and its rules hold alone."""
+        """Judge a candidate with fewer slopes; keep it if cheaper and its rules hold alone."""
         most = max((1.0 + self.simplicity) ** 2 * one.squared_error_of_rules, variance)
         soonest = one
         for worth in SLOPE_WORTHS:
@@ -103,7 +103,7 @@ class StructureSearch:
                 self.judged.remove(simpler)
 
     def _judge(self, candidate, in_folds):
-        """What a candidate leaves of the rows that its like in the folds have not seen."""
+        """Judge a candidate: in every fold, its like predicts the rows that were left out."""
         free_squares = squares = self._squares(in_folds, None)
         if self.plan.held is not None:
             squares = self._squares(in_folds, self.plan.held)
@@ -114,7 +114,7 @@ class StructureSearch:
         return judged
 
     def _squares(self, in_folds, held):
-        """Squared errors on the rows that judge, as of a training on all rows."""
+        """Squared errors on the rows that judge, scaled to those of a training on all rows."""
         squares = [
             fold.squared_errors(fold.tuned(one), rows, held)
             for fold, one, rows in zip(self.folds, in_folds, self.left_out, strict=True)
@@ -123,7 +123,7 @@ class StructureSearch:
         return factor * np.concatenate(squares)
 
     def _variance(self):
-        """Squared error of the mean on the rows that judge."""
+        """Squared error of the mean of the training rows on the rows that judge."""
         squares = []
         for fold, rows in zip(self.folds, self.left_out, strict=True):
             mean = np.average(fold.rows.y, axis=0, weights=fold.rows.sample_weight)
@@ -131,7 +131,7 @@ class StructureSearch:
         return self.judges.mean(np.concatenate(squares))
 
     def _report(self, found, variance):
-        """Every candidate in words and numbers, best first; ``variance`` is the mean's error."""
+        """Every candidate in words and numbers, best first; ``variance`` is as in ``described``."""
         return [
             described(
                 self.trials.tuned(one.candidate),

@@ -7,29 +7,29 @@ from typing import Any
 import numpy as np
 from sklearn import get_config
 
-# Of one term, whatever its family: what a limit on memory reckons with.
+# Parameters of one term, at most: the limit on memory assumes this for every family.
 _MOST_PREMISE_PARAMETERS = 4
 # Square matrices over all consequent parameters that exist at one time: the Gram matrix, its
 # moments, local form and factor; the disagreement, the parts of the penalty, and copies of these.
 _SQUARES = 14
-# Of the products of all pairs of columns, rows that are worked out at one time.
+# Rows for which the products of all pairs of columns are held at one time.
 _ROWS_OF_PAIRS = 128
 
 
 def n_bytes(n_rules: int, n_terms: int, n_basis: int, n_outputs: int) -> int:
-    """What training so many rules takes, of ``n_terms`` of all inputs."""
+    """Bytes that training takes; ``n_terms`` is the number of terms on all inputs together."""
     n_columns, n_premise = n_rules * n_basis, _MOST_PREMISE_PARAMETERS * n_terms
     squares = _SQUARES * (n_columns + n_outputs) ** 2 + 4 * n_premise**2
     return 8 * (squares + n_terms * n_rules + 2 * n_premise * n_columns)
 
 
 def _fits(needed):
-    """Whether training may take so many bytes."""
+    """Whether training may take ``needed`` bytes."""
     return needed <= get_config()["working_memory"] * 2**20
 
 
 def _check(needed, what, advice):
-    """Raise ValueError where ``what`` needs more bytes than may be."""
+    """Raise ValueError where ``what`` needs more bytes than the limit allows."""
     if not _fits(needed):
         raise ValueError(
             f"{what} would take {_count(1 + needed // 2**20)} MiB, and the limit is "
@@ -39,7 +39,7 @@ def _check(needed, what, advice):
 
 
 def check_columns_fit(n_inputs):
-    """Raise ValueError where products of all pairs of columns need more than may be."""
+    """Raise ValueError where products of all pairs of columns need too much memory."""
     _check(
         8 * _ROWS_OF_PAIRS * (1 + n_inputs) ** 2 // 2,
         f"X has {n_inputs:,} columns: products of all their pairs",
@@ -49,14 +49,14 @@ def check_columns_fit(n_inputs):
 
 
 def check_rules_fit(what, n_rules, n_terms, n_basis, n_outputs, advice):
-    """Raise ValueError where training what ``what`` makes needs more memory than may be."""
+    """Raise ValueError where training the rules that ``what`` names needs too much memory."""
     made = f"{_count(n_rules)} rules with {_count(n_rules * n_basis)} consequent parameters"
     needed = n_bytes(n_rules, n_terms, n_basis, n_outputs)
     _check(needed, f"{what} {made}; training them", advice)
 
 
 def check_grid_fits(n_mfs, counts, n_basis, n_outputs):
-    """The same of a grid of ``counts``, which ``n_mfs`` has asked for."""
+    """The same check for a grid of ``counts``, which ``n_mfs`` has asked for."""
     n_inputs = len(counts)
     of_two = n_bytes(2**n_inputs, 2 * n_inputs, 1 + n_inputs, 1)
     hint = f"n_mfs=2 makes {2**n_inputs:,} rules; " if _fits(of_two) else ""
@@ -73,7 +73,7 @@ def check_grid_fits(n_mfs, counts, n_basis, n_outputs):
 
 
 def _count(number):
-    """A count for people; beyond any hope, its order of magnitude suffices."""
+    """A count in words; of a hopelessly large one, the order of magnitude suffices."""
     return f"{number:,}" if number < 10**15 else "more than 10^15"
 
 

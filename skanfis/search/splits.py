@@ -1,13 +1,13 @@
 r"""Which leaves of a tree to split, on which inputs and where: what a model's residual asks for.
 
-Of a leaf and an input, cuts are looked at between values next to the leaf's quantiles. With p the
-part of the leaf below the cut, h one there and zero above, s w the weight of the rows times the
-strength of the leaf, b the functions 1 and z_i about the centre of the leaf, and r the residual,
-the statistic is the sum over b of
+For a leaf and an input, cuts are tried between values next to the leaf's quantiles. Let s w be a
+row's weight times the strength of the leaf, h one below the cut and zero above, p the mean of h
+over the leaf, b a basis function, 1 or z_i less its mean in the leaf, and r the residual over its
+deviation. The statistic of a cut is the sum over all b and outputs of
 
     (sum s w (h - p) b r)^2 / sum s w (h - p)^2 b^2 ,
 
-in deviations from what noise alone would give it.
+in deviations from its mean under noise alone.
 """
 
 from dataclasses import dataclass
@@ -18,11 +18,11 @@ from ..antecedent.tree import CRISP, LEAST_WIDTH
 from .sample import DIGITS, counting_weight, in_deviations, to_six_digits
 from .tuning import Tuned
 
-# Cuts that are looked at are next to so many quantiles of a leaf.
+# Cuts are tried at the quantiles that divide a leaf into this many parts.
 _QUANTILES = 8
-# A new cut is as wide as this part of the leaf's deviation.
+# Width of a new cut, in standard deviations of the input in the leaf.
 _WIDTH = 0.5
-# Beyond so many inputs, slopes are not looked at: the work goes with their square.
+# Beyond this many inputs, z_i are left out of b: the work grows with their square.
 _MOST_CROSSED = 200
 
 
@@ -37,9 +37,9 @@ class Split:
 
 
 def best_splits(tuned: Tuned, inputs, crossed):
-    """Those that the residual asks for most, best first; one of every leaf and input.
+    """The best split of every leaf and input, those that the residual asks for most first.
 
-    z_i are those of the inputs ``crossed``.
+    The z_i are the inputs ``crossed``.
     """
     rows, residual = tuned.problem.rows, tuned.residual
     weight = counting_weight(rows)
@@ -61,15 +61,15 @@ def best_splits(tuned: Tuned, inputs, crossed):
                 log_width = np.log(_width(columns[j], own, cuts[best]))
                 split = Split(leaf, int(j), float(cuts[best]), float(log_width))
                 found.append((statistics[best], split))
-    # Two inputs may part the rows alike: not the order of columns decides then.
+    # Two inputs may split the rows alike. Then the cut decides, not the order of columns.
     found.sort(key=lambda pair: (-to_six_digits(pair[0]), pair[1].cut))
     return [split for _, split in found]
 
 
 def together(splits, n_more, n_tried):
-    """Each of the next best splits, beside so many more of other leaves that are taken as they are.
+    """Lists of splits to be tried: each has the ``n_more`` best, and one of the next best.
 
-    ``splits`` are in order; where leaves are too few, one of them is left to be tried on.
+    ``splits`` are in order. No list splits a leaf twice, and one leaf is left for the last split.
     """
     best: dict[int, Split] = {}
     for split in splits:
@@ -80,13 +80,13 @@ def together(splits, n_more, n_tried):
 
 
 def _scored(column, order, sums, n_basis, variance):
-    """Cuts of an input, and the statistic at each; ``sums`` are what is summed over rows.
+    """Cuts of an input, and the statistic at each; ``sums`` are the terms of the sums over rows.
 
-    ``order`` is that of the rows by the input.
+    ``order`` sorts the rows by the input.
     """
     cuts = _cuts(column[order], sums[order, 0])
     is_below = (column < cuts[:, None]).astype(float)
-    # Each summed by itself: of what is next to nothing, a difference would leave rounding errors.
+    # Both sides are summed: if one is nearly empty, a difference would leave rounding errors alone.
     below, above = is_below @ sums, (1.0 - is_below) @ sums
     whole = below[:, :1] + above[:, :1]
     part, rest = below[:, :1] / whole, above[:, :1] / whole
@@ -99,7 +99,7 @@ def _scored(column, order, sums, n_basis, variance):
 
 
 def _cuts(values, own):
-    """Half-way between values next to the quantiles of a leaf, the values being in order."""
+    """Cuts half-way between values next to the quantiles of a leaf; ``values`` are sorted."""
     upto = np.cumsum(own)
     wanted = np.arange(1, _QUANTILES) / _QUANTILES * upto[-1]
     places = np.minimum(np.searchsorted(upto, wanted), values.size - 1)
@@ -109,7 +109,7 @@ def _cuts(values, own):
 
 
 def _width(column, own, cut):
-    """At the start; of an input that has two values, next to nothing."""
+    """Width of a new cut; on an input with two values, next to nothing."""
     below, above = column[column < cut], column[column > cut]
     if np.ptp(below) == 0.0 and np.ptp(above) == 0.0:
         return min(0.5 * (above[0] - below[0]) / CRISP, 0.5 * LEAST_WIDTH)

@@ -1,8 +1,8 @@
 """Where training starts: rules in standardised units, weights of the penalty, premises so far.
 
-Rules come from a search, or are given: by terms per input, by a clusterer, by a model. Of rules
-that are given the weights are found in the same way, on a sample. Terms in order may leave their
-bounds, as in classic ANFIS, where that leaves less than nine tenths of the expected squared error.
+Rules come from a search, or are given: by terms per input, by a clusterer, by a model. For given
+rules, the weights are found in the same way, on a sample. Their ordered terms may leave the bounds,
+as in classic ANFIS, if this lowers the expected squared error by more than a tenth.
 """
 
 from dataclasses import dataclass, field
@@ -34,35 +34,36 @@ from .tuning import (
     with_sparse_slopes,
 )
 
-# What terms without bounds must leave of the expected squared error: nearer, chance decides.
+# Terms without bounds must lower the expected squared error below this part of it: a smaller gain
+# may be chance.
 _LESS_ERROR = 0.9
-# Of displacements, in spacings of terms: rounding errors stay below.
+# Decimals of displacements, in spacings of terms. Rounding errors are smaller.
 _DIGITS = 5
 
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """A rule base in standardised units, what its parameters pay, and where they stand already."""
+    """A rule base in standardised units, the penalty's weights, and the premises so far."""
 
     antecedent: Antecedent
     penalty: Penalty
-    consequent_inputs: np.ndarray  # that the consequents are linear in
+    consequent_inputs: np.ndarray  # inputs that the consequents are linear in
     displacement: np.ndarray | None = None  # of the premises; None is zero
     is_unbounded: bool = False  # whether terms have no bounds (see ``premise``)
-    # Agreement was raised as far as the tolerance allows: it does not fall as the rows rise.
+    # Whether agreement was raised as far as the tolerance allows: then more rows do not lower it.
     agreement_is_raised: bool = False
-    candidates: list[dict] = field(default_factory=list)  # what was compared, best first
-    term_names: tuple[str, ...] = ()  # where they are given with the rules
+    candidates: list[dict] = field(default_factory=list)  # all that were compared, best first
+    term_names: tuple[str, ...] = ()  # if given with the rules
 
 
 def started(tuned: Tuned, plan: Plan, room: float, candidates) -> Start:
-    """A start from a training, with the agreement that the tolerance leaves room for.
+    """A start from a training, with as much agreement as the tolerance leaves room for.
 
-    ``room`` is the factor by which the squared error may still rise. Its root is used up: on new
-    rows agreement costs more than the rows that are trained on let see.
+    ``room`` is the factor by which the squared error may still rise. Only its root is used up:
+    agreement costs more on new rows than the training rows show.
     """
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
-    # Where premises stay, none make room for more.
+    # Premises make room for agreement by following it. Fixed ones cannot, so none is added.
     room = np.sqrt(room) if plan.premises_move else 1.0
     agreeing = with_most_agreement(tuned, room)
     is_raised = agreeing is not tuned
@@ -70,7 +71,7 @@ def started(tuned: Tuned, plan: Plan, room: float, candidates) -> Start:
         problem.antecedent,
         scaled(agreeing.penalty, plan.free, n_rows / plan.n_all, is_raised),
         problem.consequent_inputs,
-        # Training goes on from there, without the digits that rounding errors reach.
+        # Training goes on from there; rounding errors are cut off.
         np.round(agreeing.displacement, _DIGITS),
         tuned.premise.is_unbounded,
         is_raised,
@@ -79,14 +80,14 @@ def started(tuned: Tuned, plan: Plan, room: float, candidates) -> Start:
 
 
 def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simplicity) -> Start:
-    """A start from rules that are given, with the weights that are not given found on the rows."""
+    """A start from given rules, with the free weights found on a sample of the rows."""
     sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     low, high = sample.inputs.box
     premise = Premise.of(antecedent, low, high)
     turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)
     best = tune(problem, premise, free, turns, steps)
-    # Any freedom passes through hardly more rows than there are coefficients.
+    # With hardly more rows than coefficients, unbounded terms could pass through every row.
     has_rows = sample.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
     if is_bounded and has_rows and problem.n_columns <= MANY_COLUMNS:
@@ -129,7 +130,7 @@ def described(tuned: Tuned, structure, squared_error, variance, is_chosen=True):
 
 
 def check_inputs(model: TSKModel, names, what):
-    """ValueError where a model is of other inputs than the data; names count if both have them."""
+    """Raise ValueError where a model has other inputs than the data; default names match any."""
     if model.n_inputs != len(names):
         raise ValueError(
             f"{what} has rules on {model.n_inputs} inputs ({', '.join(model.input_names)}), but X "
@@ -144,11 +145,11 @@ def check_inputs(model: TSKModel, names, what):
 
 
 def imported_antecedent(model: TSKModel, rows: StandardisedData) -> Antecedent:
-    """The rule base of a model in the rows' standardised units, ready to be moved."""
+    """The rule base of a model in the rows' standardised units, ready for training."""
     scale = rows.inputs
     antecedent = model.antecedent.change_units(-scale.offset / scale.scale, 1.0 / scale.scale)
     if isinstance(antecedent, GridAntecedent):
-        # Terms of a grid move with their distances, which must be positive.
+        # Terms of a grid move by their distances, which must be positive; a table's move singly.
         places = np.split(antecedent.term_places, np.cumsum(antecedent.counts)[:-1])
         if any((np.diff(own) <= 0.0).any() for own in places):
             return RuleTableAntecedent(antecedent.groups, antecedent.rule_terms)

@@ -1,9 +1,9 @@
-r"""Short trainings of candidates on one set of rows: all that a search learns from, or a part.
+r"""Short trainings of candidates on one set of rows: all rows of a search, or those of a fold.
 
-The weights of every candidate's penalty are found by the evidence (``tuning``). Its error on rows
-left out one by one follows from the training on all of them; that ranks the next steps of one kind,
-and no more: it has seen the rows by which the step was chosen. What is expected of new rows is the
-error on rows that had no part in anything (``judging``).
+The evidence finds the weights of every candidate's penalty (``tuning``). The leave-one-out error
+follows from the training on all rows. It only ranks the possible next steps of one kind, because
+the rows that it leaves out took part in choosing the step. The error expected on new rows is that
+on rows which no step has seen (``judging``).
 """
 
 from collections.abc import Callable, Sequence
@@ -30,24 +30,25 @@ from .sample import DIGITS, to_six_digits, unit_scale
 from .splits import best_splits, together
 from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
-# Rows that a candidate sees for each of its parameters; and at least: those of which one fold is
-# enough to judge.
+# Rows that a candidate sees for each of its parameters; and the fewest that it sees in any case,
+# one fold of which is enough to judge.
 _ROWS_PER_PARAMETER, FEWEST_SEEN = 40, FOLDS * ENOUGH
-# Steps of the weights that tell what a candidate promises; training goes on from there.
+# Steps of the weights before a candidate is ranked; training goes on from there.
 _STEPS_TO_PROMISE = 1
-# Operations of a pass over all the rows that a candidate needs. More rows never mean fewer rules.
+# Most operations of a pass over the rows that a candidate needs. The limit does not depend on the
+# number of rows, so that more rows never mean fewer rules.
 _MOST_OPERATIONS = 4e9
-# Inputs, or splits, of the largest scores (``TermScores``, ``splits``) that are tried.
+# This many inputs, or splits, with the largest scores (``TermScores``, ``splits``) are tried.
 _TRIED = 4
-# Leaves of a tree for each that is split at once.
+# A tree splits one leaf for every four that it has, and at least one, at a time.
 _LEAVES_OF_ONE_SPLIT = 4
 # A score beyond this is more than chance.
 _SIGNIFICANT = 2.0
-# Terms on an input for its score: two do not see an odd curve, as of a saturation, beside a line.
+# Terms on an input for its score. Two would miss an odd curve, as of a saturation, beside a line.
 _TERMS = 3
 
-# From a training, which is free, to the premises and consequents that keep what is known of the
-# outputs: these are judged.
+# Trainings are unconstrained. This maps one to the premises and consequents that satisfy the
+# monotonic constraints; these are judged.
 Held = Callable[[SeparableProblem, Evaluation], tuple[Antecedent, np.ndarray]]
 
 
@@ -56,19 +57,19 @@ class Plan:
     """What all trainings of a search have in common."""
 
     families: Sequence[type[Membership]]  # one per input
-    order: int
-    premise_inputs: np.ndarray  # those that may have terms
+    order: int  # of the consequents
+    premise_inputs: np.ndarray  # that may have terms
     consequent_inputs: np.ndarray
-    weights: dict[str, Any]  # of the penalty, those that are given, of ``evidence.FREE``
-    seed: int  # of clusterings that have none of their own
+    weights: dict[str, Any]  # given weights of the penalty, by their names in ``evidence.FREE``
+    seed: int  # for clusterers without one
     max_rules: int | None
-    premises_move: bool  # whether what is trained afterwards moves them
+    premises_move: bool  # whether the final training moves the premises
     held: Held | None = None
     n_all: float = np.nan  # rows by weight that the final model will be trained on
 
     @property
     def free(self):
-        """Weights that the evidence finds."""
+        """Names of the weights that the evidence finds."""
         return [key for key in FREE if key not in self.weights]
 
     @property
@@ -78,9 +79,9 @@ class Plan:
 
 
 class Trials:
-    """Trainings of candidates on one set of rows, in an order that says nothing of them.
+    """Trainings of candidates on one set of rows, which come in random order.
 
-    ``is_wide``: whether the rows are few for so many inputs (``lasso``).
+    ``is_wide``: whether the rows are few for the number of inputs (``lasso``).
     """
 
     def __init__(self, rows: StandardisedData, plan: Plan, is_wide=False):
@@ -89,21 +90,22 @@ class Trials:
         if is_wide:
             self.slope_inputs = lasso_inputs(rows, plan.consequent_inputs)
         self.spacing = Spacing(rows)
-        # A bell around one of two values is a little true of the other; a tree's cut is not.
+        # Bells overlap: on an input with two values, only the cut of a tree tells the values apart.
         self.bell_inputs = [int(j) for j in plan.premise_inputs if self.spacing.n_values(j) > 2]
         self.one_rule = Candidate((1,) * rows.X.shape[1])
-        self._begun: dict[Candidate, Tuned] = {}  # trained as far as tells what they promise
-        self._found: dict[Candidate, Tuned] = {}  # and to the end
+        self._begun: dict[Candidate, Tuned] = {}  # trained as far as needed to rank them
+        self._found: dict[Candidate, Tuned] = {}  # trained to the end
 
     def _significant_inputs(self, candidate, scores):
-        """Inputs for terms of scattered rules: of scores beyond chance; for the first rules one.
+        """Inputs with scores beyond chance, for terms of scattered rules; the first rules get one.
 
-        The input of the largest score first; what its terms explain counts for no other.
+        Forward selection: what the input with the largest score explains is projected out before
+        the others are scored again.
         """
         left = self.bell_inputs
         found: list[int] = []
         work = len(scores.basis) * (_TERMS * scores.basis.shape[1]) ** 2
-        # Where to project is too much work, all whose scores are beyond chance have terms.
+        # If the projection is too much work, all inputs with scores beyond chance are taken.
         while left and work * len(found) * len(left) <= _MOST_OPERATIONS:
             if found:
                 scores.project_out(found[-1], _TERMS)
@@ -116,26 +118,26 @@ class Trials:
         return [*found, *left]
 
     def rows_for(self, candidate):
-        """As many as its parameters need, by powers of two: most candidates see the same."""
+        """As many rows as a candidate needs, in powers of two, so that most see the same rows."""
         needed = max(_ROWS_PER_PARAMETER * self.n_parameters(candidate), FEWEST_SEEN)
         n_rows = FEWEST_SEEN * 2 ** int(np.ceil(np.log2(needed / FEWEST_SEEN)))
         part = self.rows.part(slice(n_rows))
         return replace(part, inputs=unit_scale(part.X))
 
     def larger(self, kind, candidate) -> Candidate | None:
-        """The next of a kind: of those that are tried, the one that promises most; or None."""
+        """The next candidate of a kind: the one tried with the least expected error, or None."""
         smaller = self.tuned(candidate)
         begun = {}
         for one in filter(self._is_small, self._tried(kind, candidate, smaller)):
             problem = self._problem(one, smaller)
-            # Of rows that are alike but for a few, there are fewer clusters than were asked for.
+            # If few rows differ, k-means finds fewer clusters than asked for: leave these out.
             if problem.antecedent.n_rules == one.n_rules:
                 begun[one] = self._train(problem, turns=0)
         self._begun |= begun
         return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
 
     def _tried(self, kind, candidate, tuned):
-        """What may be the next of a kind, by the residual of a candidate, ``tuned``."""
+        """The next candidates of a kind to try, chosen by the residual of the trained one."""
         crossed = self._crossed(candidate)
         if kind == "tree":
             splits = best_splits(tuned, self.plan.premise_inputs, crossed)
@@ -155,13 +157,13 @@ class Trials:
         return self.plan.consequent_inputs if candidate.has_all_slopes else self.slope_inputs
 
     def _crossed(self, candidate):
-        """Inputs that terms and cuts may act together with: those of the lasso, or all."""
+        """Inputs by which new terms and cuts may change the slopes: those of the lasso, or all."""
         is_all = candidate.has_all_slopes or self.slope_inputs is self.plan.consequent_inputs
         varying = np.ptp(np.round(self.rows.X, DIGITS), axis=0) > 0.0
         return np.flatnonzero(varying) if is_all else self.slope_inputs
 
     def n_parameters(self, candidate):
-        """Of consequents and, two each, of terms."""
+        """Number of parameters: those of the consequents, and two for each term."""
         n_basis = 1 + self._inputs_with_slopes(candidate).size
         return candidate.n_rules * n_basis + 2 * candidate.n_terms
 
@@ -174,7 +176,7 @@ class Trials:
         return _ROWS_PER_PARAMETER * n**3 <= _MOST_OPERATIONS
 
     def tuned(self, candidate: Candidate) -> Tuned:
-        """The end of a candidate's training."""
+        """The candidate, trained to the end."""
         if candidate not in self._found:
             if candidate.slope_worth is not None:
                 trained = self.tuned(replace(candidate, slope_worth=None))
@@ -182,30 +184,30 @@ class Trials:
             elif candidate.n_rules == 1:
                 found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
-                # Terms of a grid serve many rules. After more turns they tell apart runs that lie
-                # far from one another, and the rules are wild between these.
+                # Terms of a grid serve many rules. More turns would fit them to runs that lie far
+                # from one another, and make the rules wild in between.
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
                 found = self._train(self._begun[candidate].problem, turns)
-                # To be held in order, all rules need a term on an input.
+                # Monotonic constraints need a term of every rule on an input: there, all stay.
                 if candidate.n_clusters and self.plan.premises_move and self.plan.held is None:
                     found = with_fewer_conditions(found)
             self._found[candidate] = found
         return self._found[candidate]
 
     def expected(self, tuned: Tuned) -> float:
-        """Squared error on rows left out one by one, of a training on all rows of the fit."""
+        """Expected squared error, scaled to a training on all rows of the fit."""
         return tuned.expected_error * self.with_more_rows(tuned)
 
     def with_more_rows(self, tuned: Tuned) -> float:
-        """Factor of the squared error where a model is trained on all rows of the fit.
+        """Factor by which the squared error changes in a training on all rows of the fit.
 
-        What the parameters cost, k / n of the noise's variance, falls as the rows rise.
+        k effective parameters add k / n of the noise variance, which falls as the rows n rise.
         """
         n_effective = tuned.posterior.n_effective
         return (1.0 + n_effective / self.plan.n_all) / (1.0 + n_effective / tuned.posterior.n_rows)
 
     def _problem(self, candidate, smaller=None):
-        """What a candidate begins with: rules and weights of a smaller one, if there is one."""
+        """The problem that a candidate begins with, from the rules and weights of a smaller one."""
         plan, rows = self.plan, self.rows_for(candidate)
         penalty = plan.first if smaller is None else smaller.penalty
         antecedent = rule_base(candidate, rows, plan.families, self.spacing, plan.seed, smaller)
@@ -219,7 +221,7 @@ class Trials:
         return tune(problem, premise, self.plan.free, turns, first_steps)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
-        """Of rows that were not trained on, as predict answers; summed over outputs."""
+        """Squared errors of ``predict`` on rows that were not trained on, summed over outputs."""
         seen = tuned.problem.rows
         antecedent, coefficients = tuned.evaluation.antecedent, tuned.solved.coefficients
         if held is not None:

@@ -1,12 +1,12 @@
-r"""The weights of the penalty and the premises in turns, by the evidence.
+r"""Tuning: the premises and the weights of the penalty take turns, guided by the evidence.
 
-At fixed weights the premises take a few steps down the cost; at fixed premises the weights take a
-few steps up the evidence, which needs no pass over the data. A step of the premises sees the cost
-alone and may sharpen the terms until no two rules fire on the same row. So the turn of the largest
+At fixed weights the premises take a few steps down the cost. At fixed premises the weights take a
+few steps up the evidence, which needs no pass over the data. A step of the premises lowers the cost
+alone, and may sharpen the terms until no two rules fire on the same row. So the turn of the largest
 evidence is kept, and the turns end when the evidence rises no further.
 
-The weights come first, at the premises of the start: from weights that are far too small, the first
-steps of the premises would go where no evidence leads back from.
+The weights come first, at the premises of the start: with weights far too small, the first steps of
+the premises would lead to a point from which the evidence finds no way back.
 """
 
 from collections.abc import Sequence
@@ -38,51 +38,51 @@ from ..reading_cost import reading_cost
 
 # In the middle of the weights that the evidence finds for data of every kind.
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
-# Steps of the weights at premises that have not moved yet: each of a hundredfold at the most, they
-# lead from the start to any end.
+# Steps of the weights before the premises have moved. Each changes a weight a hundredfold at most,
+# so that five lead from the start to any weight.
 FIRST_STEPS = 5
-# Where no premises follow, the weights arrive: most of them within ten.
+# Steps of the weights if no premises move afterwards. Most weights settle within ten.
 ARRIVING = 50
-# Steps and turns beyond ``MANY_COLUMNS``; so many turns have grids as well (``trials``).
+# Steps and turns beyond ``MANY_COLUMNS``; grids have as few turns (``trials``).
 _FEW_STEPS, FEW_TURNS = 3, 2
 # A turn: a few iterations of the premises, then steps of the weights. Neither converges while the
-# other moves: the training that follows does the rest.
+# other moves; the training that follows does the rest.
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
-# The first turn of terms without bounds goes far.
+# Terms without bounds move far in their first turn.
 _UNBOUNDED_ITERATIONS = 25
-# Of agreement: less of a rise is not worth a training.
+# Trainings and bisection steps that raise the agreement; a smaller rise is not worth a training.
 _MOST_RAISES, _HALVINGS, _LEAST_RAISE = 3, 8, 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class Tuned:
-    """The end of the turns: the posterior, the point and the weights there."""
+    """A point of the tuning: the premises, the weights, and the posterior there."""
 
     problem: SeparableProblem
     premise: Premise
-    free: Sequence[str]  # weights that are found, of ``evidence.FREE``
-    evaluation: Evaluation
-    solved: Any  # the evaluation, solved again at the weights found
+    free: Sequence[str]  # names of the weights to be found, of ``evidence.FREE``
+    evaluation: Evaluation  # at the premises, for the weights that they moved by
+    solved: Any  # the same, solved again for the weights of now
     displacement: np.ndarray
     posterior: Laplace
 
     @classmethod
     def start(cls, problem: SeparableProblem, premise: Premise, free, x=None):
-        """Where premises have not moved, or at x, with the weights of the problem's penalty."""
+        """The point at displacement ``x``, zero if not given, with the weights of the problem."""
         x = np.zeros(premise.size) if x is None else x
         evaluation = problem.evaluate(premise.parameters(x))
         posterior = laplace(problem, evaluation, x)
         return cls(problem, premise, free, evaluation, evaluation, x, posterior)
 
     def with_penalty(self, penalty, curvature=None):
-        """The same point at other weights; ``curvature`` where it is not that of before."""
+        """The same point at other weights; ``curvature`` if it has changed."""
         curvature = self.posterior.curvature if curvature is None else curvature
         there = self.solved_with(penalty)
         posterior = laplace(there.problem, there.solved, self.displacement, curvature)
         return replace(there, posterior=posterior)
 
     def solved_with(self, penalty):
-        """The same point, with the consequents alone at other weights."""
+        """The same point with consequents of other weights; the posterior stays as it was."""
         problem = self.problem.with_penalty(penalty)
         return replace(self, problem=problem, solved=problem.solved_again(self.evaluation))
 
@@ -93,23 +93,23 @@ class Tuned:
 
     @property
     def disagreement(self):
-        """Of rules that fire together, as in ``penalty``: what the error of each alone exceeds."""
+        """V (``penalty``): how much the rules' squared error, one by one, exceeds the model's."""
         normal = self.solved.normal
         return float(np.vdot(normal.coefficients, normal.disagreement @ normal.coefficients))
 
     @cached_property
     def residual(self):
-        """Of the standardised target, (n_rows, n_outputs)."""
+        """Residual of the standardised target, (n_rows, n_outputs)."""
         found = [residual for _, residual, _ in self.problem.residuals(self.evaluation)]
         return np.concatenate(found, axis=1).T
 
     @cached_property
     def expected_error(self):
-        """Mean squared error to be expected on new rows, of the standardised target.
+        """Mean squared error expected on new rows, of the standardised target.
 
-        That of the consequents on rows that are left out one by one, times what Akaike's final
-        prediction error takes for the premises, (1 + k / n) / (1 - k / n) with their effective
-        number k; infinite where these are as many as the rows.
+        The leave-one-out error, at fixed premises, times the factor of Akaike's final prediction
+        error for the premises, (1 + k / n) / (1 - k / n), k their effective number. It is infinite
+        where k reaches the number of rows n.
         """
         n_rows = self.posterior.n_rows
         share = self.posterior.n_effective_premises / n_rows
@@ -126,10 +126,10 @@ def tune(
     turns=MOST_TURNS,
     first_steps=FIRST_STEPS,
 ) -> Tuned:
-    """Find the ``free`` weights, of ``evidence.FREE``, and the premises that go with them.
+    """Find the ``free`` weights, names of ``evidence.FREE``, and the premises that go with them.
 
-    The weights start at those of the problem's penalty and take ``first_steps`` before the premises
-    move, in so many ``turns`` at most; with 0 these stay where they are.
+    The weights start at those of the problem's penalty, and take ``first_steps`` before the
+    premises move. There are ``turns`` turns at most; with 0 the premises stay.
     """
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
@@ -147,9 +147,9 @@ def tune(
 
 
 def tune_unbounded(problem: SeparableProblem, premise: Premise, free) -> Tuned:
-    """The same with the premises first, and weights that may be next to nothing.
+    """The same for unbounded terms: the premises move first, at the smallest weights.
 
-    What the premises of the start leave of data without noise would be taken for noise.
+    Else, on data without noise, the misfit of the first premises would be taken for noise.
     """
     least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
     penalty = replace(problem.penalty, **least)
@@ -159,7 +159,7 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free) -> Tuned:
 
 
 def _risen(tuned: Tuned, turns, steps) -> Tuned:
-    """The turn of the largest evidence, of so many more."""
+    """The point of the largest evidence, after up to ``turns`` more turns."""
     best = last = tuned
     for _ in range(turns):
         last = turned(last, last.penalty, steps)
@@ -171,7 +171,7 @@ def _risen(tuned: Tuned, turns, steps) -> Tuned:
 
 
 def turned(tuned: Tuned, penalty, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
-    """One turn from where the last one ended: premises down the cost, then weights up."""
+    """One turn from the end of the last: premises down the cost, then weights up the evidence."""
     problem, premise = tuned.problem.with_penalty(penalty), tuned.premise
     result = varpro(
         problem,
@@ -184,17 +184,17 @@ def turned(tuned: Tuned, penalty, steps=_STEPS, iterations=_ITERATIONS) -> Tuned
     )
     evaluation = result.evaluation
     x = premise.displacement(evaluation.antecedent.parameters)
-    # One step before the end as a rule, and as good there: another pass is not worth it.
+    # Usually it is that of one step before the end, which is as good and saves a pass.
     curvature = np.maximum(np.linalg.eigvalsh(result.gauss_newton), 0.0)
     there = replace(tuned, evaluation=evaluation, displacement=x)
     return _improved(there.with_penalty(penalty, curvature), steps)
 
 
 def _improved(tuned: Tuned, steps) -> Tuned:
-    """The same point after so many steps of the free weights, or when they stand still.
+    """The same point after up to ``steps`` steps of the free weights, fewer if they settle.
 
-    Steps that are alike are taken on to where they lead, if the evidence rises there; the last is
-    always a plain one. ``before`` is the penalty before the last step, if that was a plain one.
+    Similar successive steps are extrapolated to their limit, if the evidence rises there; the last
+    step is always a plain one. ``before`` is the penalty before the last step, if it was plain.
     """
     line, free, before = tuned.problem.common_line, tuned.free, None
     n_distinct = tuned.problem.rows.n_rows  # a search sample has no row twice
@@ -214,17 +214,17 @@ def _improved(tuned: Tuned, steps) -> Tuned:
 
 
 def cost_of(tuned: Tuned) -> int:
-    """To read the rules."""
+    """Reading cost of the rules."""
     problem, n_rules = tuned.problem, tuned.problem.antecedent.n_rules
     n_slopes = n_rules * len(problem.common_line.slopes) - tuned.penalty.n_held
     return reading_cost(problem.antecedent, n_slopes, problem.n_outputs)
 
 
 def with_most_agreement(tuned: Tuned, room: float) -> Tuned:
-    """The same with as much agreement as keeps the squared error within ``room`` times itself.
+    """The same with as much agreement as lets the squared error rise by the factor ``room``.
 
-    The consequents alone tell how much that is at least; then the premises follow, which makes room
-    for more, or for less.
+    First the agreement is raised at fixed premises. Then these follow, which may leave room for
+    more, or for less.
     """
     is_known = np.isfinite(tuned.expected_error)
     if "agreement" not in tuned.free or not tuned.displacement.size or room <= 1.0 or not is_known:
@@ -243,7 +243,7 @@ def with_most_agreement(tuned: Tuned, room: float) -> Tuned:
 
 
 def with_sparse_slopes(tuned: Tuned, worth) -> Tuned:
-    """The same with slopes that are worth so much alone: else one for several rules, or none."""
+    """The same, where rules share a slope or have none unless their own is worth ``worth``."""
     if not {"alpha", "slope"} <= set(tuned.free) or tuned.problem.n_columns > MANY_COLUMNS:
         return tuned
     common, absent = sparse_slopes(tuned.posterior, tuned.solved.normal.coefficients, worth)
@@ -251,22 +251,22 @@ def with_sparse_slopes(tuned: Tuned, worth) -> Tuned:
 
 
 def _most_agreement(tuned: Tuned, most: float) -> float:
-    """The largest agreement at which the consequents alone keep the error, by bisection."""
+    """The largest agreement that keeps the error below ``most`` at fixed premises, by bisection."""
     low, high = tuned.penalty.agreement, LARGEST.agreement
     for _ in range(_HALVINGS):
         middle = float(np.sqrt(low * high))
         penalty = replace(tuned.penalty, agreement=middle)
-        # The consequents of another penalty take no pass over the rows but for their error.
+        # Solving again takes no pass over the rows; only the error of the solution does.
         raised = tuned.solved_with(penalty)
         low, high = (middle, high) if raised.expected_error <= most else (low, middle)
     return low
 
 
 def scaled(penalty: Penalty, free, ratio, agreement_is_raised=False):
-    """The free weights times a ratio: relative to a mean over rows, they fall with their number.
+    """The free weights times ``ratio``: relative to a mean over rows, they fall as rows rise.
 
-    But agreement that makes rules hold one by one does so for any number of rows. More digits than
-    three say nothing, and would carry rounding errors into the model.
+    Raised agreement stays: it makes rules hold one by one for any number of rows. Weights keep
+    three digits; more would carry rounding errors into the model.
     """
     weights: dict[str, Any] = {key: _in_digits(getattr(penalty, key) * ratio) for key in free}
     if agreement_is_raised:

@@ -1,4 +1,4 @@
-"""What ``partial_fit`` and ``merge`` refuse, and why: rows are seen but once."""
+"""What ``partial_fit`` and ``merge`` refuse, and why: they see every row only once."""
 
 from dataclasses import replace
 from numbers import Real
@@ -9,11 +9,11 @@ import numpy as np
 from ..learning.data import LARGEST_NUMBER
 from ..model import TSKModel
 
-# What the premises and the columns of the design depend on.
+# Parameters that the premises and the columns of the design depend on.
 _STRUCTURE = ("n_mfs", "mf", "order", "premise_features", "consequent_features")
-# Sums of squares of weights, and of standardised rows, stay finite within these.
+# Between this and its inverse, sums of squares of weights and of standardised rows stay finite.
 _SMALLEST_WEIGHT = 1.0 / LARGEST_NUMBER
-# Parameters that a file has carried agree to their last digits.
+# Tolerance for equal parameters, relative: a file may round the last digits.
 _ROUNDING = 1e-12
 
 
@@ -28,7 +28,7 @@ def check_forgetting(forgetting):
 
 
 def can_learn_from_chunks(estimator: Any) -> bool:
-    """True; AttributeError where a parameter needs all rows again."""
+    """Return True, or raise AttributeError where a parameter needs all rows again."""
     wrong = [
         ("loss", estimator.loss != "squared_error", "weighs rows anew that are no longer there"),
         ("early_stopping", estimator.early_stopping, "holds out rows for a training that iterates"),
@@ -45,12 +45,12 @@ def can_learn_from_chunks(estimator: Any) -> bool:
 
 
 def structure_settings(estimator):
-    """What must stay as it was at the first call, in a form that can be compared and kept."""
+    """The parameters that must stay as at the first call, as strings that can be kept."""
     return {name: repr(getattr(estimator, name)) for name in _STRUCTURE}
 
 
 def check_settings(estimator, before):
-    """Raise ValueError where what the premises depend on has changed since the first call."""
+    """Raise ValueError where a parameter of the premises has changed since the first call."""
     for name, value in structure_settings(estimator).items():
         if value != before[name]:
             raise ValueError(
@@ -60,7 +60,7 @@ def check_settings(estimator, before):
 
 
 def check_begin(estimator, n_rows, finds_structure):
-    """Raise ValueError where a first chunk is nothing to begin with."""
+    """Raise ValueError where a first chunk does not suffice to begin with."""
     if n_rows == 0:
         raise ValueError(
             "The first chunk has no row with a positive weight: there is nothing to begin with."
@@ -80,7 +80,7 @@ def check_begin(estimator, n_rows, finds_structure):
 
 
 def check_outputs(base: TSKModel, names):
-    """Raise ValueError where a chunk has other targets than those before, or has them elsewhere."""
+    """Raise ValueError where a chunk has other targets than those before, or another order."""
     before = base.output_names
     if len(names) != len(before):
         raise ValueError(
@@ -98,7 +98,7 @@ def check_distance(base: TSKModel, scale):
     """Raise ValueError where rows are so far from the premises that their squares overflow."""
     for j, name in enumerate(base.input_names):
         for end in (scale.minimum[j], scale.maximum[j]):
-            # Both are divided before: their difference might overflow.
+            # Divide before subtracting: the difference might overflow.
             away = abs(end / base.spread[j] - base.reference[j] / base.spread[j])
             if not away <= LARGEST_NUMBER:
                 raise ValueError(
@@ -109,9 +109,9 @@ def check_distance(base: TSKModel, scale):
 
 
 def faded_weights(sample_weight, n_rows, forgetting):
-    """Weights of a chunk's rows, the last of which is the newest; None where all are one.
+    """Weights of a chunk's rows, oldest first; None if all are one.
 
-    ValueError where a weight is beyond what sums of squares hold.
+    ValueError where the square of a weight would overflow or vanish.
     """
     if sample_weight is not None and n_rows:
         outside = (sample_weight < _SMALLEST_WEIGHT) | (sample_weight > LARGEST_NUMBER)
@@ -123,13 +123,13 @@ def faded_weights(sample_weight, n_rows, forgetting):
             )
     if forgetting == 1.0:
         return sample_weight
-    # What is next to nothing stays above it: a row has weight or has not.
+    # Weights do not fade to zero: a row of weight zero is no row.
     fading = np.maximum(forgetting ** np.arange(n_rows - 1, -1, -1.0), _SMALLEST_WEIGHT)
     return fading if sample_weight is None else sample_weight * fading
 
 
 def named_premises(model: TSKModel, data):
-    """An imported model as the base of chunks: its premises, by the names of the data."""
+    """An imported model as the base of chunks: its premises, with the names of the data."""
     n_outputs = data.y.shape[1]
     return replace(
         model,
@@ -142,7 +142,7 @@ def named_premises(model: TSKModel, data):
 
 
 def check_same_premises(one, other, place):
-    """Raise ValueError that says in what the sums of two models differ; ``place`` is the second."""
+    """Raise ValueError where the sums of two models differ; the second has the number ``place``."""
     difference = _difference(one, other)
     if difference:
         raise ValueError(

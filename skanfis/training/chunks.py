@@ -1,10 +1,11 @@
-r"""Sums over rows that come in chunks, at premises that stay, and the model that they make.
+r"""Sums over rows that come in chunks, at fixed premises, and the model that they give.
 
     G = sum s phi phi' ,    c = sum s phi y ,    q = sum s y^2 ,    W = sum s ,
 
-with phi = kron(w(x), [1, z]), inputs and targets standardised by all rows in the sums. Sums of two
-sets of rows are carried over to the scales of both, exactly since z' = t + g z, and added: the
-order and the size of chunks make no difference, and no digits are lost as a sensor drifts.
+with phi = kron(w(x), [1, z]), weights s, and inputs and targets standardised by all rows in the
+sums. To add the sums of two sets of rows, both are first converted to the scales of all their rows,
+z' = t + g z, which is exact. So the order and size of chunks make no difference, and no digits are
+lost as a sensor drifts.
 """
 
 from dataclasses import dataclass, replace
@@ -31,21 +32,21 @@ from .data import Fitted
 from .pruning import redundant_rules
 from .rule_rows import RuleRows, rescaled
 
-# The weights of the penalty that are found where premises stay.
+# The weights of the penalty that are found at fixed premises.
 _FREE = ("agreement", "alpha", "slope")
-# What adds up over rows, each with its weight.
+# The weighted sums over rows.
 _SUMS = ("weight", "gram", "slope", "square")
 
 
 @dataclass(frozen=True, eq=False)
 class RowSums:
-    """What is kept of rows: sums of a fixed size; immutable."""
+    """All that is kept of the rows: sums of a fixed size; immutable."""
 
-    base: TSKModel  # its premises and names hold, its consequents are not used
+    base: TSKModel  # provides premises and names; its consequents are not used
     consequent_inputs: np.ndarray
-    inputs: Scale  # that the sums are on, and that of the targets
-    targets: Scale
-    n_rows: int  # with weight, however long ago
+    inputs: Scale  # of the inputs in the sums
+    targets: Scale  # of the targets in the sums
+    n_rows: int  # rows with positive weight, however old
     weight: float  # W
     squared_weight: float  # the sum of squares of the weights
     gram: np.ndarray  # G
@@ -72,7 +73,7 @@ class RowSums:
             raw = np.array(rows.X[part].T, dtype=float, order="C")
             strengths, shares = antecedent.strengths_and_shares(raw)
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
-            # In any units of the target: by its digits and its exponent.
+            # Mantissa and exponent of the target, so that no unit makes it overflow or vanish.
             marks = fingerprint(np.vstack([numbers, *np.frexp(rows.y[part].T)]))
             distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(slopes)]
             every = basis(Z)
@@ -104,7 +105,7 @@ class RowSums:
 
     @property
     def effective_weight(self):
-        """Rows by weight, as the search counts them."""
+        """Number of rows by weight, as ``StandardisedData`` counts it."""
         return max(self.weight, self.weight**2 / self.squared_weight)
 
     def faded(self, factor):
@@ -114,7 +115,7 @@ class RowSums:
         return replace(self, squared_weight=squared, rules=rules, **sums)
 
     def plus(self, other):
-        """The rows of both."""
+        """The sums over the rows of both."""
         weights = self.weight, other.weight
         inputs = joined_scales(self.inputs, other.inputs, *weights)
         targets = joined_scales(self.targets, other.targets, *weights)
@@ -126,11 +127,11 @@ class RowSums:
         return replace(one, distinct=distinct, rules=one.rules.plus(two.rules, inputs), **sums)
 
     def _on(self, inputs: Scale, targets: Scale):
-        """The same sums on other scales."""
+        """The sums on other scales."""
         shift, factor = _change(self.inputs, inputs)
         t, g = _change(self.targets, targets)
         own = shift[self.consequent_inputs], factor[self.consequent_inputs]
-        # sum s phi, since strengths sum to one; and sum s y likewise.
+        # sum s phi and sum s y, because strengths sum to one.
         every = self.gram[:, :: self.n_basis].sum(axis=1)
         total = self.slope[:: self.n_basis].sum(axis=0)
         gram = rescaled(self.gram, *own)
@@ -149,11 +150,11 @@ def joined_scales(one: Scale, other: Scale, weight: float, other_weight: float) 
     """The scale of two sets of rows together, by their weights (Chan, Golub and LeVeque 1979)."""
     low, high = np.minimum(one.minimum, other.minimum), np.maximum(one.maximum, other.maximum)
     if other_weight > weight:
-        # From the heavier side: what little is added to it costs no digits.
+        # Start from the heavier side: adding a small change to it costs no digits.
         one, other, weight, other_weight = other, one, other_weight, weight
     share = other_weight / (weight + other_weight)
     is_constant = never_changes(low, high)
-    # In parts of the range, whose squares neither overflow nor vanish.
+    # Relative to the range, squares neither overflow nor vanish.
     span = np.where(is_constant, 1.0, high - low)
     step = (other.offset - one.offset) / span
     square = (1.0 - share) * _variance(one, span) + share * _variance(other, span)
@@ -176,11 +177,11 @@ def _change(old: Scale, new: Scale):
 
 
 class _ProblemOfSums(SeparableProblem):
-    """The least-squares problem at premises that stay, out of sums; no rows are read."""
+    """The least-squares problem at fixed premises, from sums; no rows are read."""
 
     def __init__(self, sums: RowSums, penalty: Penalty):
         self.antecedent, self.penalty = sums.base.antecedent, penalty
-        # What is asked of the rows: their scales, and how many of them are distinct.
+        # Stands for the rows, of which only the scales and the number of distinct ones are used.
         none = np.empty((len(sums.distinct), 0))
         self.rows = StandardisedData(none, none, None, sums.inputs, sums.targets)
         self.consequent_inputs, self.n_basis = sums.consequent_inputs, sums.n_basis
@@ -195,7 +196,7 @@ class _ProblemOfSums(SeparableProblem):
 
 
 def inputs_with_slopes(model: TSKModel, inputs):
-    """Those by which a model has slopes, or may yet: nothing is known of what has not changed."""
+    """Inputs by which a model has slopes, or may get some: those that were constant so far."""
     assert model.target is not None
     if not model.order or never_changes(model.target.minimum, model.target.maximum).all():
         return inputs
@@ -204,7 +205,7 @@ def inputs_with_slopes(model: TSKModel, inputs):
 
 
 def fitted_weights(estimator, sums: RowSums):
-    """The weights of the penalty that a fit to these rows has found, times rows, in plain types."""
+    """The weights of the penalty that a fit found, times the rows by weight, in plain types."""
     place, n_rows = list(sums.base.input_names).index, sums.effective_weight
     model = estimator.model_
     is_absent = (model.coefficients[:, 1:] == 0.0).all(axis=2)
@@ -231,18 +232,18 @@ def fitted_weights(estimator, sums: RowSums):
 def solve(sums: RowSums, given, first=None) -> Fitted:
     """Solve for the consequents: the model of all rows so far.
 
-    ``given`` are weights of the penalty, by name. The others are those of ``first``, which
-    :func:`fitted_weights` gives; without it, the evidence finds them.
+    ``given`` are weights of the penalty, by name. The others come from ``first``, which
+    :func:`fitted_weights` returns; without ``first``, the evidence finds them.
     """
     antecedent, none = sums.base.antecedent, np.empty(0)
     given = {key: given[key] for key in _FREE if key in given}
     if first is not None:
-        # Relative to a mean over rows, they fall with their number.
+        # Weights are relative to a mean over rows, so they fall as rows rise.
         found = {key: first[key] / sums.effective_weight for key in _FREE}
         if "alpha" not in given:
             found["pulls"] = {tuple(component): pull for component, pull in first["pulls"]}
             found["slope_pulls"] = dict(first["slope_pulls"])
-            # Slopes that rules have in common, or have not, stay so.
+            # Shared slopes stay shared, absent ones absent.
             for key in ("common", "absent"):
                 found[key] = tuple((j, tuple(rules)) for j, rules in first[key])
         given = found | given
@@ -265,7 +266,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
 def _model(sums, problem, evaluation):
     posterior = None
     if sums.n_rows > 1:
-        # Premises stay: what is not known of them is not counted.
+        # The premises are fixed: their uncertainty is left out.
         posterior = posterior_of(problem, None, evaluation, sums.effective_weight)
     inputs, targets, own = sums.inputs, sums.targets, sums.consequent_inputs
     units = inputs, targets, own, 1 if own.size else 0
@@ -282,5 +283,5 @@ def _model(sums, problem, evaluation):
         support=sums.rules.support(inputs, 1 + int(np.sum(~inputs.is_constant[own]))),
         target=TargetRange(targets.minimum, targets.maximum, targets.scale),
         posterior=posterior,
-        tangent_at=None,  # nothing is known to rise or fall
+        tangent_at=None,  # there are no monotonic constraints
     )

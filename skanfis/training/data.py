@@ -1,4 +1,4 @@
-"""What goes into a fit, validated rows, and what it leaves behind."""
+"""Input and output of a fit: validated rows, runs of the solver, and results."""
 
 from dataclasses import dataclass
 from numbers import Real
@@ -24,13 +24,13 @@ from ..model import TSKModel
 from ..naming import default_output_names
 from ..search import Start
 
-# What scikit-learn checks of numbers; whether they are finite is checked by the column's name.
+# scikit-learn's checks of numbers. Whether they are finite is checked here, to name the column.
 NUMERIC: dict = {"dtype": (np.float64, np.float32), "ensure_all_finite": False}
 
 
 @dataclass(frozen=True, eq=False)
 class ValidatedData:
-    """What a user gave, checked: rows of positive weight as arrays of floats, and their names."""
+    """The user's data, checked: rows of positive weight as arrays of floats, and their names."""
 
     X: np.ndarray
     y: np.ndarray  # (n_rows, n_outputs)
@@ -38,8 +38,8 @@ class ValidatedData:
     groups: np.ndarray | None
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
-    kept: np.ndarray | None = None  # which of the rows given have weight and are here, if not all
-    constraints: Constraints | None = None  # what is known of the target, in the user's units
+    kept: np.ndarray | None = None  # mask of the given rows that have weight; None if all have
+    constraints: Constraints | None = None  # on the outputs, in the user's units
 
     def rows(self, indices=slice(None)):
         """Some of the rows, on scales of their own."""
@@ -50,12 +50,12 @@ class ValidatedData:
         return rows
 
     def numbered(self, indices):
-        """X and y of some rows, and their numbers among all rows given."""
+        """X and y of some rows, and their numbers among all given rows."""
         numbers = np.arange(len(self.X)) if self.kept is None else np.flatnonzero(self.kept)
         return self.X[indices], self.y[indices], numbers[indices]
 
     def over_all(self, values, elsewhere):
-        """Values of these rows as values of all rows given, with another one elsewhere."""
+        """Values of these rows as values of all given rows, with ``elsewhere`` for the others."""
         if self.kept is None:
             return values
         given = np.full(self.kept.size, elsewhere)
@@ -64,7 +64,7 @@ class ValidatedData:
 
 
 def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
-    """The data, of all rows with weight; ``is_chunk``: as rows that may have come before."""
+    """The data, checked, without rows of weight zero; ``is_chunk`` if other chunks may precede."""
     refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
     is_first = not (is_chunk and hasattr(estimator, "model_"))
     output_names = _target_names(y)
@@ -92,8 +92,8 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
     groups = None if groups is None else group_numbers(groups, len(X))
     keep = None
     if sample_weight is not None:
-        # A chunk may be without any weight, which scikit-learn refuses from some version on;
-        # weights of chunks count against one another and stay as they are.
+        # A chunk may have no weight at all, which newer versions of scikit-learn refuse. Weights of
+        # chunks are relative to each other, and stay as they are.
         if isinstance(sample_weight, Real):
             sample_weight = np.full(len(X), sample_weight)
         with named_refusals(sample_weight=sample_weight):
@@ -112,7 +112,7 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
 
 
 def _target_names(y):
-    """Names of a Series or of a frame's columns, if all are str."""
+    """The name of a Series or names of a frame's columns, if all are str; else None."""
     names = getattr(y, "columns", None)
     names = [getattr(y, "name", None)] if names is None else list(names)
     return tuple(names) if all(isinstance(name, str) and name for name in names) else None
@@ -120,7 +120,7 @@ def _target_names(y):
 
 @dataclass(frozen=True, eq=False)
 class SolverRun:
-    """One run of the solver: where it began, what it worked on, where it ended."""
+    """One run of the solver: its start, its problem, and its end."""
 
     start: Start
     problem: SeparableProblem
@@ -136,13 +136,13 @@ class SolverRun:
 
     @property
     def displacement(self) -> np.ndarray:
-        """Where the premises are, from their start."""
+        """Displacement of the premises from their start."""
         return self.premise.displacement(self.evaluation.antecedent.parameters)
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """What a fit leaves behind."""
+    """The results of a fit."""
 
     model: TSKModel
     result: SolverResult

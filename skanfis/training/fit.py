@@ -1,11 +1,12 @@
 """One fit, from checked data to the frozen model, in the order in which things happen.
 
-1. Rows are held out, where training is to stop early (``watching``).
-2. With Huber's loss, what is far off is found before there is any model (``robust``).
-3. ``search`` gives a start: the rules, the weights of the penalty, where the premises stand.
-4. A solver runs from there; of many rows, on a sample first.
-5. With Huber's loss the rows are weighted anew by what that left, and 3 and 4 repeated.
-6. The model is frozen in the user's units (``freezing``), and rules that do nothing are listed
+1. If training may stop early, rows are held out (``watching``).
+2. With Huber's loss, outliers are weighted down before there is any model (``robust``).
+3. ``search`` gives a start: the rules, the weights of the penalty, the premises so far.
+4. A solver runs from there; if there are many rows, on a sample first.
+5. With Huber's loss, the residuals give the rows new weights, and the solver runs again until
+   these settle; then 3 to 5 are repeated without the outliers.
+6. The model is frozen in the user's units (``freezing``), and redundant rules are listed
    (``pruning``).
 """
 
@@ -35,14 +36,14 @@ from .robust import huber_weights, reweighted, robust_start, silenced, without_o
 from .settings import solver_of
 from .watching import Callbacks, Printer, ValidationLoss, hold_out, watch_all
 
-# Part of tol that a sample of many rows is trained to: its iterations cost next to nothing, and
-# what is left to do is done on all rows.
+# A sample is trained to this part of tol. Its iterations cost next to nothing, and the fewer are
+# left to do on all rows.
 _THOROUGH = 0.1
-# Huber's loss. Turns of weights and fit at one structure: with sound settings a handful settles
-# them, and what has not after these goes to and fro.
+# Turns of weights and fit with Huber's loss. With sound settings the weights settle after a few;
+# those that have not settled after this many oscillate.
 _MOST_TURNS = 20
-# Weights are settled when they change by less than this on average: a tenth of what the scale of
-# the residuals, a median of some hundred rows, is uncertain by.
+# Weights are settled when they change by less than this on average: a tenth of the uncertainty of
+# the residuals' scale, a median of some hundred rows.
 _SETTLED = 1e-3
 
 
@@ -52,7 +53,7 @@ def fit_rules(
     request: StructureRequest,
     callbacks: Callbacks | None = None,
 ) -> Fitted:
-    """Fit the rules of an estimator, whose parameters say how, to data."""
+    """Fit the rules of an estimator to data; its parameters say how."""
     if estimator.max_iter == 0 and isinstance(request.partition, TSKModel):
         return as_given(estimator, data, request.partition)
     fit = _Fit(estimator, data, request, callbacks)
@@ -68,7 +69,7 @@ def fit_rules(
 
 
 class _Fit:
-    """What every step of one fit needs: the rows, what was asked for, and who watches."""
+    """All that the steps of one fit share: the rows, the request, the solver, and the watchers."""
 
     def __init__(self, estimator, data, request, callbacks):
         self.estimator, self.data, self.callbacks = estimator, data, callbacks
@@ -89,7 +90,7 @@ class _Fit:
             self.held_out = replace(held_out, inputs=self.rows.inputs, targets=self.rows.targets)
         elif is_many(self.rows) and self.huber is None:
             self.rows = with_sample(self.rows)
-        # A slope by a column that never changes is nothing that data could tell of.
+        # A slope by a constant column cannot be learnt.
         inputs, is_constant = request.consequent_inputs, self.rows.inputs.is_constant
         self.request = replace(
             request,
@@ -98,12 +99,12 @@ class _Fit:
         )
 
     def start(self, rows: StandardisedData) -> Start:
-        """Where a run begins: rules, weights of the penalty, and the premises so far."""
+        """The start of a run: rules, weights of the penalty, and the premises so far."""
         start = self.request.start(rows.sample or rows)
         if rows.sample is not None:
             start = self.request.for_all(start, rows.sample, rows)
         if not self.solver.goes_on_from_tuning:
-            # Descents begin afresh, and with slopes of its own for every rule.
+            # Descents begin afresh, and every rule has slopes of its own.
             penalty = replace(start.penalty, common=(), absent=())
             start = replace(start, displacement=None, penalty=penalty)
         if self.printer is not None:
@@ -111,11 +112,11 @@ class _Fit:
         return start
 
     def run(self, rows: StandardisedData, start: Start) -> SolverRun:
-        """The run of the solver from a start; of many rows, what is left to do is a step or two."""
+        """Run the solver from a start; a sample of many rows leaves a step or two for all rows."""
         if rows.sample is None or not isinstance(self.solver, VariableProjection):
             return self._solved(rows, start, self.solver)
         thorough = clone(self.solver).set_params(tol=_THOROUGH * self.solver.tol)
-        # Who watches counts iterations on all rows.
+        # Watchers only see the iterations on all rows.
         found = self._solved(rows.sample, start, thorough, is_watched=False)
         return self._solved(rows, replace(start, displacement=found.displacement), self.solver)
 
@@ -157,10 +158,10 @@ class _Fit:
         return SolverRun(start, problem, premise, result, np.array(validation.losses))
 
     def robust_run(self) -> tuple[SolverRun, np.ndarray]:
-        """Runs and weights in turns, until the weights settle.
+        """Runs and weights in turns, until the weights settle; twice.
 
-        The first start has seen outliers, and what comes of it too. Once the weights are settled,
-        training starts afresh without the rows of less than half their weight.
+        Outliers have shaped the first start, and so its result. Once the weights have settled,
+        training starts afresh without the rows that keep less than half their weight.
         """
         self.rows, weights = robust_start(self.rows)
         if self.held_out is not None:
@@ -171,7 +172,7 @@ class _Fit:
     def _robust_turns(self, weights):
         rows, epsilon = self.rows, self.huber.epsilon
         start = self.start(without_outliers(rows, weights))
-        # Those far off are not yet known for what they are: no rule is to go and meet them.
+        # Outliers count next to nothing in the first run, so that no rule moves to them.
         run = self.run(reweighted(rows, silenced(weights)), start)
         for _ in range(_MOST_TURNS):
             before = weights
@@ -189,7 +190,7 @@ class _Fit:
         return run, weights
 
     def warn_unless_converged(self, run):
-        """Warn where the solver would have gone on."""
+        """Warn where the solver stopped before it converged."""
         estimator, result = self.estimator, run.result
         if result.converged or estimator.max_iter == 0:
             return
@@ -201,17 +202,17 @@ class _Fit:
         )
 
     def _answering(self, model):
-        """The model with the policy out of bounds that was asked for."""
+        """The model with the policy out of bounds that the user asked for."""
         return model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
 
     def frozen(self, run: SolverRun, weights: np.ndarray | None) -> Fitted:
-        """The model of a run, and its posterior; ``weights`` are those of Huber's loss."""
+        """The results of a run, with the posterior; ``weights`` are those of Huber's loss."""
         rows = self.rows
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
         n_rows = rows.effective_weight
         if weights is not None:
-            # Kish's effective number of rows, by what Huber's loss leaves of the weight of each.
+            # Kish's effective number of rows, from the part of its weight that each row keeps.
             share, square = (np.average(weights**k, weights=rows.weights) for k in (1, 2))
             n_rows *= share**2 / square
         posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
@@ -227,12 +228,12 @@ class _Fit:
         return Fitted(model, run.result, run.start, redundant, weights, run.validation_losses)
 
     def constrained(self, fitted, run, weights):
-        """The same with the nearest consequents that keep what is known, and a report."""
+        """The same with the nearest consequents that satisfy the constraints, and a report."""
         evaluation, constraints = run.evaluation, self.data.constraints
         if evaluation.normal is None:
-            # Found by descent: the consequents are solved for first.
+            # A descent does not solve for the consequents: do so first.
             evaluation = run.problem.evaluate(evaluation.antecedent.parameters)
-        # Rows on a cluster have no numbers.
+        # Rows on a cluster of machines have no numbers.
         is_here = isinstance(self.data, ValidatedData)
         rows = self.data.numbered(self.trained_on) if is_here else None
         given = fitted.model, evaluation, run.problem, constraints, rows

@@ -1,4 +1,4 @@
-"""From where a run has ended to the frozen model, in the user's units."""
+"""From the end of a run to the frozen model, in the user's units."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ from ..search import (
 from .data import Fitted, ValidatedData
 from .pruning import redundant_rules
 
-# More rows tell nothing new.
+# Rows that medians are taken of: more would hardly move them.
 _MOST_ROWS = 2000
 
 
@@ -34,7 +34,7 @@ def frozen_model(
     start: Start,
     evaluation: Evaluation,
 ) -> tuple[TSKModel, list[dict]]:
-    """The model, in the user's units, of what was found on ``rows``, and its redundant rules."""
+    """The model of an evaluation on ``rows``, in the user's units, and its redundant rules."""
     trained, inputs = evaluation.antecedent, start.consequent_inputs
     offset, scale, n_coefficients = rows.inputs.offset, rows.inputs.scale, 1 + inputs.size
     firing = RuleFiring.of(rows, trained, n_coefficients)
@@ -62,7 +62,7 @@ def frozen_model(
 
 
 def _tangent_at(constraints, rows):
-    """The medians of the inputs that an output is to rise or fall with; None without any."""
+    """The medians of the inputs with a monotonic constraint, NaN elsewhere; None without any."""
     if constraints is None or not constraints.signs.any():
         return None
     table, weight, _ = representative_rows(rows.sample or rows, _MOST_ROWS)
@@ -87,7 +87,7 @@ def as_given(estimator, data, model) -> Fitted:
         output_names=data.output_names,
     )
     rows = data.rows()
-    # Rows beyond the model's range count as they are predicted, or where that is not at all, held.
+    # Rows beyond the model's range count as predicted; if the policy gives no value, as clipped.
     answering = model if model.out_of_bounds == "linear" else model.with_out_of_bounds("clip")
     residual = (data.y - answering.predict(data.X)) / rows.targets.scale
     loss = np.average(np.sum(residual**2, axis=1), weights=data.sample_weight)

@@ -1,9 +1,9 @@
 r"""Rules that do nothing: those that never fire, and those that repeat another.
 
-A rule *never fires* where its strength is nowhere above one in a hundred. It *repeats* another
-where their strengths are in proportion on all rows, which shows in their mean products over the
-rows O_rs = mean of w_r w_s: O_rs / sqrt(O_rr O_ss) is close to one. They then have one consequent
-between them, however it is divided. Of two that repeat one another the stronger one stays.
+A rule *never fires* if its strength is below one in a hundred on every row. It *repeats* another if
+their strengths are proportional over the rows. Then the cosine O_rs / sqrt(O_rr O_ss) is close to
+one, with O_rs the mean of w_r w_s, and the data determine only one consequent for both, however it
+is divided. Of two rules that repeat one another, the stronger one stays.
 """
 
 from dataclasses import replace
@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike
 from ..model import TSKModel
 from ..support import RuleSupport
 
-# A strength that is nowhere above this: what the rule says moves no prediction by more than a
-# hundredth of its difference from the others.
+# Largest strength of a rule that never fires: it moves no prediction by more than a hundredth of
+# its difference from the others.
 _NEVER = 0.01
-# Cosine of the strengths of two rules over all rows: an angle of less than a degree, which no
-# consequents could be told apart by.
+# Least cosine of the strengths of two rules that repeat one another: an angle of less than a
+# degree, too little to tell their consequents apart.
 _ALIKE = 0.9999
 
 
@@ -42,7 +42,7 @@ def redundant_rules(overlap, peak):
 
 
 def model_without_rules(model: TSKModel, rules: ArrayLike) -> TSKModel:
-    """The model without some rules: those that are left fire as before, in proportion.
+    """The model without some rules; the strengths of the others keep their proportions.
 
     ValueError where there is no such rule, or where none would be left.
     """
@@ -64,7 +64,7 @@ def model_without_rules(model: TSKModel, rules: ArrayLike) -> TSKModel:
     antecedent, terms = model.antecedent.without_rules(numbers)
     weights, support = model.rule_weights[kept], model.support
     if support is not None:
-        # What the rules say of every input alone is another thing without some of them.
+        # The marginal effects of the inputs change without these rules: they are dropped.
         own = {key: of_rules[kept] for key, of_rules in vars(support).items() if key != "marginals"}
         support = RuleSupport(**own)
     return replace(
@@ -75,6 +75,6 @@ def model_without_rules(model: TSKModel, rules: ArrayLike) -> TSKModel:
         rule_weights=weights / weights.sum(),
         rule_rows=model.rule_rows[kept],
         support=support,
-        posterior=None,  # it is of all rules
+        posterior=None,  # it would be that of all rules
         term_names=tuple(model.term_names[t] for t in terms),
     )

@@ -1,18 +1,18 @@
-r"""Huber's loss by reweighting: rows far from the model count less, those near it as ever.
+r"""Huber's loss by reweighting: rows far from the model count less, all others in full.
 
 Least squares with the weights
 
     w_i = min(1, epsilon s / |r_i|)
 
-of the residuals before has the minimum of Huber's estimator (1964): weights and fit are found in
-turns, and one Gram matrix serves as before. The scale s is the median of |r| over 0.6745, a robust
-standard deviation, found anew in every turn. Of several outputs, r is the length of the row's
-residuals, over the root of their number.
+of the last residuals, repeated, ends at the minimum of Huber's estimator (1964). Weights and fit
+take turns, and each fit is least squares with one Gram matrix, as without weights. The scale s is
+the median of |r| over 0.6745, a robust standard deviation, found again in every turn. With several
+outputs, r is the root mean square of the row's residuals.
 
-Before there is any model, rows far beyond all others already count less: by the residuals of a
-linear model that scikit-learn's HuberRegressor finds, beyond ten robust standard deviations. The
-target's own scale is found with these weights. A grid of many rules would otherwise spend a rule on
-each outlier before it is known for one.
+Before there is any model, rows beyond ten robust standard deviations of a linear model already
+count less; scikit-learn's HuberRegressor fits it. The target's own scale is found with these
+weights. Otherwise, a grid of many rules would spend a rule on each outlier before it is known as
+one.
 """
 
 import warnings
@@ -28,31 +28,31 @@ from ..search import weighted_quantile
 
 # The median of |u| for a standard normal u.
 _NORMAL_MEDIAN = 0.6744897501960817
-# Of the linear model, robust standard deviations that no shape of a sound target leaves.
+# Robust standard deviations from the linear model that no sound target exceeds, however it bends.
 _FAR = 10.0
-# Of its minimiser: so tight that the first weights do not depend on the order of the rows.
+# Steps and tolerance of the linear fit: so tight that the order of rows does not matter.
 _MOST_STEPS, _TIGHT = 1000, 1e-9
-# Digits of the first weights: more would only carry the minimiser's errors on.
+# Decimals of the first weights: more would only carry errors of the linear fit on.
 _DIGITS = 2
-# Rows of less weight have no part in where training starts: by the default epsilon, those beyond
-# 2.7 standard deviations.
+# Rows that keep less of their weight are left out of a start: with the default epsilon, those
+# beyond 2.7 standard deviations.
 _OUTLIER = 0.5
 
 
 def huber_weights(problem, evaluation, epsilon, own):
-    """Weights (n_rows,) by the residuals at an evaluation; ``own`` are those that the rows have."""
+    """Weights (n_rows,) by the residuals at an evaluation; ``own`` are the rows' own weights."""
     sizes = np.empty(problem.rows.n_rows)
     for part, residual, _ in problem.residuals(evaluation):
         sizes[part] = np.sqrt(np.mean(residual**2, axis=0))
     scale = _weighted_median(sizes, own) / _NORMAL_MEDIAN
     if scale == 0.0:
-        # Half of the rows are met exactly: what is not must not be the only one to count.
+        # At least half of the rows are met exactly. The others then count next to nothing.
         return np.where(sizes == 0.0, 1.0, np.finfo(float).eps)
     return np.minimum(1.0, epsilon * scale / np.maximum(sizes, np.finfo(float).tiny))
 
 
 def robust_start(rows):
-    """The rows with the target's scale as it is without what is far off, and their weights."""
+    """The rows, with the target's scale free of outliers, and the first weights."""
     weights = np.ones(rows.n_rows)
     is_large = rows.n_rows > SAMPLE_ROWS
     lines = _robust_lines(with_sample(rows, SAMPLE_ROWS).sample if is_large else rows)
@@ -72,13 +72,13 @@ def robust_start(rows):
     weights = np.maximum(np.round(weights, _DIGITS), 10.0**-_DIGITS)
     if (weights == 1.0).all():
         return rows, weights
-    # A square with the square of its weight is at most that of a row at the ten deviations.
+    # With the weight squared, no row adds more than one at ten deviations would.
     targets = column_statistics(rows.y, rows.weights * weights**2)
     return replace(rows, targets=targets), weights
 
 
 def _robust_lines(rows):
-    """Centre, spread and scikit-learn's robust line of every output; None where there is none."""
+    """Centre, spread and robust line of every output; None if one output has none."""
     Z, target, _ = rows.read(slice(None))
     lines = []
     for values in target:
@@ -87,7 +87,7 @@ def _robust_lines(rows):
         if spread == 0.0:
             return None
         linear = HuberRegressor(max_iter=_MOST_STEPS, tol=_TIGHT)
-        # A rough line will do.
+        # A rough line suffices: it need not converge.
         with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
             try:
                 linear.fit(Z.T, (values - center) / spread, sample_weight=rows.sample_weight)
@@ -98,7 +98,7 @@ def _robust_lines(rows):
 
 
 def _weighted_median(values, weight):
-    """Half of the weight is below, half above; between two values, their mean."""
+    """The value with half of the weight on either side; between two values, their mean."""
     return 0.5 * sum(float(weighted_quantile(values, weight, 0.5, side)) for side in (1, -1))
 
 
@@ -108,12 +108,12 @@ def reweighted(rows, weights):
 
 
 def without_outliers(rows, weights):
-    """The rows that have at least half of their weight; all of them where these are few."""
+    """The rows that keep at least half of their weight; all rows if these are the minority."""
     kept = weights >= _OUTLIER
-    # What is said of most rows is said of none.
+    # If most rows look like outliers, none counts as one.
     return rows.part(kept) if 2.0 * rows.weights[kept].sum() >= rows.weights.sum() else rows
 
 
 def silenced(weights):
-    """The weights, but next to nothing for rows that have less than half of theirs."""
+    """The weights, but next to nothing for rows that keep less than half of theirs."""
     return np.where(weights < _OUTLIER, np.finfo(float).eps, weights)

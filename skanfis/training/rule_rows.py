@@ -1,7 +1,7 @@
-"""Where the rows of every rule lie, and how many they are, of rows that come in chunks.
+"""Where the rows of every rule lie, and how many there are, for rows that come in chunks.
 
-Sums are on the rows' standardised inputs z; those of two sets of rows are carried over to the
-scale of both, z' = t + g z, and added.
+Sums are over the rows' standardised inputs z. To add the sums of two sets of rows, both are first
+converted to the scale of all their rows, z' = t + g z.
 """
 
 from dataclasses import dataclass, replace
@@ -13,33 +13,33 @@ from ..learning.data import Scale
 from ..learning.firing import FIRES, places
 from ..support import RuleSupport
 
-# Farthest rows of a rule that are kept, beside those at its ends.
+# Farthest rows of a rule that are kept, beside those with the extremes of an input.
 _MOST_FAR = 8
 
 
 @dataclass(frozen=True, eq=False)
 class RuleRows:
-    """What is kept of the rows of every rule; of a fixed size, immutable."""
+    """All that is kept of the rows of every rule; of a fixed size, immutable."""
 
     second: np.ndarray  # sums of s w_r [1, z] [1, z]', (n_rules, 1 + n_inputs, 1 + n_inputs)
     strongest: np.ndarray  # weight of the rows on which each rule is the strongest
     peak: np.ndarray  # largest strength of each rule on any row
     extent: np.ndarray  # largest sqrt(w_r) |x - a_r|, by inputs that consequents are linear in
-    # Rules, and fingerprints of distinct inputs on which they are the strongest, (n, 2).
+    # Pairs of a rule and the fingerprint of an input on which it is the strongest, (n, 2).
     distinct: np.ndarray
-    # Rules, and the rows on which they fire farthest from their centres, (n, 1 + n_inputs).
+    # A rule, and a row on which it fires far from its centre, (n, 1 + n_inputs).
     farthest: np.ndarray
 
     @classmethod
     def none(cls, n_rules, n_inputs, n_slopes):
-        """Of no rows."""
+        """The sums over no rows."""
         extent, zeros = np.zeros((n_rules, n_slopes)), np.zeros(n_rules)
         second = np.zeros((n_rules, 1 + n_inputs, 1 + n_inputs))
         return cls(second, zeros, zeros, extent, np.empty((0, 2)), second[:0, 0])
 
     @classmethod
     def of(cls, X, basis_rows, strengths, weight, numbers, slope_inputs, centers):
-        """Of a block of rows, X (n_inputs, n_rows), ``basis_rows`` [1, z].
+        """The sums over a block of rows, X (n_inputs, n_rows), ``basis_rows`` [1, z].
 
         ``numbers`` are fingerprints of the inputs, ``centers`` a_r of the rules on the inputs by
         which they have slopes, (n_rules, n_slopes).
@@ -60,11 +60,11 @@ class RuleRows:
         )
 
     def faded(self, factor):
-        """The same rows with all weights times a factor."""
+        """The sums with all weights times a factor."""
         return replace(self, second=factor * self.second, strongest=factor * self.strongest)
 
     def plus(self, other, scale: Scale):
-        """The rows of both, of which the sums are on this scale."""
+        """The sums over the rows of both, which must be on ``scale``."""
         second = self.second + other.second
         distinct = np.unique(np.vstack([self.distinct, other.distinct]), axis=0)
         far = np.vstack([self.farthest, other.farthest])
@@ -81,7 +81,7 @@ class RuleRows:
         )
 
     def on(self, shift, factor):
-        """The same sums on z' = shift + factor z."""
+        """The sums on z' = shift + factor z."""
         second = [rescaled(rescaled(own, shift, factor).T, shift, factor) for own in self.second]
         return replace(self, second=np.stack(second))
 
@@ -99,7 +99,7 @@ class RuleRows:
 
 
 def rescaled(sums, shift, factor):
-    """Sums of [1, z] times something, rule by rule along the first axis, on [1, t + g z]."""
+    """Sums of [1, z] times a factor, by rule along the first axis, converted to [1, t + g z]."""
     blocks = sums.reshape(-1, 1 + shift.size, sums.shape[-1]).copy()
     blocks[:, 1:] *= factor[:, None]
     blocks[:, 1:] += shift[:, None] * blocks[:, :1]
@@ -107,7 +107,7 @@ def rescaled(sums, shift, factor):
 
 
 def _outermost(far):
-    """Of rows by rule, the farthest first: who may be the farthest when the centre has moved."""
+    """The rows to keep, of rows by rule, farthest first: each may be farthest as centres move."""
     kept = []
     for own in np.split(far, np.flatnonzero(np.diff(far[:, 0])) + 1):
         ends = np.concatenate([own.argmin(axis=0), own.argmax(axis=0)])
@@ -116,7 +116,7 @@ def _outermost(far):
 
 
 def _distances(farthest, second, scale):
-    """The rules of rows that were far, and Mahalanobis' distances from these rules' centres."""
+    """The rules of ``farthest`` rows, and the Mahalanobis distances of these from the centres."""
     rules = farthest[:, 0].astype(int)
     center, factor = places(second, np.ones(len(second)))
     away = (farthest[:, 1:] - scale.offset) / scale.scale - center[rules]

@@ -1,4 +1,4 @@
-"""What the parameters of an estimator ask for: names of columns, families and solvers resolved."""
+"""The parameters of an estimator, with names of columns, families and solvers resolved."""
 
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import has_fit_parameter
@@ -11,12 +11,12 @@ from ..search import StructureRequest, check_inputs
 
 
 def solver_of(estimator) -> Solver:
-    """The solver, by its word or as it is given."""
+    """The solver that the estimator names, or holds."""
     return SOLVERS[estimator.solver]() if isinstance(estimator.solver, str) else estimator.solver
 
 
 def given_weights(estimator):
-    """The weights of the penalty that are given, by their names in ``Penalty``."""
+    """The given weights of the penalty, by their names in ``Penalty``."""
     stiffness = solver_of(estimator).stiffness
     given = {"agreement": estimator.agreement, "alpha": estimator.alpha, "stiffness": stiffness}
     weights = {key: float(weight) for key, weight in given.items() if not isinstance(weight, str)}
@@ -26,7 +26,7 @@ def given_weights(estimator):
 
 
 def structure_request(estimator, names, sample_weight=None):
-    """What training starts from, with all names of columns and families resolved."""
+    """The request that a start is found for, with all names of columns and families resolved."""
     partition = _partition(estimator, names, sample_weight)
     families = membership_families(estimator.mf, names)
     if isinstance(partition, str) and partition == "tree" and set(families) != {Gaussian}:
@@ -59,7 +59,7 @@ def structure_request(estimator, names, sample_weight=None):
 
 
 def _partition(estimator, names, sample_weight):
-    """``partition``, with the model in place of the estimator that holds it."""
+    """``partition``; for an estimator, the model that it holds."""
     given = estimator.partition
     if isinstance(given, type):
         raise ValueError(

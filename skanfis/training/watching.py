@@ -1,4 +1,4 @@
-"""What watches a training: rows held out, a line of text, scikit-learn's callbacks."""
+"""Watchers of a training: held-out rows, printed lines, scikit-learn's callbacks."""
 
 import sys
 import time
@@ -13,7 +13,7 @@ from ..options import EarlyStopping
 
 
 def watch_all(*watchers):
-    """Several watchers as one: every one sees every iteration, any one can end the run."""
+    """Several watchers as one: each sees every iteration, and any of them can end the run."""
     present = [watcher for watcher in watchers if watcher is not None]
 
     def watch(n_iter, evaluation):
@@ -24,13 +24,13 @@ def watch_all(*watchers):
 
 
 class Printer:
-    """Writes a line after every iteration to the standard output, as verbose does elsewhere."""
+    """Writes a line to the standard output after every iteration, for ``verbose``."""
 
     def __init__(self, name):
         self._name, self._start = name, time.perf_counter()
 
     def tell_start(self, start):
-        """Write what the structure and the weights are."""
+        """Write the structure and the weights of the start."""
         penalty, n_candidates = start.penalty, len(start.candidates)
         found = f"{n_candidates} candidates compared, " if n_candidates > 1 else ""
         self._write(
@@ -50,10 +50,10 @@ class Printer:
 
 
 class Callbacks:
-    """scikit-learn's callbacks: told of every iteration, and asked whether to go on.
+    """scikit-learn's callbacks: they see every iteration, and may end the run.
 
-    ``context`` is scikit-learn's of the fit, ``data`` are "X", "y" and "metadata", as the user gave
-    them.
+    ``context`` is scikit-learn's callback context of the fit. ``data`` holds "X", "y" and
+    "metadata", as the user gave them.
     """
 
     def __init__(self, estimator, context, data):
@@ -63,9 +63,9 @@ class Callbacks:
         self.context.call_on_fit_task_begin(**self.given)
 
     def iteration(self, make_model):
-        """Tell of an iteration that has just ended; whether a callback wants to stop.
+        """Tell the callbacks of an iteration; return whether one of them wants to stop.
 
-        ``make_model`` makes the model as it is then, if a callback asks for it.
+        ``make_model`` makes the current model, if a callback asks for it.
         """
         context = self.context.subcontext(task_name="iteration")
         context.call_on_fit_task_begin(**self.given)
@@ -81,15 +81,15 @@ class Callbacks:
 
 
 def hold_out(rows: StandardisedData, validation_fraction, seed):
-    """Indices to train on and to hold out, each in order: whole groups of the rows.
+    """Indices to train on and to hold out, each in order; groups are not split.
 
-    Where there are none, equal rows are a group: no row is on both sides, and a weight is as good
-    as so many repeats. ValueError where either part would have fewer than two rows.
+    Without groups, rows with equal inputs form one: so repeats are never on both sides, and a
+    weight acts like repeats. ValueError where either part would have fewer than two rows.
     """
     what = f"{rows.n_rows} rows"
     groups = rows.groups
     if groups is None:
-        # By the inputs alone, wherever their columns stand.
+        # By the inputs alone, in any order of columns.
         groups = rows.numbers(lambda Z, _: place_in_sample(Z, Z[:0]))
     else:
         what += f" in {np.unique(groups).size} groups"
@@ -111,7 +111,8 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
 class ValidationLoss:
     """Watches a run: the mean squared error of held-out rows after every iteration.
 
-    ``rows`` are these, on the training rows' scales; ``stopping`` says when the run ends.
+    ``rows`` are the held-out ones, on the scales of the training rows; ``stopping`` says when the
+    run ends.
     """
 
     def __init__(self, rows: StandardisedData, consequent_inputs, stopping: EarlyStopping):
@@ -134,7 +135,7 @@ class ValidationLoss:
 
     def restored(self, result):
         """The result with the parameters of the smallest held-out error."""
-        if not self.losses:  # the run was at its end before an iteration
+        if not self.losses:  # the run ended without an iteration
             self(0, result.evaluation)
         return result if self.best is None else replace(result, evaluation=self.best)
 
@@ -142,7 +143,7 @@ class ValidationLoss:
 def held_out_loss(rows: StandardisedData, consequent_inputs, evaluation):
     """Mean squared error of rows that were not trained on, standardised, summed over outputs.
 
-    Rows beyond the training rows' range count at its nearest point, whatever the policy.
+    Rows beyond the training range are moved to its nearest point, whatever the policy.
     """
     low, high = (edge[:, None] for edge in rows.inputs.box)
     coefficients = evaluation.coefficients
