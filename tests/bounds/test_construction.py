@@ -141,6 +141,38 @@ def test_slopes_that_are_none_stay_none_in_order(kind, rng):
         assert slopes.any() == (rules != every)
 
 
+@pytest.mark.theory
+@pytest.mark.parametrize("signs", [[1, 0], [-1, 1]], ids=str)
+@pytest.mark.parametrize("kind", ["tree", "grid", "scattered"])
+def test_margins_are_the_least_of_the_inequality_on_the_box(kind, signs, rng):
+    """At the corners of the other input, and at 20,001 places of the one that is told."""
+    low, high = np.full(2, -1.5), np.full(2, 1.5)
+    n_pairs = 0
+    for _ in range(10):
+        antecedent = KINDS[kind](rng, 2)
+        if kind != "tree":
+            antecedent = with_equal_widths(antecedent, range(2))
+        order = RuleOrder.of(antecedent, np.array(signs), FREE, np.arange(2), ORIGIN)
+        rules = rng.normal(size=(antecedent.n_rules, 3))
+        told = 1 + np.flatnonzero(signs)
+        rules[:, told] = np.abs(rules[:, told]) * np.array(signs)[told - 1]
+        margins = order.margins(rules, low, high)[0]
+        for k, margin in enumerate(margins):
+            above, below, j, middle, width, own, curved, _ = (part[k] for part in order.pairs)
+            x, least = np.linspace(low[0], high[0], 20_001), np.inf
+            u = (x - middle) / width
+            slopes = (own + curved * np.exp(u)) * rules[above, j]
+            slopes += (own + curved * np.exp(-u)) * rules[below, j]
+            for end in (low[0], high[0]):
+                place = np.column_stack([x, np.full(x.size, end)][:: 1 if j == 1 else -1])
+                values = place @ (rules[above, 1:] - rules[below, 1:])
+                values += rules[above, 0] - rules[below, 0] + width * slopes
+                least = min(least, values.min())
+            assert margin == pytest.approx(least, rel=1e-5, abs=1e-5)
+        n_pairs += margins.size
+    assert n_pairs > 20
+
+
 def test_the_least_change_that_is_in_order(rng):
     """Against a general solver, which has what every pair adds to the slope at many points."""
     antecedent = with_equal_widths(grid(rng, 2), [0])
