@@ -200,7 +200,7 @@ def _of_version_1(document):
 
 
 def _inputs(inputs):
-    """What the model has of every input."""
+    """The model's arrays and names of the inputs."""
     found = _columns(inputs, INPUT, "inputs")
     names, arrays = tuple(found.pop("name")), {key: np.array(own) for key, own in found.items()}
     low, high, at = arrays["minimum"], arrays["maximum"], arrays.pop("tangent_at")
@@ -212,7 +212,7 @@ def _inputs(inputs):
 
 
 def _outputs(outputs):
-    """Names of the outputs, and the range of the target, which is known of all or of none."""
+    """Names of the outputs, and the range of the target, known for all outputs or none."""
     found = _columns(outputs, OUTPUT, "outputs")
     names = tuple(found.pop("name"))
     values = [value for column in found.values() for value in column]

@@ -34,8 +34,8 @@ _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
 # Steps of 20 times the usual one are not noise; if they are not rare, they are not glitches.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LEAST_CORRELATION = 0.9  # of output and rate
-# An output is saturated where it has its largest or smallest value in so many rows or more, at
-# rates that differ by more than this part of their range.
+# An output is saturated if at least this many rows have its largest or smallest value, at rates
+# that differ by more than this part of their range.
 _FEWEST_SATURATED, _SATURATED = 3, 0.02
 # Placeholder in messages: if a file was read, ``LogFile.located`` puts in the column's name.
 RATE_COLUMN = "column of the rate"

@@ -20,7 +20,7 @@ from .targets.error_model import ErrorModel
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
-# What a log cannot show, and what it has too few of and should have: in general; for one cycle.
+# What a log cannot show, and what it has too few of: rates or temperatures; thermal cycles.
 _FEW = "So few rates or temperatures cannot tell what is left at others", "few: log five or more"
 _CYCLE = "One cycle cannot tell whether this repeats", "cycle: record two more"
 _DIGITS = 4  # of the noise: to these, numbers are exact enough for the text to err as the rules do
@@ -159,7 +159,7 @@ def of_rates(compensator, log, rates):
 
 
 def written_text(calibration):
-    """What is written, and whether that is what is recommended."""
+    """Which compensation is written, and whether it is the recommended one."""
     asked = calibration.recipe.write != "recommended"
     others = "as --write asks" if asked else "as recommended; --write chooses another"
     return f"{ARTICLES.get(calibration.written, 'the fuzzy rules')}, {others}"
@@ -258,7 +258,7 @@ def _term(value, factor=""):
 
 
 def _line(what, estimator, inputs):
-    """What a single rule gives: a constant or a line."""
+    """The output of a single rule as text: a constant or a line."""
     model = FrozenRules.of(estimator, len(inputs)).model
     constant, *slopes = model.coefficients.ravel()
     lines = [f"{what} = {constant:.9g}"]

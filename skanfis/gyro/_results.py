@@ -126,7 +126,7 @@ class Results:
         self.symbol = signs(self.unit)
 
     def shown(self, error):
-        """An error [deg/s] in the unit for errors, without it; a dash where it is not known."""
+        """An error [deg/s] as a number in the unit for errors; a dash if it is not known."""
         return three_digits(RATE_UNITS[self.unit] * error)
 
     @cached_property

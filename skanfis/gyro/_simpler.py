@@ -114,7 +114,7 @@ def make_law(inputs, degree, outside):
     return OpenLoopArcsineRegressor(
         "output",
         "temperature" if "temperature" in inputs else None,
-        # The lag of the thermometer is part of the law where it can be known.
+        # The thermometer lag is part of the law if the inputs allow to fit it.
         temperature_rate="temperature_rate" if knows_lag else None,
         amplitude_degree=degree,
         bias_degree=degree,

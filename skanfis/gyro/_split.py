@@ -28,7 +28,7 @@ _FEW_ROWS = 0.1
 
 KINDS = ("auto", "device", "run", "level", "device+level", "run+level", "leg", "piece")
 
-# Fewest groups. Of two legs each way, one can be held out while the other shows its direction.
+# Fewest groups of a kind. Of two legs each way, one is held out, and the other shows its direction.
 _FEWEST = {"device": 3, "run": 3, "level": 5, "leg": 4, "piece": 2}
 # As in scikit-learn's cross-validation: each fold trains on four fifths.
 _N_FOLDS = 5
@@ -42,7 +42,7 @@ _SHARED = 0.1
 _ROWS_PER_LEVEL = 3
 # Widest gap between temperatures, relative to their range: three soaks leave gaps of a half.
 _WIDEST_GAP = 0.4
-# At a turning point the temperature comes back by this share of its range, and this much [degC].
+# From a turning point the temperature comes back by at least this share of its range, and [degC].
 _TURN, _SMALLEST_TURN = 0.2, 3.0
 # Rows of each run among which turning points are searched.
 _MOST_POINTS = 5_000

@@ -350,15 +350,15 @@ def _known_answers(whole):
         output = law.columns_[0]
         X[3::4, output] = 3.0 * law.amplitude_[0] * (points[3::4, output] - 0.5)
     X = np.vstack([low, high, X]).astype(whole.dtype).astype(float)
-    # NaN past the amplitude.
+    # The phase is NaN where the output exceeds the amplitude.
     phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (phase_of(law, X), law.max_phase)
     phase, coverage = np.abs(phase), rules.coverage(X)
-    # Where no coverage is asked for, every row has enough.
+    # Without a least coverage, every row is covered.
     asked = -1.0 if part.min_coverage is None else part.min_coverage
     sure = ~(np.abs(phase - limit) < 1e-3) & (np.abs(coverage - asked) > 1e-3 * asked)
     chosen = np.flatnonzero(sure)[:ROWS]
     X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= limit)[chosen]
-    # The status tells, row by row.
+    # The status replaces the warning, row by row.
     with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
         of_law = law.predict(X)
     model, z = rules.model.with_out_of_bounds(_said(rules.model)), X[:, rules.positions]

@@ -36,7 +36,7 @@ INCOMPLETE = 5  # a target was refused; all else is written
 NOT_KEPT = 6  # all is written; a limit is not kept, or not measured
 INTERRUPTED = 130  # a shell's code for Ctrl-C
 
-# What a calibration may write.
+# All files that a calibration may write.
 _FILES = (
     *("compensator.json", "compensator.h", "compensator.c", "report.html", "report.pdf"),
     *("rules.txt", *chain.from_iterable(FILES.values())),
@@ -327,7 +327,7 @@ def _staged(folder, replaced=()):
     """A temporary folder to write to; at the end all its files are moved to ``folder``.
 
     Other files in ``folder`` with a name in ``replaced`` are from an earlier run, and are removed
-    then. If this fails, or an error comes before, no new file or folder is left behind.
+    then. An error before the move leaves no new file or folder behind.
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:

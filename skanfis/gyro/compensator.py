@@ -1,4 +1,4 @@
-"""GyroCompensator: a fitted estimator, and all that it takes to apply it to a log."""
+"""GyroCompensator: a fitted estimator with all that is needed to apply it to a log; its file."""
 
 import json
 import warnings
@@ -24,15 +24,15 @@ from .thermal_rate import ThermalRate
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
-# Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
+# Entries of a law in the file: lists of coefficients; numbers; lists with a number per column.
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
 _NUMBERS = ("thermometer_lag", "reference_temperature")
 _RANGE = ("minimum", "maximum")
 _OF_POLYNOMIAL = ("center", "scale", "coefficients")
 _PARAMETERS = ("max_phase", "out_of_bounds")
-# As of a model alone: see skanfis.export.model_json.
+# The limit for a model alone, too: see skanfis.export.model_json.
 _MOST_BYTES = 2**24
-# It is shown in tables and on axes.
+# The name of a unit is shown in tables and on axes.
 _LONGEST_UNIT = 40
 
 

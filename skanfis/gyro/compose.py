@@ -131,7 +131,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         return np.minimum.reduce(self._answers("coverage", X))
 
     def _answers(self, method, X):
-        """What the parts that have ``method`` answer."""
+        """The results of ``method`` from the parts that have it."""
         check_is_fitted(self)
         parts = [self.base_, self.residual_]
         able = [part for part in parts if hasattr(final_step(part)[0], method)]
@@ -150,7 +150,7 @@ class FrozenRules:
     positions: np.ndarray
 
     def predict(self, X):
-        """What the rules give."""
+        """The output of the rules."""
         return self.model.predict(self._rows(X))[:, 0]
 
     def in_bounds(self, X):
@@ -210,7 +210,7 @@ class Polynomial:
     n_features_in_ = property(lambda self: self.center.size)
 
     def predict(self, X):
-        """What the polynomial gives."""
+        """The value of the polynomial."""
         z = np.clip(np.asarray(X, dtype=float), self.minimum_, self.maximum_) - self.center
         terms = np.tile(self.coefficients, (len(z), 1))
         for column, powers in zip((z / self.scale).T, self.powers.T, strict=True):

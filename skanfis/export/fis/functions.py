@@ -145,8 +145,8 @@ _TO_FILE: dict[str, tuple[str, Callable]] = {
     "sigmoid_falling": ("sigmf", lambda cut, width: [-1.0 / width, cut]),
     **{one.name: ("psigmf", _product_to_file(*signs)) for signs, one in PRODUCTS.items()},
 }
-# By function: its family, the number of its parameters, and what turns them into the family's. The
-# signs of the slopes tell which family of sigmoids it is.
+# By function: its family, the number of its parameters, and their conversion to the family's. For
+# sigmoids the signs of the slopes decide the family.
 _FROM_FILE: dict[str, tuple[str, int, Callable]] = {
     "gaussmf": ("gaussian", 2, lambda width, c: [c, abs(width)]),
     "gbellmf": ("bell", 3, lambda width, slope, c: [c, abs(width), slope]),
