@@ -15,7 +15,7 @@ def __dir__():
 
 
 def __getattr__(name):
-    # Libraries load when the estimator is asked for: a command can see to Ctrl-C before.
+    # Imported on demand: libraries load slowly, and a command must handle Ctrl-C before that.
     if name == "ANFISRegressor":
         from .regressor import ANFISRegressor
 

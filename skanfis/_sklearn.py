@@ -1,7 +1,7 @@
-"""The one door to private or version-dependent scikit-learn.
+"""The only module that imports private or version-dependent names of scikit-learn.
 
-Every name here exists at the oldest and the newest supported version; what moves between versions
-is mended here and nowhere else.
+Every name here exists at the oldest and the newest supported version. Differences between versions
+are handled here and nowhere else.
 """
 
 from collections.abc import Callable
@@ -43,10 +43,10 @@ _Method = TypeVar("_Method", bound=Callable)
 
 
 def fit_context(*, prefer_skip_nested_validation: bool) -> Callable[[_Method], _Method]:
-    """scikit-learn's frame around ``fit``; type checkers see the method as it is written."""
+    """scikit-learn's decorator of ``fit``, typed so that checkers keep the method's signature."""
     return _fit_context(prefer_skip_nested_validation=prefer_skip_nested_validation)
 
 
 def check_parameters(estimator):
-    """Raise ValueError where a parameter is not what ``_parameter_constraints`` allow."""
+    """Raise ValueError if a parameter violates ``_parameter_constraints``."""
     estimator._validate_params()

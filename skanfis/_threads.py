@@ -1,4 +1,4 @@
-"""Threads: work is shared out by ``n_jobs``; BLAS, whose sums depend on its threads, has one."""
+"""Worker threads for ``n_jobs``; BLAS gets one thread, as its sums depend on their number."""
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -8,17 +8,17 @@ from threading import Lock
 from joblib import Parallel, delayed, effective_n_jobs
 from threadpoolctl import ThreadpoolController
 
-# The process's thread pools; looking for them takes as long as a small fit.
+# The process's thread pools, kept because finding them takes as long as a small fit.
 _thread_pools = lru_cache(maxsize=1)(ThreadpoolController)
-# BLAS has one number of threads for the whole process: fits in several threads give it back in
-# reverse order, whichever ends first. Of OpenMP every thread has a number of its own.
+# BLAS has one thread limit for the whole process. Fits in several threads restore it in reverse
+# order, whichever ends first: the last restores the original. OpenMP has a limit per thread.
 _BLAS_LIMITS: list = []
 _LOCK = Lock()
 
 
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """One thread of the numerical libraries; at the end of the last fit as many as before."""
+    """Hold numerical libraries to one thread; the last fit to end restores the number before."""
     blas, openmp = (_thread_pools().select(user_api=api) for api in ("blas", "openmp"))
     with _LOCK:
         _BLAS_LIMITS.append(blas.limit(limits=1))

@@ -1,4 +1,4 @@
-"""Checks on data that scikit-learn's own do not make, or not with the column's name."""
+"""Checks of data and parameters, beside scikit-learn's own; their messages name the column."""
 
 import warnings
 from collections import Counter
@@ -13,8 +13,8 @@ from sklearn.utils import check_array
 
 from .blocks import LARGE_BLOCK_ROWS, row_blocks
 
-# Largest exponent of two of weights that are left as they are: products of two, summed over as many
-# rows as there can be, stay below 2^1023.
+# Weights are rescaled only beyond this exponent of two: below it, sums of products of two weights
+# stay below 2^1023, for any possible number of rows.
 _LARGEST_EXPONENT = 400
 _SECONDS = "Give the time since some moment, such as the power-on, as a number of seconds."
 _IMPUTE = "Drop these rows, or impute them in a Pipeline before (sklearn.impute)."
@@ -22,7 +22,7 @@ _IMPUTE = "Drop these rows, or impute them in a Pipeline before (sklearn.impute)
 
 @contextmanager
 def unchanged_by_failure(estimator):
-    """Leave an estimator as it was, and able to predict, where learning fails or is interrupted."""
+    """Restore an estimator to its state before, if learning fails or is interrupted."""
     before = estimator.__dict__.copy()
     try:
         yield
@@ -33,10 +33,10 @@ def unchanged_by_failure(estimator):
 
 @contextmanager
 def named_refusals(*, takes_categories=False, **tables):
-    """Let scikit-learn check tables, given by their roles: X=..., y=...
+    """Let scikit-learn check tables, given by their roles X=..., y=..., but name what is wrong.
 
-    Text, times, sparse or lazy frames, masked values and two columns of one name are refused by the
-    column's name; in X categories that are numbers, too.
+    Text, times, sparse or lazy frames, masked values and duplicate column names are refused with
+    the column's name; in X numeric categories, too.
     """
     refuse_lazy(**tables)
     for what, table in tables.items():
@@ -50,7 +50,7 @@ def named_refusals(*, takes_categories=False, **tables):
 
 
 def refuse_lazy(**tables):
-    """Raise TypeError where one of the tables, given by their roles, has no values yet."""
+    """Raise TypeError if one of the tables, given by their roles, is lazy: it has no values yet."""
     for what, table in tables.items():
         if type(table).__name__ == "LazyFrame":
             raise TypeError(
@@ -64,7 +64,7 @@ def refuse_lazy(**tables):
 
 
 def as_numbers(table, what="X", *, takes_categories=True, floats="d"):
-    """A table as floats, NaN where values are missing; what else it holds is refused by name."""
+    """Return a table as floats, missing values as NaN; other entries are refused by column."""
     if type(table) is np.ndarray and table.dtype in list(floats) and table.ndim < 3:
         return table
     any_form = {"ensure_all_finite": False, "ensure_2d": False, "ensure_min_samples": 0}
@@ -73,9 +73,9 @@ def as_numbers(table, what="X", *, takes_categories=True, floats="d"):
 
 
 def rows_by_name(X, names):
-    """Rows as an array: the columns of a table by their names; ValueError where it lacks any.
+    """Return the named columns of a table as an array; ValueError if one is missing.
 
-    Columns of which none has a name that is a str are taken in their order.
+    If no column has a str as its name, all are taken in their order.
     """
     refuse_lazy(X=X)
     is_named = any(isinstance(name, str) for name in getattr(X, "columns", ()))
@@ -89,7 +89,7 @@ def rows_by_name(X, names):
 
 
 def _check_kind(table, what, takes_categories):
-    """Raise where a table is sparse or masked, or a column shares its name or holds times."""
+    """Refuse sparse or masked tables, duplicate column names, times, and numeric categories."""
     is_frame = hasattr(table, "columns") and hasattr(table, "dtypes")
     names = list(table.columns) if is_frame else [getattr(table, "name", None)]
     dtypes = list(table.dtypes) if is_frame else [getattr(table, "dtype", None)]
@@ -121,7 +121,7 @@ def _check_kind(table, what, takes_categories):
                 f"a ColumnTransformer, or take its numbers, X[{name!r}].astype(float)."
             )
         dtype = dtype if categories is None else categories
-        # Of polars, of NumPy and pandas, a period of pandas.
+        # In this order: times of polars, times of NumPy and pandas, periods of pandas.
         is_temporal = getattr(dtype, "is_temporal", lambda: False)()
         if is_temporal or getattr(dtype, "kind", "") in ("m", "M") or hasattr(dtype, "freq"):
             column = "" if name is None else f" in column {name!r}"
@@ -129,7 +129,7 @@ def _check_kind(table, what, takes_categories):
 
 
 def _name_what_is_no_number(table, what, error):
-    """Raise ``error`` again by the first column and row of the table that float() refuses."""
+    """Raise ``error`` again, naming the first column and row that float() refuses, if any."""
     found = [(name, *place) for name, column in _columns(table) for place in _refused(column)]
     if not found:
         return
@@ -155,12 +155,12 @@ def _name_what_is_no_number(table, what, error):
 
 
 def _refused(column):
-    """Row and value of the first entry that is no number, and why, if there is one."""
+    """Yield row, value and error of the first entry that is no number, if there is one."""
     if getattr(getattr(column, "dtype", None), "kind", "O") in "biufc":
         return
     for row, value in enumerate(column):
         try:
-            # Complex numbers are scikit-learn's to refuse.
+            # scikit-learn refuses complex numbers itself.
             float(np.nan if value is None or isinstance(value, complex) else value)
         except (TypeError, ValueError, OverflowError) as refusal:
             yield row, value, refusal
@@ -168,7 +168,7 @@ def _refused(column):
 
 
 def _columns(table):
-    """Names and columns of a frame or array that may hold anything; of one dimension no name."""
+    """Names and columns of a frame or array of any content; a plain vector has the name None."""
     if hasattr(table, "columns"):
         return [(name, table[name]) for name in table.columns]
     try:
@@ -181,7 +181,7 @@ def _columns(table):
 
 
 def group_numbers(groups, n_rows):
-    """The groups of rows as numbers; ValueError where one is missing, or they are of two kinds."""
+    """The rows' groups as numbers; ValueError if one is missing, or text and numbers are mixed."""
     if np.ma.is_masked(groups):
         groups = np.where(np.ma.getmaskarray(groups), None, groups)
     groups = np.asarray(groups, dtype=object) if isinstance(groups, list) else np.asarray(groups)
@@ -221,10 +221,10 @@ def is_missing(label):
 
 
 def check_finite(values, what, names):
-    """Raise ValueError that names the column where ``values`` (n_rows, n_columns) is not finite.
+    """Raise ValueError, with the column's name, if ``values`` (n_rows, n_columns) are not finite.
 
-    The sum tells in one pass, without a temporary array; only where it is not finite, a second
-    pass looks for the place. ``sklearn.config_context(assume_finite=True)`` switches it off.
+    A finite sum proves all values finite in one pass, without a temporary array. Only otherwise a
+    second pass finds the place. ``sklearn.config_context(assume_finite=True)`` skips the check.
     """
     if get_config()["assume_finite"]:
         return
@@ -247,9 +247,9 @@ def check_finite(values, what, names):
 
 
 def feature_indices(given, names, parameter):
-    """Columns that a parameter names, in order: all of None, or by name, position or mask.
+    """Sorted positions of the columns given by name, position or mask; None is all columns.
 
-    ValueError where it names none, one twice, or one that is not there.
+    ValueError if no column is given, one is given twice, or one does not exist.
     """
     if given is None:
         return np.arange(len(names))
@@ -283,7 +283,7 @@ def feature_indices(given, names, parameter):
 
 
 def position_of(entry, names):
-    """Position of what is given by its name or position, the last from -1 on; None if none is."""
+    """Position of an entry given by name or position, -1 for the last; None if there is none."""
     if isinstance(entry, str) and entry in names:
         return list(names).index(entry)
     if isinstance(entry, Integral) and -len(names) <= int(entry) < len(names):
@@ -292,7 +292,7 @@ def position_of(entry, names):
 
 
 def checked_position(feature, names, what="input"):
-    """Position of an input or output that is given by name or position; ValueError for none."""
+    """Position of an input or output given by name or position; ValueError if there is none."""
     found = position_of(feature, names)
     if found is None:
         raise ValueError(
@@ -313,9 +313,9 @@ def check_not_negative(sample_weight):
 
 
 def positive_weights(sample_weight, n_rows, least=2):
-    """Which rows have weight: a mask, or None where all have.
+    """Mask of the rows with positive weight, or None if all rows have it.
 
-    ValueError where a weight is negative, or where fewer than ``least`` rows are left.
+    ValueError if a weight is negative, or if fewer than ``least`` rows are left.
     """
     check_not_negative(sample_weight)
     keep = sample_weight > 0
@@ -329,7 +329,7 @@ def positive_weights(sample_weight, n_rows, least=2):
 
 
 def bearable_weights(sample_weight):
-    """The weights, scaled by a power of two where sums would overflow or lose digits."""
+    """The weights, scaled by a power of two if sums would overflow or lose digits."""
     exponent = int(np.frexp(np.max(sample_weight, initial=0.0))[1])
     return (
         np.ldexp(sample_weight, -exponent) if abs(exponent) > _LARGEST_EXPONENT else sample_weight
@@ -337,7 +337,7 @@ def bearable_weights(sample_weight):
 
 
 def warn_user(message, category):
-    """Warn at the line two calls up: that which called what calls this."""
+    """Warn at the line that called the caller of this function."""
     warnings.warn(message, category, stacklevel=3)
 
 

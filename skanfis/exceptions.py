@@ -1,4 +1,4 @@
-"""Warnings of skanfis, and one error; others are ValueError, TypeError and NotFittedError.
+"""Warnings of skanfis and one error; other errors are ValueError, TypeError, NotFittedError.
 
 To silence one, or to make it an error, name it in a filter of :mod:`warnings`:
 
@@ -25,30 +25,30 @@ class ConstantInputWarning(UserWarning):
 
 
 class ConstraintWarning(UserWarning):
-    """The data contradict what ``fit`` was constrained to, by more than noise explains.
+    """The data contradict the constraints of ``fit`` by more than noise explains.
 
     Look at the data, or at the sign of the constraint.
     """
 
 
 class ForgottenRowsWarning(UserWarning):
-    """``partial_fit`` follows ``fit``, whose rows do not count any more.
+    """``partial_fit`` was called after ``fit``: the rows of ``fit`` no longer count.
 
     Give all rows that count to ``partial_fit``.
     """
 
 
 class InfeasibleConstraintsError(ValueError):
-    """No consequents of a rule base keep all that ``fit`` was constrained to.
+    """No consequents of the rule base satisfy all constraints of ``fit``.
 
-    The message names what cannot be kept.
+    The message names the constraints that cannot be met.
     """
 
 
 class OutOfBoundsWarning(UserWarning):
     """Rows to predict lie outside the range of the training data, input by input.
 
-    From ``predict`` and ``score`` with ``out_of_bounds="linear"``; ``in_bounds(X)`` tells the rows.
+    ``predict`` and ``score`` warn with ``out_of_bounds="linear"``; ``in_bounds(X)`` tells the rows.
     """
 
 

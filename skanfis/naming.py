@@ -1,8 +1,8 @@
-r"""What terms are called: linguistic names for a grid, places for rules with terms of their own.
+r"""Names of terms: words such as "low" on a grid, places such as "near 21 ± 4" in other rules.
 
-A Gaussian term at c of width h is "near c ± h". A side of a cut at c over a width h is
-"> c ± h log 9": so far from the cut it is 0.9 true. A cut between the only two values of an input
-needs no width: its side is "> c", or the value itself where they are 0 and 1.
+A Gaussian term with center c and width h is "near c ± h". One side of a cut at c with width h is
+"> c ± h log 9": at this distance from the cut its membership is 0.9. A cut between the only two
+values of an input needs no width: its side is "> c", or the value itself if these are 0 and 1.
 """
 
 from collections import Counter
@@ -14,7 +14,7 @@ from .antecedent.tree import CRISP
 from .digits import in_digits, plain, rounded, told_apart
 from .membership import Gaussian, SigmoidFalling, SigmoidRising
 
-# Six as in the founding paper, negative large to positive large; seven with zero between them.
+# Six names as in the founding paper, negative large to positive large; seven add zero.
 LINGUISTIC = {
     1: ("any",),
     2: ("low", "high"),
@@ -25,24 +25,24 @@ LINGUISTIC = {
     7: ("NL", "NM", "NS", "ZE", "PS", "PM", "PL"),
 }
 
-# Families whose terms are called by place and length: what stands before the place, and the length
-# in widths of the term: so far from its place a side of a cut is 0.9 true.
+# Families whose terms are named by place and length: the text before the place, and the length in
+# widths of the term. At log 9 widths from its place, a side of a cut has the membership 0.9.
 WRITTEN = {
     SigmoidRising: ("> ", np.log(9.0)),
     SigmoidFalling: ("< ", np.log(9.0)),
     Gaussian: ("near ", 1.0),
 }
-# Digits of the length that are written, and most of them if terms would have one name otherwise.
+# Digits written of a length, and the most of them where terms would otherwise share a name.
 _DIGITS_OF_LENGTH, _MOST_DIGITS_OF_LENGTH = 2, 9
-# Relative to the range: rounding of a cut between two values; places that are nearer are the same.
+# Relative to the range: rounding error of a cut between two values; distance of equal places.
 _ROUNDING, _ALIKE = 1e-6, 1e-9
 
 
 def default_term_names(model, digits=_DIGITS_OF_LENGTH):
-    """Names of all terms: of a grid by their order, or "0" and "1" where an input is no more.
+    """Names of all terms: on a grid by their order, or "0" and "1" of an input with only these.
 
-    Of other rules "> 6.8 ± 0.3" and "near 21.3 ± 4.2", to so many digits of the length, or, of
-    families without one, "near 21.3". Terms of an input that differ have different names.
+    Other rules have "> 6.8 ± 0.3" and "near 21.3 ± 4.2", with ``digits`` digits of the length, or
+    "near 21.3" for families without a length. Different terms of an input have different names.
     """
     antecedent, minimum, maximum = model.antecedent, model.minimum, model.maximum
     inputs, places = antecedent.term_inputs, antecedent.term_places
@@ -67,22 +67,22 @@ def default_term_names(model, digits=_DIGITS_OF_LENGTH):
 
 
 def is_crisp(cut, width, low, high):
-    """Whether a cut stands half-way between the ends of a range, too narrow to blur either."""
+    """Whether a cut stands half-way between the ends of a range, too narrow to blur an end."""
     size = high - low
     is_between = abs(2.0 * cut - low - high) <= _ROUNDING * size
     return is_between & (2.0 * CRISP * width <= (1.0 + _ROUNDING) * size)
 
 
 def _written(group, own, low, high, fewest):
-    """Names of terms of one input and family, with the digits of the place that the length needs.
+    """Names of terms of one input and family; the length decides the digits of the place.
 
-    Terms that would look the same have more digits; equal ones, of different rules, have one name.
+    Terms that would look alike get more digits. Equal terms of different rules share a name.
     """
     sign, per_width = WRITTEN[group.family]
     places, log_widths = group.theta[:, own]
     widths = np.exp(log_widths)
     alone = (group.family is not Gaussian) & is_crisp(places, widths, low, high)
-    # Between two values it is the middle, whatever rounding has left of that.
+    # A cut between two values stands in their exact middle: undo its rounding.
     places = np.where(alone, 0.5 * (low + high), places)
     lengths = np.where(alone, 0.5 * (high - low), widths * per_width)
     terms = list(zip(places, lengths, alone, strict=True))
@@ -92,7 +92,7 @@ def _written(group, own, low, high, fewest):
         written = {}
         for place, length, is_alone in terms:
             at = rounded(place, length, digits)
-            # A cut between rows is not said to be beyond them all.
+            # Rounding must not move a cut between rows to where it is beyond all rows.
             if per_width > 1.0 and low < place < high and not low < at < high and digits < most:
                 continue
             text = sign + plain(at)
@@ -111,7 +111,7 @@ def _written(group, own, low, high, fewest):
 
 
 def parameters_written(name, family, theta):
-    """Place and log width that the name of a term says; ``theta`` where it does not."""
+    """Place and log width as the name of a term states them; ``theta`` for those not stated."""
     _, *numbers = name.replace("±", "").split()
     if not numbers:
         return theta
@@ -126,7 +126,7 @@ def default_output_names(n_outputs):
 
 
 def given_term_names(model, names):
-    """The user's names, one per term, of every input or by input; ValueError if they do not fit."""
+    """Names of all terms, given for every input or by input; ValueError if they do not fit."""
     antecedent, input_names = model.antecedent, model.input_names
     found = list(default_term_names(model))
     if isinstance(names, Mapping):
@@ -165,7 +165,7 @@ def _near(places, size):
 
 
 def distinct(names, numbered="{} ({})"):
-    """The names, all different: a number is added to one that is taken."""
+    """Make all names different: a name that is taken gets a number."""
     taken: dict[str, int] = {}
     found = []
     for name in names:

@@ -1,6 +1,6 @@
-"""Options of ANFISRegressor that have settings of their own: each with a word for its defaults.
+"""Options of ANFISRegressor with settings of their own: a loss, early stopping, extrapolation.
 
-They are scikit-learn objects: ``clone`` copies them, and a search reaches into them, as in
+They are scikit-learn objects: ``clone`` copies them, and a grid search can vary their settings:
 ``GridSearchCV(ANFISRegressor(loss=Huber()), {"loss__epsilon": [1.1, 1.35, 2.0]})``.
 """
 
@@ -18,14 +18,14 @@ __all__ = ["EarlyStopping", "Huber", "LinearExtrapolation"]
 class Huber(BaseEstimator):
     """Huber's loss (1964): rows far from the model count by their residual, not by its square.
 
-    Where more than half of a target is one value without noise, such as zero, all other rows are
-    taken for outliers, as by any scale that is a median: such targets take squares.
+    If more than half of the targets are one value without noise, such as zero, all other rows count
+    as outliers, because the robust scale is a median. Use squared errors for such targets.
 
     Parameters
     ----------
     epsilon : float, default=1.35
-        Where the loss turns, in robust standard deviations of the residual; 0.1 or more. The
-        smaller, the more robust; 1.35 loses 5 % of the efficiency where there are no outliers.
+        Residual from which the loss is linear, in robust standard deviations; 0.1 or more. Smaller
+        is more robust; 1.35 loses 5 % of the efficiency if there are no outliers.
 
     Examples
     --------
@@ -46,17 +46,17 @@ class Huber(BaseEstimator):
 
 
 class EarlyStopping(BaseEstimator):
-    """Rows held out, the error on them followed, the parameters of its minimum kept.
+    """Hold out rows, follow the error on them, and keep the parameters at its minimum.
 
     Parameters
     ----------
     validation_fraction : float, default=0.1
-        Part of the rows, or of the groups, that is held out; between 0 and 1.
+        Fraction of the rows, or of the groups, that is held out; between 0 and 1.
     n_iter_no_change : int, default=10
-        Training ends after so many iterations in which the error on the rows held out has not
-        fallen by ``tol``; 1 or more.
+        Training ends after this many iterations in a row in which the held-out error has not fallen
+        by ``tol``; 1 or more.
     tol : float, default=1e-3
-        The relative fall that counts as one; zero or positive.
+        Smallest relative fall of the error that counts; zero or positive.
 
     Examples
     --------
@@ -84,15 +84,15 @@ class EarlyStopping(BaseEstimator):
 
 
 class LinearExtrapolation(BaseEstimator):
-    """Beyond the training data the tangent at their edge, so far and no further.
+    """Follow the tangent at the edge beyond the training data, for a limited distance.
 
     Parameters
     ----------
     max_extrapolation : float or "auto", default="auto"
         How far the tangent is followed beyond the range of an input, in standard deviations of that
         input; the value reached is held. 0 is "clip"; ``math.inf`` is the tangent without end.
-        "auto": so many of them as the target's deviation is times that of the noise, a hundred at
-        most; half a one where the noise is not known. See :doc:`/mathematics`.
+        "auto": the target's standard deviation divided by that of the noise, at most 100; 0.5 if
+        the noise is not known. See :doc:`/mathematics`.
 
     Examples
     --------
@@ -112,7 +112,7 @@ class LinearExtrapolation(BaseEstimator):
 
 
 def policy_of(out_of_bounds: "str | LinearExtrapolation") -> tuple[str, float | str]:
-    """``out_of_bounds`` and ``max_extrapolation`` of a model, for the parameter of that name."""
+    """A model's ``out_of_bounds`` and ``max_extrapolation``, from the estimator's parameter."""
     if isinstance(out_of_bounds, LinearExtrapolation):
         return "linear", out_of_bounds.max_extrapolation
     return out_of_bounds, "auto"

@@ -1,4 +1,4 @@
-"""ANFISRegressor: the estimator."""
+"""ANFISRegressor, the scikit-learn estimator: parameters, fit, predict, learning from chunks."""
 
 import warnings
 from collections.abc import Mapping, Sequence
@@ -41,7 +41,7 @@ from .training.chunks import RowSums, fitted_weights, inputs_with_slopes, solve
 from .training.data import NUMERIC, Fitted
 from .training.settings import given_weights, solver_of, structure_request
 
-# Parameters that are words or objects with settings: such an object.
+# Parameters that take a word or an object with settings: the class of such an object.
 _OBJECTS: dict[str, type] = {
     "partition": KMeans,
     "solver": VariableProjection,
@@ -57,13 +57,13 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     A first-order Takagi-Sugeno-Kang model [1]_: rules "IF temperature is low AND rate is high THEN
     y = p0 + p1 temperature + p2 rate", averaged with the strengths at which they fire. Memberships
     are trained; consequents are the solution of a linear least-squares problem at every step [2]_.
-    The fit does not depend on units, and everything that comes out is in the user's.
+    The fit does not depend on units, and all results are in the user's units.
 
     Parameters
     ----------
     n_mfs : "auto", int, or array-like of shape (n_features,), default="auto"
-        Number of membership functions (terms) per input: a grid, with a rule for every combination
-        of terms; 1 leaves the input to the consequents alone. "auto" leaves it to ``partition``.
+        Number of membership functions (terms) per input. Numbers make a grid: a rule for every
+        combination of terms, and an input with 1 in the consequents alone. "auto": ``partition``.
     partition : {"auto", "grid", "tree", "scattered"}, clusterer or model, default="auto"
         Where the rules come from, if ``n_mfs`` is "auto". "grid": grids that grow term by term;
         "tree": cuts of the inputs, one after the other (:doc:`/trees`); "scattered": rules with
@@ -72,14 +72,14 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ``model_``: training starts from its rules; with ``solver="lse"`` only the consequents are
         learnt, with ``max_iter=0`` nothing is.
     simplicity : float, default=0.05
-        Part of the error, from 0 to 1, that is given up for a model that is read sooner; of weak
-        signals at most ``(1 + simplicity)**2 - 1`` of the variance explained. Of candidates within,
-        the one of the smallest reading cost is taken; half of what is left goes into ``agreement``.
-        Given rules lose slopes, and agree, by the same. 0: the best. R2 alone always picks 0 in
-        GridSearchCV (:doc:`/choosing`).
+        Relative increase of the error, from 0 to 1, accepted for a model that is quicker to read;
+        for weak signals at most ``(1 + simplicity)**2 - 1`` of the explained variance. Among the
+        candidates within this tolerance the one with the smallest reading cost is taken, and half
+        of the tolerance left is spent on ``agreement``. Given rules lose slopes, and agree, within
+        the same tolerance. 0: the best. GridSearchCV by R2 always picks 0 (:doc:`/choosing`).
     max_rules : int, default=None
-        Most rules that the search may take; None: as many as pay, where several have no more than
-        464 parameters, nor than there are distinct rows. ValueError where given rules are more.
+        Largest number of rules. None: as many as reduce the error, while several rules have at most
+        464 parameters, and no more than there are distinct rows. ValueError if more are given.
     mf : str, type of Membership, or sequence of these of shape (n_features,), default="gaussian"
         Family of the membership functions, for all inputs or one each: "gaussian", "bell",
         "triangular", "trapezoidal", "two_sided_gaussian", "pi_shaped", "s_shaped", "z_shaped",
@@ -87,19 +87,19 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ValueError with "tree".
     premise_features, consequent_features : array-like of str, int or bool, default=None
         Columns of X in the rules' IF parts, and in their THEN parts, by name, position or mask;
-        None is all; where rows are few, a search may find slopes by fewer of them.
+        None is all columns; with few rows, the search may give slopes to fewer of them.
     order : {0, 1}, default=1
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
     monotonic_cst : array-like of shape (n_features,) or dict, default=None
-        1 where the target does not fall as the feature rises, -1 where it does not rise, 0 where
-        nothing is known; or these by name or position; of several outputs a row for each. Certain
-        to hold in the range of the training data and beyond it (:mod:`skanfis.bounds`).
+        1: the target does not fall as the feature rises; -1: it does not rise; 0: nothing is known.
+        A dict gives these by name or position; several outputs take a row each. The order certainly
+        holds in the range of the training data and beyond it (:mod:`skanfis.bounds`).
     constraints : list of OutputLimits and FixedPoint, default=None
-        Limits of the output, which hold for every row, and values at points; in the units of X as
-        it comes here, behind any scaler. See :mod:`skanfis.bounds`.
+        Limits that the output keeps on every row, and values that it takes at given points. They
+        are in the units of the X given here, after any scaler. See :mod:`skanfis.bounds`.
     loss : {"squared_error", "huber"} or Huber, default="squared_error"
-        What is minimised. "huber", or :class:`~skanfis.options.Huber` with its ``epsilon``: rows
-        far from the model count by the size of their residual and not its square.
+        What is minimised. "huber", or :class:`~skanfis.options.Huber` with its ``epsilon``: large
+        residuals count by their size, not by their square.
     solver : {"varpro", "hybrid", "gradient", "lse"} or Solver, default="varpro"
         How the premises are learnt: :class:`~skanfis.learning.VariableProjection`, Gauss-Newton
         steps in a trust region; :class:`~skanfis.learning.Hybrid`, Jang's rule [1]_;
@@ -110,26 +110,26 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         target. 0 lets rules compensate one another, 1 makes every rule a model of its own rows.
         "auto": found by the evidence [3]_, and raised as far as ``simplicity`` leaves room.
     alpha : "auto" or float, default="auto"
-        Ridge penalty on the consequents, in standard deviations of inputs and target: on each
-        rule's departure from the rules' common line, and on the slopes of that line. Of a single
-        rule it is scikit-learn's ``Ridge``. "auto": found by the evidence [3]_.
+        Ridge penalty on the consequents of standardised inputs and target: on each rule's departure
+        from the rules' common line, and on the slopes of that line. With a single rule it is
+        scikit-learn's ``Ridge``. "auto": found by the evidence [3]_.
     max_iter : int, default=500
-        Most iterations (epochs). With 0, premises stay as they start.
+        Largest number of iterations (epochs). With 0 the premises stay as they start.
     early_stopping : bool or EarlyStopping, default=False
-        Whether to hold out rows, or whole ``groups``, and keep the parameters of the smallest error
-        on them; see :class:`~skanfis.options.EarlyStopping`.
+        Whether to hold out rows, or whole ``groups``, and keep the parameters with the smallest
+        error on them; see :class:`~skanfis.options.EarlyStopping`.
     out_of_bounds : {"linear", "clip", "nan", "raise"} or LinearExtrapolation, default="linear"
         What ``predict`` does with rows outside the range of the training data, input by input:
-        "linear" warns, and goes on along the tangent at the edge for a limited distance
+        "linear" warns, and follows the tangent at the edge for a limited distance
         (:class:`~skanfis.options.LinearExtrapolation`); "clip" holds the value at the edge; "nan"
         returns NaN; "raise" raises ValueError. It may be changed after training.
     verbose : bool, default=False
         Whether to write a line per iteration.
     random_state : int, RandomState instance or None, default=None
-        Seed of clusterings and of rows held out; None is one fixed seed: the same data give the
-        same model. Which rows judge the structure depends on their values alone.
+        Seed for clustering and for holding out rows. None is a fixed seed: the same data give the
+        same model. The rows that judge the structure depend on their values, not on the seed.
     n_jobs : int, default=None
-        Worker threads, -1 is one per core; the result is the same to the last bit for any number.
+        Number of worker threads; -1: one per core. The result is the same to the last bit.
 
     Attributes
     ----------
@@ -144,41 +144,41 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     consequents_ : ndarray of shape (n_rules, 1 + n_features[, n_outputs])
         p0, p1, ..., pd of every rule.
     feature_importances_ : ndarray of shape (n_features,) or (n_outputs, n_features)
-        Sobol's total share of each input, were they independent, over their sum: see
+        Sobol's total share of each input, as if inputs were independent, divided by their sum: see
         :func:`skanfis.inspection.effects`. Computed on access; not after ``partial_fit``.
     n_iter_, loss_curve_, status_ : int, ndarray of shape (n_iter + 1,), str
-        Iterations of the last run of the solver, the mean squared error of the standardised target
-        from the start on, and why it stopped.
+        The last run of the solver: its iterations, its mean squared error on the standardised
+        target from the start on, and why it stopped.
     agreement_, alpha_, slope_alpha_, stiffness_ : float
-        The weights used; ``slope_alpha_`` is that on the slopes of the rules' common line,
-        ``stiffness_`` that on moving the premises.
+        Weights of the penalties. ``slope_alpha_`` penalises the slopes of the rules' common line,
+        ``stiffness_`` movements of the premises.
     pulls_, slope_pulls_ : list of dict, dict
-        Of each component of the departures its "inputs" and its weight in ``alpha_``, "pull"; the
-        weight of the slope by each input in ``slope_alpha_``. Empty where alpha is given.
+        For each component of the rules' departures: its "inputs", and "pull", its weight in
+        ``alpha_``. For each input: its slope's weight in ``slope_alpha_``. Empty if alpha is given.
     structures_ : list of dict
-        What was compared, best first, or the one given: "structure" in words, "kind", "rules",
-        "n_mfs" of a grid, "reading_cost" (numerals in the rules' sentences), "expected_error" (RMS
-        on new rows, in sd of the target), "rules_beat_mean" (whether its rules, before they are
-        made to agree, err less than the mean one by one: those of which they do come first),
-        "chosen". Empty where nothing was fitted.
+        The structures compared, or the one given: "structure" in words, "kind", "rules", "n_mfs" of
+        a grid, "reading_cost" (numerals in the rules' sentences), "expected_error" (RMS on new
+        rows, in standard deviations of the target), "rules_beat_mean" (whether the rules one by
+        one, before they are made to agree, err less than the mean), "chosen". The smallest error
+        comes first. Empty if nothing was fitted.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
         Standard deviation of the noise of a row of mean weight, in the units of y.
     readability_ : skanfis.inspection.Readability
         How far the rules can be read one by one, measured on the training rows.
     redundant_rules_ : list of dict
         Rules that do nothing: "rule", its number; "reason", "never fires" or "repeats rule ...";
-        "weight", its part of the data's weight. ``without_rules`` drops them.
+        "weight", its share of the weight of all rows. ``without_rules`` drops them.
     constraints_ : dict or None
-        With constraints: "certified", that they hold everywhere; "drawn", how much of the way to
-        rules in order, or to one line, it took; "loss_before" and "loss_after", of training.
+        With constraints: "certified", that they hold everywhere; "drawn", how far the rules had to
+        be moved towards order, or one line, from 0 to 1; training's "loss_before", "loss_after".
     validation_loss_curve_ : ndarray of shape (n_iter,) or None
-        With ``early_stopping``: as ``loss_curve_``, of the rows held out.
+        With ``early_stopping``: as ``loss_curve_``, on the held-out rows.
     robust_weights_ : ndarray of shape (n_samples,) or None
-        With ``loss="huber"``: the weight left to each row; NaN for rows that had no part.
+        With ``loss="huber"``: the weight that it leaves to each row; NaN for rows not used.
     n_samples_seen_ : int
-        After ``partial_fit``: rows with weight, of all calls.
+        After ``partial_fit``: number of rows with non-zero weight in all calls.
     n_features_in_, feature_names_in_ : int, ndarray of shape (n_features,)
-        Number of inputs; their names where X had names that are all strings.
+        Number of inputs; their names, if all columns of X have strings as names.
 
     References
     ----------
@@ -212,7 +212,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         "max_rules": [Interval(Integral, 1, None, closed="left"), None],
         "mf": [
             StrOptions(set(MEMBERSHIPS)),
-            Hidden(StrOptions(set(NAMES_IN_MATLAB))),  # refused with the name that they have here
+            Hidden(StrOptions(set(NAMES_IN_MATLAB))),  # refused, with the name used here
             "array-like",
             type,
         ],
@@ -220,7 +220,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         "consequent_features": ["array-like", str, Integral, None],
         "order": [Interval(Integral, 0, 1, closed="both")],
         "monotonic_cst": ["array-like", dict, None],
-        "constraints": "no_validation",  # by its own words
+        "constraints": "no_validation",  # checked elsewhere, with its own messages
         "loss": [StrOptions({"squared_error", "huber"}), Huber],
         "solver": [StrOptions(set(SOLVERS)), Solver],
         "agreement": [StrOptions({"auto"}), Interval(Real, 0, None, closed="left")],
@@ -284,7 +284,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return tags
 
     def set_params(self, **params: Any) -> Self:
-        """Set parameters by name, and settings of objects among them, such as ``solver__tol``."""
+        """Set parameters by name, or settings of their objects, such as ``solver__tol``."""
         for key in params:
             name, _, setting = key.partition("__")
             given = params.get(name, getattr(self, name, None))
@@ -315,11 +315,12 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         y : array-like of shape (n_samples,) or (n_samples, n_outputs)
             Targets, in any units.
         sample_weight : array-like of shape (n_samples,), default=None
-            Weights, zero or positive. A whole number counts as so many copies of the row, zero as
-            the row's absence. Those that say how precise a row is are to have the mean one.
+            Weights, zero or positive. A whole number n counts as n copies of the row, zero as its
+            absence. Scale weights that state the precision of rows to a mean of one.
         groups : array-like of shape (n_samples,), default=None
             The run, device or level that each row belongs to. The structure is chosen by its error
-            on groups left out, and ``early_stopping`` holds out whole groups. One group is none.
+            on groups left out, and ``early_stopping`` holds out whole groups. One group counts as
+            none.
 
         Raises
         ------
@@ -331,17 +332,17 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Warns
         -----
         ConvergenceWarning
-            If ``max_iter`` was reached first.
+            If ``max_iter`` was reached before convergence.
         ConstraintWarning
-            If the data contradict constraints, or these cost much of the fit.
+            If the data contradict the constraints, or these make the fit much worse.
         ConstantInputWarning
             If an input is constant in the training data; it gets no terms and no slope.
         UnderdeterminedWarning
-            If rules that are given are more than the rows determine.
+            If the rows cannot determine all of the given rules.
         """
         context = None
         if hasattr(self, "_skl_callbacks"):
-            # How many runs Huber's loss takes is not known before.
+            # Huber's loss takes several runs of the solver; their number is not known in advance.
             most = max(self.max_iter, 1) if self.loss == "squared_error" else None
             context = self._init_callback_context(max_subtasks=most)
         with unchanged_by_failure(self):
@@ -391,9 +392,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ----------
         X : array-like of shape (n_samples, n_features)
         return_std : bool, default=False
-            Whether to return the standard deviation of a new row of mean weight as well: of the
-            noise, the consequents and, by Laplace's method, the premises. It takes the structure
-            and the weights of the penalty for known, and grows outside the training range.
+            Whether to also return the standard deviation of a new row of mean weight. It covers the
+            noise, the consequents and, by Laplace's method, the premises; structure and penalty
+            weights are taken as known. It grows outside the training range.
 
         Returns
         -------
@@ -405,8 +406,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ------
         ValueError
             If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data;
-            or, with ``return_std=True``, if the model has no posterior, as one that was read from a
-            .fis file, or that is too large to keep its factor (2,000 parameters).
+            or, with ``return_std=True``, if the model has no posterior, because it was read from a
+            .fis file or has more than 2,000 parameters.
 
         Warns
         -----
@@ -441,8 +442,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     def coverage(self, X: ArrayLike) -> np.ndarray:
         """Tell how well the training data cover each row.
 
-        Rules that have enough training rows near by make it one; it falls with the distance from
-        the rows on which they fire, and outside the training range.
+        It is one where the rules that fire have enough training rows near by. It falls with the
+        distance from these rows, and outside the training range.
 
         Parameters
         ----------
@@ -502,12 +503,12 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         *,
         forgetting: float = 1.0,
     ) -> Self:
-        r"""Learn from a chunk of rows, going on from those before; premises stay.
+        r"""Learn from one more chunk of rows; the premises stay.
 
-        The first call is ``fit`` on its rows, which finds the structure and the premises; or, with
-        ``solver="lse"`` and a model as ``partition``, takes both from there. Every further call
-        adds its rows to the sums that the consequents are solved from: the model does not depend on
-        how rows are divided into calls. See :doc:`/streaming`.
+        The first call fits its rows, to find the structure and the premises. With ``solver="lse"``
+        and a model as ``partition`` it takes both from that model. Every further call adds its rows
+        to the sums from which the consequents are solved, so that the model does not depend on how
+        rows are divided into calls. See :doc:`/streaming`.
 
         Parameters
         ----------
@@ -518,15 +519,15 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         sample_weight : array-like of shape (n_samples,), default=None
             Weights, zero or positive, relative to those of all other calls.
         forgetting : float, default=1.0
-            Above 0 and at most 1: with every row that has weight, the weights of all rows before it
-            are multiplied by this. 1 forgets nothing; at 0.999 about the last 1,000 rows count. The
-            box and the counts of coverage do not forget.
+            Factor above 0 and at most 1. Every row with non-zero weight multiplies the weights of
+            all rows before it by this. 1 forgets nothing; at 0.999 about the last 1,000 rows count.
+            The range of the training data and the row counts of ``coverage`` do not forget.
 
         Raises
         ------
         ValueError
-            If the data are not finite, or other columns than those before; if the first call has a
-            single row but must find the structure; if what that depends on has been changed since.
+            If the data are not finite, or have other columns than before; if the first call has a
+            single row but must find the structure; if a parameter of the structure has changed.
         AttributeError
             If ``loss``, ``early_stopping`` or constraints need all rows again.
 
@@ -552,7 +553,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return self
 
     def _learn_chunk(self, X, y, sample_weight, forgetting):
-        """Add the sums of a chunk to those before, or begin with them."""
+        """Add the sums of a chunk to those of earlier chunks, or begin with them."""
         before = getattr(self, "_sums", None)
         if before is not None:
             chunk_checks.check_settings(self, self._chunk_settings)
@@ -574,7 +575,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         self.n_samples_seen_ = getattr(self, "n_samples_seen_", 0) + n_rows
 
     def _begin_chunks(self, X, y, data, weight):
-        """Fix the premises, and sum over a first chunk; whether it is fitted, and so solved for."""
+        """Fix the premises and sum over the first chunk; return whether ``fit`` has solved it."""
         request = structure_request(self, data.input_names)
         own = request.consequent_inputs
         after_fit = hasattr(self, "model_")
@@ -602,7 +603,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         base = replace(self.model_, posterior=None)
         self._sums = RowSums.of(base, own, data.X, data.y, weight)
         if is_fitted and not self._sums.targets.is_constant.all():
-            # What this fit has found holds for further rows too, as a prior of fixed strength.
+            # The penalty weights of this fit stay for later rows, as a prior of fixed strength.
             self._first_weights = fitted_weights(self, self._sums)
         return is_fitted
 
@@ -615,19 +616,19 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
     @available_if(chunk_checks.can_learn_from_chunks)
     def merge(self, *others: Any) -> Self:
-        """Add up what models trained apart by ``partial_fit`` have seen.
+        """Merge models trained apart by ``partial_fit``, as if one had seen all their rows.
 
         Parameters
         ----------
         *others : ANFISRegressor
-            Trained by ``partial_fit``, on rows of their own, at the same premises: such as each
-            with ``solver="lse"`` and the same model as ``partition``.
+            Trained by ``partial_fit`` on rows of their own, with the same premises: for example
+            each with ``solver="lse"`` and the same model as ``partition``.
 
         Returns
         -------
         merged : ANFISRegressor
-            With the parameters of this one, as after ``partial_fit`` with all rows, but without
-            ``readability_``, which is of rows. The models stay as they are.
+            A new estimator with the parameters of this one, as after ``partial_fit`` with all rows.
+            It has no ``readability_``, which needs the rows. The merged models do not change.
 
         Raises
         ------
@@ -670,8 +671,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Parameters
         ----------
         names : sequence of str or dict
-            One per term, for every input alike or by input, ``{"temperature": ["cold", "hot"]}``,
-            in the order of ``memberships_``; terms of other inputs get their default names.
+            One name per term, in the order of ``memberships_``: the same for every input, or by
+            input, ``{"temperature": ["cold", "hot"]}``; other inputs get their default names.
         """
         model = self._fitted_model()
         named = {"term_names": given_term_names(model, names)}
@@ -683,15 +684,15 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return self
 
     def without_rules(self, rules: ArrayLike | None = None) -> TSKModel:
-        """Give the model without some of its rules, to go on from.
+        """Return the model without some of its rules, as a start for further training.
 
-        What is left fires as before, in proportion. Its consequents were learnt beside those that
-        are gone: ``ANFISRegressor(partition=model.without_rules()).fit(X, y)`` trains them again.
+        The rules left fire in the same proportions. Their consequents were learnt together with the
+        dropped ones: ``ANFISRegressor(partition=model.without_rules()).fit(X, y)`` trains again.
 
         Parameters
         ----------
         rules : array-like of int, default=None
-            The numbers of the rules; None is those of ``redundant_rules_``.
+            Numbers of the rules to drop; None: those of ``redundant_rules_``.
 
         Returns
         -------
@@ -730,7 +731,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
     @property
     def feature_importances_(self) -> np.ndarray:
-        """Sobol's total share of every input over their sum."""
+        """Sobol's total share of every input, divided by their sum."""
         model = self._fitted_model()
         try:
             found = importances(model)
@@ -743,11 +744,11 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return self.model_
 
     def _keep(self, fitted: Fitted) -> None:
-        """Set what every fit tells beside its model, in one go or by chunks."""
+        """Set the attributes beside ``model_``, after ``fit`` or a chunk."""
         result, penalty = fitted.result, fitted.start.penalty
         self.redundant_rules_, self.status_ = fitted.redundant_rules, result.message
         self.n_iter_ = max(result.n_iter, 1)
-        # Where there was nothing to do, the loss at the end is that of the start.
+        # Without an iteration, the loss at the end is the loss at the start.
         self.loss_curve_ = np.resize(result.loss_curve, self.n_iter_ + 1)
         self.agreement_, self.alpha_ = penalty.agreement, penalty.alpha
         self.slope_alpha_ = penalty.slope
@@ -765,7 +766,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         return readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
 
     def _repr_html_inner(self):
-        # For notebooks; scikit-learn 1.6 and 1.9 come here or to the method below.
+        # For notebooks: scikit-learn 1.6 to 1.9 calls this method or the next, by version.
         return super()._repr_html_inner() + self._rules_html()
 
     def _repr_mimebundle_(self, **kwargs):
@@ -781,7 +782,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
     def _check_inputs(self, X):
         """Rows to predict, as an array."""
-        # Of an array as it should be scikit-learn's checks find nothing, and are half of a call.
+        # scikit-learn's checks find nothing in a plain float array, but take half of a call.
         is_plain = (
             type(X) is np.ndarray
             and X.dtype == np.float64

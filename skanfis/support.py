@@ -1,8 +1,8 @@
-r"""How far the training data carry every rule: what coverage reads.
+r"""How well the training data support every rule: the numbers that ``coverage`` is made of.
 
-A rule is known as far as data determine it, and only near them. Of the rows on which it fires are
-kept the part of its coefficients that they are enough for, their mean and covariance, and how far
-from that mean the farthest lies.
+A rule is known only as far as data determine it, and only near them. Kept are the share of its
+coefficients that the rows can determine; and, of the rows on which it fires, their mean and
+covariance, and how far from that mean the farthest lies.
 """
 
 from dataclasses import dataclass, replace
@@ -35,9 +35,9 @@ class RuleSupport:
     center: np.ndarray  # m, mean of the inputs by the rule's strength, (n_rules, n_inputs)
     factor: np.ndarray  # lower triangular; Mahalanobis' distance d of x is |factor (x - m)|
     radius: np.ndarray  # the largest d of a training row on which the rule fires, (n_rules,)
-    # Of every input alone, standardised: second moments of what rules say of it, or None
-    # (``inspection.anova``), values at evenly spaced quantiles, and values next to the places of
-    # terms. Empty where not known.
+    # For each standardised input alone: second moments of what the rules say of it, or None
+    # (``inspection.anova``); its values at evenly spaced quantiles; its values next to the places
+    # of terms. Empty if not known.
     marginals: Any = ()
 
     def change_units(self, offset, scale):
@@ -48,7 +48,7 @@ class RuleSupport:
         """Return the same support with the inputs in another order."""
         if (np.diff(order) > 0).all():
             return self
-        # Triangular again, with the same norms: the Q of a QR decomposition turns, no more.
+        # QR makes the factor triangular again; Q only rotates, so that distances stay the same.
         turned = np.asarray(np.linalg.qr(self.factor[:, :, order[::-1]], mode="r"))
         return replace(
             self,
@@ -58,14 +58,14 @@ class RuleSupport:
         )
 
     def without_moments(self):
-        """Return the same support for rules of other terms, of which the moments are not."""
+        """Return the same support for rules with other terms, whose moments are not known."""
         marginals = tuple((None, *values) for _, *values in self.marginals)
         return replace(self, marginals=marginals)
 
     def by_rule(self, Z):
         """The share of each rule, falling with the distance from its data, (n_rules, n_rows).
 
-        share exp(-max(0, d - D)^2 / 2) at points Z (n_inputs, n_rows) in the box.
+        It is share exp(-max(0, d - radius)^2 / 2) at points Z (n_inputs, n_rows) in the box.
         """
         found = np.zeros((self.share.size, Z.shape[1]))
         known = self.share > 0.0

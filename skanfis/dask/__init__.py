@@ -1,4 +1,4 @@
-"""Training and prediction on a dask cluster: every pass over the rows is a reduction there."""
+"""Training and prediction on a dask cluster: each pass over the rows is a reduction there."""
 
 from .estimator import DaskANFISRegressor
 

@@ -1,4 +1,4 @@
-"""DaskANFISRegressor: ANFISRegressor on dask collections."""
+"""DaskANFISRegressor: ANFISRegressor for dask collections, trained on their cluster."""
 
 from dataclasses import replace
 from functools import partial
@@ -22,14 +22,14 @@ class DaskANFISRegressor(ANFISRegressor):
     r"""ANFISRegressor for dask arrays and DataFrames, trained on the cluster where they live.
 
     Every pass over the rows is one reduction on the cluster: a task per partition, and a tree that
-    adds their sums. The rows stay where they are, but for one sample of 20,000, on which the
-    structure is searched and the memberships are trained first. Up to 100,000 rows are fetched.
+    adds their sums. The rows stay there, except one sample of 20,000, on which the structure is
+    searched and the memberships are trained first. Data of up to 100,000 rows are fetched whole.
 
     Parameters, attributes and results are those of :class:`skanfis.ANFISRegressor` on the same
     rows, up to rounding errors. Give X, y, weights and groups all as dask arrays or frames cut at
-    the same rows, or all as that takes them. On dask collections ``predict`` is lazy, and ``score``
-    is a reduction. The scheduler is dask's current one; partitions are loaded anew for every pass,
-    some eight times, unless they have been persisted (``X.persist()``).
+    the same rows, or all in memory. On dask collections ``predict`` is lazy, and ``score`` is a
+    reduction. The scheduler is dask's current one. Partitions are loaded again for every pass, some
+    eight times, unless they have been persisted (``X.persist()``).
 
     Notes
     -----
@@ -49,7 +49,7 @@ class DaskANFISRegressor(ANFISRegressor):
     """
 
     def predict(self, X: Any, return_std: bool = False) -> Any:
-        """Predict the target, lazily where X is a dask collection; warnings go to the workers."""
+        """Predict the target, lazily if X is a dask collection; warnings go to the workers."""
         if not is_collection(X):
             return super().predict(X, return_std)
         check_is_fitted(self)
@@ -58,7 +58,7 @@ class DaskANFISRegressor(ANFISRegressor):
         return (y, self._lazily(X, is_deviation=True)) if return_std else y
 
     def score(self, X: Any, y: Any, sample_weight: Any = None) -> float:
-        """Coefficient of determination, a reduction where X and y are dask collections."""
+        """Coefficient of determination, by a reduction if X and y are dask collections."""
         if not is_collection(X):
             return super().score(X, y, sample_weight)
         check_is_fitted(self)
@@ -77,7 +77,7 @@ class DaskANFISRegressor(ANFISRegressor):
         return float(np.mean(np.where(error == 0.0, 1.0, explained)))
 
     def _local(self, has_names=True):
-        """The model alone, as sent to the workers; of inputs without names it expects none."""
+        """The model alone, to send to the workers; without ``has_names`` it expects no names."""
         local = ANFISRegressor(out_of_bounds=self.out_of_bounds)
         for name in ("model_", "n_features_in_", "feature_names_in_", "_single_output"):
             if hasattr(self, name) and (has_names or name != "feature_names_in_"):
@@ -98,7 +98,7 @@ class DaskANFISRegressor(ANFISRegressor):
         return X.map_blocks(of_block, chunks=chunks, dtype=float, meta=nothing)
 
     def _check_columns(self, X, reset=False):
-        """scikit-learn's checks of the columns: here, where a worker would warn of each block."""
+        """scikit-learn's checks of columns, once, here: workers would warn for each block."""
         import pandas as pd
 
         if X.ndim != 2:
@@ -146,7 +146,7 @@ class DaskANFISRegressor(ANFISRegressor):
         if not isinstance(data, ClusterData):
             return super()._readability(data)
         rows = data.rows()
-        # Nothing is asked of the posterior, which is most of a model's bytes.
+        # The posterior is not needed, and is most of a model's bytes.
         printed = Sentences.of(self.model_).printed
         model, printed = (replace(one, posterior=None) for one in (self.model_, printed))
         sums = rows.reduce(
@@ -156,7 +156,7 @@ class DaskANFISRegressor(ANFISRegressor):
 
 
 def _predicted(block, model, names, is_deviation):
-    """Predictions of a block, or their standard deviations; a frame where the block is one."""
+    """Predictions of a block, or their standard deviations; a frame if the block is one."""
     if not len(block):
         values = np.empty(0 if model._single_output else (0, len(names)))
     elif is_deviation:
@@ -173,7 +173,7 @@ def _predicted(block, model, names, is_deviation):
 
 
 def _target_and_error(rows, model):
-    """As of ``_describe``, of the target alone, without squares of weights; and squared error."""
+    """As ``_describe``, for the target alone, without squared weights; and the squared error."""
     if not rows.n_rows:
         return None, 0.0
     predicted = model.predict(rows.X).reshape(rows.y.shape)

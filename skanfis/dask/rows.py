@@ -15,9 +15,9 @@ from ..learning.data import Scale, StandardisedData, check_scales, column_statis
 from ..naming import default_output_names
 from ..training.chunks import joined_scales
 
-# Results that one task adds: a deep tree has many tasks, a flat one holds many results at once.
+# Results that one task adds: with fewer there are more tasks, with more it holds more at once.
 _FAN_IN = 8
-# Squares of weights up to this, and of their inverses, are finite.
+# Weights up to this have finite squares, and so have their inverses.
 _LARGEST_WEIGHT = 2.0**400
 
 
@@ -28,7 +28,7 @@ def is_collection(value):
 
 @dataclass(frozen=True)
 class Layout:
-    """Shape and names that every partition must have; names are None where there are none."""
+    """Shape and names that every partition must have; names are None if there are none."""
 
     n_inputs: int
     n_outputs: int
@@ -37,7 +37,7 @@ class Layout:
 
     @classmethod
     def of(cls, X, y):
-        """Of collections; TypeError or ValueError where they are none that can be trained on."""
+        """The layout of collections; TypeError or ValueError if they cannot be trained on."""
         for what, one, dimensions in (("X", X, (2,)), ("y", y, (1, 2))):
             if not is_collection(one):
                 raise TypeError(
@@ -82,7 +82,7 @@ class Partitions:
 
     @classmethod
     def of(cls, X, y, sample_weight=None, groups=None):
-        """Of collections; TypeError or ValueError where they cannot be laid side by side."""
+        """The partitions of collections; TypeError or ValueError if they do not match."""
         layout = Layout.of(X, y)
         first = _delayed(X, "X")
         pieces = [first]
@@ -105,8 +105,8 @@ def _delayed(collection, what):
             "array or Series."
         )
     if not hasattr(collection, "chunks"):
-        # Simplified, so that files are read in the columns that are needed; but not optimised:
-        # that joins small files into one partition, X's other ones than y's.
+        # Simplified, so that only the columns needed are read from files. Not optimised, because
+        # that joins small files into one partition, and different ones for X and y.
         return list(collection.simplify().to_delayed(optimize_graph=False))
     if collection.ndim == 2:
         collection = collection.rechunk({1: -1})
@@ -121,7 +121,7 @@ def reduce_partitions(partitions: Partitions, of_rows: Callable, merge: Callable
     """
     from dask.delayed import delayed
 
-    # One key for what all tasks have in common: it is sent to a worker once.
+    # What all tasks share has one key, so that it is sent to a worker once.
     common = delayed((partitions.layout, of_rows), traverse=False)
     apply, add = delayed(_apply, pure=False), delayed(reduce, pure=False)
     level = [apply(common, number, *parts) for number, parts in enumerate(partitions.pieces)]
@@ -132,7 +132,7 @@ def reduce_partitions(partitions: Partitions, of_rows: Callable, merge: Callable
 
 
 def computed(*collections):
-    """What ``dask.compute`` gives; RuntimeError where the cluster is gone, or kills its workers."""
+    """``dask.compute``, with RuntimeError if the cluster is gone or its workers are killed."""
     from concurrent.futures import CancelledError
 
     from dask.base import compute
@@ -140,7 +140,7 @@ def computed(*collections):
     try:
         return compute(*collections)
     except Exception as error:
-        # Futures of a client that is closed are no part of the graph any more.
+        # Futures of a closed client are missing from the graph.
         is_missing = isinstance(error, ValueError) and str(error).startswith("Missing dependency")
         is_of_cluster = type(error).__module__.partition(".")[0] == "distributed"
         if is_missing or is_of_cluster or isinstance(error, CancelledError):
@@ -161,7 +161,7 @@ def _gone(what):
 
 
 def _apply(common, number, *parts):
-    """Runs where the data are; ValueError names the partition."""
+    """Apply ``of_rows`` on the worker that has the data; errors name the partition."""
     layout, of_rows = common
     try:
         return of_rows(_loaded(layout, *parts))
@@ -196,9 +196,9 @@ def _loaded(layout, X, y, sample_weight, groups):
 
 
 def _numbers(table, what, names, n_columns):
-    """A partition as floats, (n_rows, n_columns); ValueError where it is none of these columns."""
+    """A partition as floats, (n_rows, n_columns); ValueError if its columns differ."""
     if isinstance(table, str | tuple):
-        # Where its future is gone, dask may hand over a chunk's key in its place.
+        # If a chunk's future is gone, dask may pass its key instead.
         raise RuntimeError(_gone(f"{what} is a {type(table).__name__} and no rows"))
     found = None if names is None or not hasattr(table, "columns") else tuple(table.columns)
     if found is not None and found != names:
@@ -215,7 +215,7 @@ def _numbers(table, what, names, n_columns):
 
 @dataclass(frozen=True, eq=False)
 class ClusterRows:
-    """``StandardisedData`` whose rows stay on the cluster, but for a ``sample`` that is here."""
+    """``StandardisedData`` whose rows stay on the cluster, with a ``sample`` in local memory."""
 
     partitions: Partitions
     n_rows: int
@@ -227,11 +227,11 @@ class ClusterRows:
 
     @property
     def effective_weight(self):
-        """Rows by weight."""
+        """Number of rows, counted by weight."""
         return max(self.total_weight, self.total_weight**2 / self.squared_weight)
 
     def reduce(self, of_rows, merge):
-        """What ``of_rows`` makes of the rows of every partition, merged two by two."""
+        """The results of ``of_rows`` on the partitions' rows, merged two by two."""
         scales = {"inputs": self.inputs, "targets": self.targets}
         return reduce_partitions(
             self.partitions, lambda rows: of_rows(replace(rows, **scales)), merge
@@ -244,9 +244,9 @@ class ClusterRows:
 
 
 def _describe(rows, layout):
-    """Count, weights, their squares, scales of inputs and targets of a partition; None of no rows.
+    """Number of rows, sums of weights and of their squares, scales of inputs and of targets.
 
-    ValueError where a value is not finite.
+    None for a partition without rows; ValueError if a value is not finite.
     """
     if rows.n_rows == 0:
         return None
@@ -262,7 +262,7 @@ def _describe(rows, layout):
 
 
 def joined(one, other):
-    """The description, as of ``_describe``, of the rows of two partitions together."""
+    """Join the descriptions, as from ``_describe``, of two partitions."""
     if one is None or other is None:
         return other if one is None else one
     n_rows, weights, squares, *pairs = zip(one, other, strict=True)
@@ -291,6 +291,6 @@ class ClusterData:
         return cls(partitions, described, layout.input_names, layout.output_names)
 
     def rows(self):
-        """The rows on their scales."""
+        """The rows with their scales."""
         check_scales(*self.described[3:], self.input_names, self.output_names)
         return ClusterRows(self.partitions, *self.described)

@@ -1,4 +1,4 @@
-"""A seeded simulator of thermal runs of open-loop fiber-optic gyros on a rate table."""
+"""Simulated data: thermal runs of open-loop fiber-optic gyros on a rate table, from a seed."""
 
 from collections.abc import Mapping
 from numbers import Integral, Real
@@ -23,8 +23,8 @@ def _within(limit):
     return Interval(Real, -limit, limit, closed="both")
 
 
-# Nominal value, tolerance relative to it, absolute tolerance, and the values that make sense: those
-# of amplitude and Sagnac factor stay positive at every temperature. Units: docs/gyro_simulator.
+# Nominal value, relative tolerance, absolute tolerance, and allowed values, which keep amplitude
+# and Sagnac factor positive at every temperature. Units: docs/gyro_simulator.
 _POPULATION = {
     "amplitude": (6.29e6, 0.0, 0.0, _POSITIVE),
     "sagnac_factor": (0.2536, 0.02, 0.0, _POSITIVE),
@@ -50,7 +50,7 @@ _POPULATION = {
     "quantisation": (0.5, 0.0, 0.0, _NOT_NEGATIVE),
     "thermometer_noise": (0.0, 0.2, 0.0, _NOT_NEGATIVE),
 }
-# What the factor on the noise multiplies.
+# Coefficients that the parameter ``noise`` multiplies.
 _RANDOM = [
     "bias_repeatability", "angle_random_walk", "bias_instability", "rate_random_walk",
     "quantisation", "thermometer_noise",
@@ -64,7 +64,7 @@ _CONSTRAINTS = {
     **dict.fromkeys(["max_residual_heat", "device_spread"], (Interval(Real, 0, 1, closed="both"),)),
     "coefficients": [Mapping, None],
 }
-# Outside, neither the polynomials in temperature nor any chamber for gyros would hold.
+# Beyond these, neither the polynomials in temperature nor chambers for gyros are meant to work.
 _COLDEST, _HOTTEST = -60.0, 100.0  # degC
 
 
@@ -90,9 +90,9 @@ def make_ofog(
     """Simulate thermal runs of open-loop fiber-optic gyros on a rate table (regression).
 
     Every device is drawn from a population and goes through ``n_runs`` thermal runs, while the
-    table steps through rates of both signs. A compensator on board knows the columns time,
-    temperature and output (or counts) alone. Hold out whole runs (``run``) or devices (``device``),
-    never single rows: neighbours are nearly equal. Formulas are in :doc:`/gyro_simulator`.
+    table steps through rates of both signs. A compensator on board knows only the columns time,
+    temperature and output (or counts). Hold out whole runs (``run``) or devices (``device``), never
+    single rows, because neighbours are nearly equal. Formulas are in :doc:`/gyro_simulator`.
 
     Parameters
     ----------
@@ -100,14 +100,14 @@ def make_ofog(
         Chamber during a run: one temperature, five of them up and down, or a ramp up and down,
         which takes ``duration``.
     n_devices, n_runs : int, default=3, 8
-        Gyros, and runs of each, which begin in as many equal parts of the ambient range.
+        Number of gyros, and of runs of each. Runs start in equal parts of the ambient range.
     n_power_ups, off_time : int, float, default=1, 600.0
         Power-ups in each run, and the time without power between two of them [s].
     duration, sampling_interval : float, default=3600.0, 10.0
         Length of each power-up, and time between rows [s]; a row is the mean over the interval.
     max_rate : float, default=None
-        Largest rate of the table [deg/s], 100 by default, at which the Sagnac phase of every device
-        must be below pi/2. Every dwell has a rate of its own.
+        Largest rate of the table [deg/s], 100 by default. The Sagnac phase of every device must be
+        below pi/2 at this rate. Every dwell has a different rate.
     rates : array-like of shape (n_rates,), default=None
         The rates of the table [deg/s], which all runs share, in place of ``max_rate``; ``[0]`` is a
         gyro at rest.
@@ -116,15 +116,14 @@ def make_ofog(
     ambient_range : tuple of two floats, default=(-20.0, 50.0)
         Temperatures of the chamber [degC], within -60 and 100.
     max_residual_heat : float, default=0.5
-        A run starts with a part of the self-heating, up to this one, in the coil; 0: cold starts.
+        A run starts with a fraction of the self-heating in the coil, up to this; 0: cold starts.
     noise, device_spread : float, default=1.0
-        Factors on all that is random within a device, and, in [0, 1], on the tolerances of the
+        Factor on all random effects within a device; factor, in [0, 1], on the tolerances of the
         population.
     coefficients : dict of str to float, default=None
         Nominal values by their names in :doc:`/gyro_simulator`. Zero turns an effect off.
     random_state : int, RandomState instance or None, default=None
-        Seed. The draws stay the same, up to their size, for another ``noise``, ``device_spread`` or
-        ``coefficients``.
+        Seed. Another ``noise``, ``device_spread`` or ``coefficients`` only scales the same draws.
 
     Returns
     -------
@@ -166,7 +165,7 @@ def make_ofog(
     _check_phase(nominal, device_spread, schedule.ambient_range, largest)
     generator: np.random.RandomState = check_random_state(random_state)
     devices = _draw_devices(nominal, n_devices, device_spread, noise, generator)
-    # All runs before the first row: the noise of one must not move the temperature of the next.
+    # All runs are drawn before the first row, so that their starts do not depend on the rows.
     runs = list(_draw_runs(devices, n_runs, schedule, max_residual_heat, generator))
     n_held = round(dwell_time / sampling_interval)
     n_dwells = -(-schedule.n_samples // n_held)
@@ -201,7 +200,7 @@ def _nominal_device(coefficients):
 
 
 def _table_rates(max_rate, rates):
-    """Largest rate of the table, and its levels; None where every dwell has its own."""
+    """Largest rate of the table, and its levels; None if every dwell has its own rate."""
     if rates is None:
         return (100.0 if max_rate is None else max_rate), None
     if max_rate is not None:
@@ -231,7 +230,7 @@ def _tolerances(nominal):
 
 
 def _check_phase(nominal, spread, ambient_range, largest):
-    """Refuse rates of a Sagnac phase of pi / 2: beyond it, two rates give one output."""
+    """Refuse rates with a Sagnac phase of pi / 2: beyond it, two rates give one output."""
     tolerances = _tolerances(nominal)
     factor, by_temperature, self_heating = (
         abs(nominal[name]) + spread * tolerances[name]
@@ -260,8 +259,8 @@ def _draw_devices(nominal, n_devices, spread, noise, random_state):
 def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
     """Device, start (ambient, rising, residual heat) and bias of each power-up, for every run.
 
-    The ambient range is cut into as many equal parts as there are runs, and each holds one run: a
-    device of few runs could miss half of the range otherwise.
+    The ambient range is cut into as many equal parts as there are runs, with one run in each.
+    Otherwise a device with few runs could miss half of the range.
     """
     low, high = schedule.ambient_range
     for number, device in enumerate(devices):
@@ -276,9 +275,9 @@ def _draw_runs(devices, n_runs, schedule, max_residual_heat, random_state):
 
 
 def _draw_rates(n_dwells, largest, levels, random_state):
-    """True rate of each dwell of a power-up: each level comes once before any comes again.
+    """True rate of each dwell of a power-up; all levels occur once before any occurs again.
 
-    Without levels the range is cut into as many equal parts as there are dwells, with a rate each.
+    Without levels, the range is cut into as many equal parts as dwells, with one rate in each.
     """
     if levels is None:
         parts = np.arange(n_dwells) + random_state.uniform(size=n_dwells)

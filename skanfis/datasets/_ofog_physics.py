@@ -1,6 +1,6 @@
-"""One run of an open-loop gyro: temperatures, then the output and the parts of its error.
+"""Physics of one simulated run of an open-loop gyro: temperatures, output, parts of its error.
 
-Units are those of data sheets: rates in deg/s, biases and their coefficients by the hour (deg/h),
+Units are those of data sheets: rates in deg/s, biases and their coefficients per hour (deg/h),
 scale factors in ppm, temperatures in degC, time in s. :func:`make_ofog` has the formulas.
 """
 
@@ -11,20 +11,20 @@ import numpy as np
 from scipy.signal import lfilter
 
 REFERENCE_TEMPERATURE = 25.0  # degC, where the factory calibrates the scale factor
-# Biases that nobody can foresee, the one drawn at power-on included.
+# Biases that no compensation can foresee, including the one drawn at power-on.
 _RANDOM_BIASES = ("bias_repeatability", "bias_instability", "rate_random_walk")
 
 _PER_HOUR = 1.0 / 3600.0  # deg/h in deg/s, and an arc second in deg
 _PPM = 1e-6
 _N_SOAKS = 5
-# The flat Allan deviation of flicker noise in its coefficient, over the largest of a Gauss-Markov
-# process in its standard deviations (IEEE 952, annex on Allan variance).
+# Flat Allan deviation of flicker noise, in units of its coefficient, divided by the largest Allan
+# deviation of a Gauss-Markov process, in units of its standard deviation (IEEE 952).
 _GAUSS_MARKOV = np.sqrt(2.0 * np.log(2.0) / np.pi) / (0.437 * np.sqrt(2.0))
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """What all runs have in common: their clock, and the chamber's program."""
+    """The settings that all runs share: their clock, and the chamber's program."""
 
     n_samples: int  # of one power-up
     sampling_interval: float  # s
@@ -41,7 +41,7 @@ class Schedule:
         span = high - low
         place = (start - low) / span if span > 0 else 0.0
         phase = 0.5 * place if rising else 1.0 - 0.5 * place
-        # One power-up sees all of the way up and down.
+        # One power-up lasts for one full cycle up and down.
         period = self.sampling_interval * self.n_samples
         clock = self.sampling_interval * (first + np.arange(n_samples))
         triangle = 1.0 - np.abs(2.0 * ((phase + clock / period) % 1.0) - 1.0)
@@ -53,15 +53,15 @@ class Schedule:
 def temperatures(device, schedule, start, rising, residual_heat):
     """Yield the temperatures [degC] and their rates [degC/s] of one power-up after another.
 
-    The run begins at the chamber's temperature ``start``, ``residual_heat`` times the self-heating
-    above which coil and thermometer are.
+    The chamber begins at ``start``; coil and thermometer are warmer by ``residual_heat`` times the
+    self-heating.
     """
     n_on, interval = schedule.n_samples, schedule.sampling_interval
     coil_start = schedule.ambient(0, 1, start, rising)[0] + residual_heat * device.self_heating
     thermometer_start = coil_start
     for power_up in range(schedule.n_power_ups):
         first = power_up * (n_on + schedule.n_off)
-        # One sample more than is read: the state when the power changes.
+        # One sample more than is recorded: the state when the power is switched.
         on = schedule.ambient(first, n_on + 1, start, rising)
         off = schedule.ambient(first + n_on, schedule.n_off + 1, start, rising)
         warm = on + device.self_heating
@@ -85,8 +85,8 @@ def temperatures(device, schedule, start, rising, residual_heat):
 def simulate_power_up(device, turn_on_bias, rate, thermal, normals, sampling_interval):
     """Columns of the measurement and of the parts of its error, for one power-up.
 
-    ``thermal`` is of :func:`temperatures`; ``normals`` are four rows of standard normal numbers,
-    for bias instability, rate random walk, angle random walk and thermometer.
+    ``thermal`` comes from :func:`temperatures`; ``normals`` are four rows of standard normal
+    numbers, for bias instability, rate random walk, angle random walk and thermometer.
     """
     h, time = sampling_interval, sampling_interval * np.arange(rate.size)
     warm = thermal.coil - REFERENCE_TEMPERATURE
@@ -120,7 +120,7 @@ def simulate_power_up(device, turn_on_bias, rate, thermal, normals, sampling_int
     nominal = open_loop_response(rate, device.sagnac_factor)
     sine = open_loop_response(rate, device.sagnac_factor, relative)
     parts = {
-        # Without any bias: the sine's error, then what each further effect adds to it.
+        # First without any bias: the error of the sine, then what each further effect adds.
         "nonlinearity": nominal - rate,
         "scale_factor": (scale - 1.0) * nominal,
         "wavelength": scale * (sine - nominal),
@@ -136,11 +136,11 @@ def simulate_power_up(device, turn_on_bias, rate, thermal, normals, sampling_int
         "temperature_rate": thermal.thermometer_rate,
         "ambient": thermal.ambient,
         "rate": rate,
-        "counts": output,  # holds the place of the column, which is filled in later
+        "counts": output,  # placeholder, replaced later
         "output": output,
         "error": output - rate,
         "noise": sum(biases[name] for name in _RANDOM_BIASES)
-        # A unit of noise of the output is worth 1 over the response's slope at the input.
+        # Noise of the output, divided by the slope of the response, is noise at the input.
         + (1.0 / bias_gain(rate + bias, 0.0, *optics)) * (white + parts["quantisation"]),
     }
     return measurement, parts
@@ -155,8 +155,8 @@ def open_loop_response(rate, sagnac_factor, relative_factor=1.0, amplitude=1.0):
 def bias_gain(rate, bias, sagnac_factor, relative_factor, amplitude):
     """Change of the indicated rate per unit of bias, exact and without loss of digits.
 
-    By the sum-to-product rule a K / K0 cos(K (Omega + b / 2)) sinc(K b / 2): it shares the effect
-    of the whole bias out among its parts in proportion.
+    By the sum-to-product rule it is a K / K0 cos(K (Omega + b / 2)) sinc(K b / 2). Times each part
+    of the bias b, it divides the effect of the whole bias among its parts in proportion.
     """
     factor = sagnac_factor * relative_factor
     half_phase = 0.5 * factor * np.deg2rad(bias)
@@ -173,7 +173,7 @@ def first_order_lag(values, start, time_constant, sampling_interval):
         return np.array(values, dtype=float)
     ratio = sampling_interval / time_constant
     decay = np.exp(-ratio)
-    mean_decay = -np.expm1(-ratio) / ratio  # of exp(-t / tau), over one interval
+    mean_decay = -np.expm1(-ratio) / ratio  # mean of exp(-t / tau) over one interval
     new, old = 1.0 - mean_decay, mean_decay - decay
     filtered, _ = lfilter([new, old], [1.0, -decay], values, zi=[start - new * values[0]])
     return filtered

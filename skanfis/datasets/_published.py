@@ -1,4 +1,4 @@
-"""Data of papers: the benchmarks of Jang 1993 by their formulas, and Table 1 of Sun et al. 2009."""
+"""Data from papers: the benchmarks of Jang 1993, by formula, and Table 1 of Sun et al. 2009."""
 
 from importlib.resources import files
 
@@ -14,8 +14,8 @@ _SUBSET = {"subset": [StrOptions({"train", "check", "all"})]}
 def load_ofog() -> Bunch:
     """Load Table 1 of the founding paper: 19 rows of an open-loop fiber-optic gyro (regression).
 
-    A historical document, kept as printed, and no benchmark, as ``DESCR`` says. For data to develop
-    a compensation on, see :func:`make_ofog`.
+    It is a historical document, kept as printed, and no benchmark; see ``DESCR``. For data to
+    develop a compensation, see :func:`make_ofog`.
 
     Returns
     -------
@@ -140,8 +140,8 @@ def make_mackey_glass(subset: str = "train") -> tuple[np.ndarray, np.ndarray]:
 def _mackey_glass_series(last_time, steps_per_unit=10):
     """x(0), x(1), ..., x(last_time) by Runge and Kutta's method of order 4.
 
-    In the middle of a step the delayed value is a mean. Published errors are of 10 steps per unit:
-    chaos magnifies the error of the step that reads across the jump at t = 0.
+    In the middle of a step the delayed value is a mean. Published errors use 10 steps per unit; the
+    number matters, because chaos magnifies the error of the step across the jump at t = 0.
     """
     step = 1.0 / steps_per_unit
     x = [0.0] * (17 * steps_per_unit) + [1.2]  # from t = -17 on

@@ -1,4 +1,4 @@
-"""Carrying a trained model away: other formats, other languages."""
+"""Export of trained models to other formats and languages: JSON, .fis, C, ONNX."""
 
 from ..membership import FAMILIES
 from .c import CCode, CCost, export_c
@@ -21,9 +21,9 @@ __all__ = [
     "register_onnx_converter",
 ]
 
-#: Every type of skanfis that a fitted estimator may hold. None of them runs anything when it is
-#: loaded. ``skops.io.load(path, trusted=TRUSTED_TYPES)``; what stands beside them in a pipeline
-#: is scikit-learn's own, which skops knows.
+#: Every type of skanfis that a fitted estimator may hold, for
+#: ``skops.io.load(path, trusted=TRUSTED_TYPES)``. Loading them runs no code. Other steps of a
+#: pipeline are scikit-learn's own, which skops knows.
 TRUSTED_TYPES = [
     *(f"{family.__module__}.{family.__name__}" for family in FAMILIES.values()),
     "skanfis.antecedent.base.TermGroup",

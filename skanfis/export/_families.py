@@ -1,14 +1,14 @@
-"""Every family of memberships as other languages compute it: written once, for all of them.
+"""Formulas of all membership families for export, written once for all target languages.
 
-Of a family there are the constants p of its terms, made of theta (n_parameters, n_terms) whose
-location is about the reference, and a formula: of an input x about the reference, two functions
-that give log mu and its derivative by x. What x and p are is the language's own: nodes of a graph,
-or parts of an expression in C. They have +, -, *, /, < and >, and as methods ``exp``, ``log``,
-``abs``, ``at_most``, ``at_least``, and of a comparison ``where``: one value where it holds, another
-where it does not. Numbers stand to the right of them.
+A family has the constants p of its terms, computed from theta (n_parameters, n_terms) with the
+location relative to the reference. Its formula takes an input x, relative to the reference, and
+gives two functions, for log mu and its derivative by x. A language supplies its own x and p, such
+as nodes of a graph or parts of an expression in C. They support +, -, *, /, < and >, and the
+methods ``exp``, ``log``, ``abs``, ``at_most`` and ``at_least``; a comparison has ``where``, with
+the values if it holds and if not. Numbers stand to the right of them.
 
-log(1 + exp(-|u|)) stands where Python has log1p, which not all have: it is as exact where it
-counts, since an absolute error of log mu is a relative one of the strengths.
+log(1 + exp(-|u|)) replaces Python's log1p, which some languages lack. It is exact enough, because
+an absolute error of log mu is only a relative error of the strengths.
 """
 
 from collections.abc import Callable
@@ -20,12 +20,12 @@ from ..membership import FAMILIES, PRODUCTS
 
 # As in ``membership.profiles`` and ``membership.bells``.
 _FLOOR, _SMALLEST_LOG_SQUARE = 1e-10, float(np.log(1e-300))
-# What is no larger counts as zero: single precision has hardly any smaller numbers.
+# Sizes up to this count as zero: single precision has hardly any smaller numbers.
 _ZERO = 1e-37
 
 
 class Formula(NamedTuple):
-    """Constants of theta, one row of numbers each, and the two functions of x and these."""
+    """Function from theta to the constants, one row of numbers each; function of x and these."""
 
     constants: Callable
     of: Callable
@@ -48,7 +48,7 @@ def _gaussian(x, p):
 def _bell(x, p):
     u = (x - p[0]) * p[1]
     far = u.abs() > _ZERO
-    # log |u| has a floor, as in Python; where u is zero so is the slope.
+    # log |u| has a floor, as in Python. Where u is zero, so is the slope.
     safe = far.where(u, 1.0)
     log_square = far.where(safe.abs().log() * 2.0, _SMALLEST_LOG_SQUARE)
     exponent = log_square.at_least(_SMALLEST_LOG_SQUARE) * p[2]
@@ -89,13 +89,13 @@ def _linear(t):
 
 
 def _spline(t):
-    """Two parabolas, 1 - 2 t^2 and 2 (1 - t)^2, for t between zero and one; and the slope."""
+    """Value of two parabolas, 1 - 2 t^2 and 2 (1 - t)^2, for t between 0 and 1; and slope."""
     s = -(t - 1.0)
     return (t < 0.5).where(-(t * t * 2.0 - 1.0), s * s * 2.0), lambda: t.at_most(s) * -4.0
 
 
 def _with_foot(profile):
-    """A profile that is zero from t = 1 on, over a floor."""
+    """A profile that is zero from t = 1 on, with a floor added so that its log is finite."""
 
     def of(t):
         near = t.at_most(1.0)
@@ -104,7 +104,7 @@ def _with_foot(profile):
         mixture = mu + (gaussian - mu) * _FLOOR
 
         def slope():
-            # Not times 1 - _FLOOR: onnxruntime takes that for one and leaves it out.
+            # A factor 1 - _FLOOR would be dropped by onnxruntime, which takes it for one.
             steep = mu_slope()
             return (steep - (near * gaussian + steep) * _FLOOR) / mixture - (t - near)
 
@@ -129,7 +129,7 @@ def _sigmoid_difference_constants(theta):
 
 
 def _sigmoid_product_constants(first, second):
-    """Of a sigmoid at the left and one at the right; the signs of their slopes."""
+    """Constants of two sigmoids, left and right; ``first``, ``second`` are their slopes' signs."""
 
     def constants(theta):
         location, log_width, *log_flanks = theta
@@ -184,7 +184,7 @@ FORMULAS = {FAMILIES[name]: Formula(*pair) for name, pair in _BY_NAME.items()}
 
 
 def check_own(family):
-    """Raise ValueError for a class that is not of this package, also one that goes by its names."""
+    """Raise ValueError for a family that is not of this package, even if it has the same name."""
     if family not in FORMULAS:
         raise ValueError(
             f"Memberships of the class {family.__name__!r} cannot be exported; those of skanfis' "

@@ -1,8 +1,9 @@
-"""The numbers of a model as other languages compute with them: rounded, shifted, checked.
+"""The numbers of a model as exported code computes with them: rounded, shifted, checked.
 
-Inputs are about the model's reference, rounded to the type: z = x - reference is exact for inputs
-near it, and an offset (a time stamp, a raw count) costs no digits. Consequents are about one value
-per output, which is added at the end, since strengths sum to one: sums stay small.
+Inputs are relative to the model's reference, rounded to the type. z = x - reference is exact for
+inputs near it, so that an offset (a time stamp, a raw count) costs no digits. Consequents are
+relative to one value per output, so that sums stay small. It is added at the end, which is allowed
+because strengths sum to one.
 """
 
 from dataclasses import replace
@@ -24,9 +25,9 @@ class TermTable(NamedTuple):
 
 
 class Numbers:
-    """What is written of a TSKModel: floating-point arrays of one type, and integers.
+    """The numbers of a TSKModel to export: floating-point arrays of one type, and integers.
 
-    ValueError where the type cannot hold them.
+    ValueError if the type cannot hold them.
     """
 
     def __init__(self, model, dtype):
@@ -36,56 +37,56 @@ class Numbers:
         self.reference = reference = _rounded(model.reference, dtype, "the mean of an input")
         what = "the inverse spread of an input"
         self.inverse_spread = _rounded(1.0 / model.spread, dtype, what, counts=True)
-        # With its box as it is rounded: a function on the numbers differs by rounding alone.
+        # The model gets the rounded box: so exported code differs from it by rounding alone.
         box = {"minimum": self.low.astype(float), "maximum": self.high.astype(float)}
         self.model = model = replace(model, **box)
         self.terms = tuple(_term_tables(model, reference))
         self.term_input = model.antecedent.term_inputs
-        # Terms per input of a grid, and where those of each input start; None where there is none.
+        # For a grid, terms per input, and where those of each input start; else None.
         self.counts = model.antecedent.grid_counts
         self.block_starts = np.cumsum([0, *(self.counts or ())])[:-1]
-        # Positions of terms (n_rules, n_terms_per_rule), the number of all terms for none: where no
-        # rule has any, of one column.
+        # Positions of terms (n_rules, n_terms_per_rule); the number of all terms stands for none.
+        # If no rule has a term, there is one column.
         rule_terms, n_terms = model.antecedent.rule_terms, model.antecedent.n_terms
         rule_terms = rule_terms if rule_terms.size else np.full((model.n_rules, 1), -1)
         self.rule_terms = np.where(rule_terms < 0, n_terms, rule_terms)
-        # Of a tree, its nodes from the root on: their constants, inputs, and what is below each.
+        # For a tree, its nodes from the root on: their constants, inputs, and what is below each.
         self.nodes = None
         if isinstance(model.antecedent, TreeAntecedent):
             order, self.node_ends = model.antecedent.walk
             self.nodes, self.node_input = self.terms[0].constants[order], self.term_input[order]
-        # Coefficients (n_rules, n_outputs, 1 + n_slopes) about an offset, and inputs with slopes.
+        # Coefficients (n_rules, n_outputs, 1 + n_slopes) minus an offset, and inputs with slopes.
         offset, coefficients, slopes = _consequents(model, reference)
         self.slope_input = slopes
         self.offset = _rounded(offset, dtype, "a typical output")
-        # A slope that is small by its unit counts by what it adds to an output, over the box.
+        # A slope matters by what it adds to an output over the box, not by its size.
         adds = np.abs(coefficients) * np.append(1.0, (model.maximum - model.minimum)[slopes])
         counts = adds > np.finfo(dtype).eps * adds.max(axis=(0, 2), keepdims=True)
         self.consequents = _rounded(coefficients, dtype, "a consequent", counts)
-        # How far the tangent is followed in each input, so that the sum in deviations is finite.
+        # How far the tangent is followed in each input; limited so that the sum stays finite.
         end = float(np.finfo(dtype).max)
         with np.errstate(over="ignore"):
             reach = min(model.max_extrapolation, 0.25 * end / model.n_inputs) * model.spread
         self.reach = _rounded(np.minimum(reach, end), dtype, "a reach", counts=False)
-        # Inputs whose tangents are found at one place: those of group 0 and g, where they are; all
-        # others at ``tangent_at``, about the reference. None where they all are where they are.
+        # The tangent of group g is found with inputs of groups 0 and g at the row, all others at
+        # ``tangent_at``, relative to the reference. None if no input is held at ``tangent_at``.
         self.tangent_group = None
         if model.tangent_at is not None and model.antecedent.n_terms:
             is_held = np.isfinite(model.tangent_at)
             self.tangent_group = np.where(is_held, np.cumsum(is_held), 0)
             at = np.where(is_held, model.tangent_at - reference, 0.0)
             self.tangent_at = _rounded(at, dtype, "a median of an input")
-        # (2, n_outputs); None where outputs are not held.
+        # (2, n_outputs); None if outputs are not limited.
         self.output_limits = None
         if model.out_of_bounds == "linear" or np.isfinite(model.output_limits).any():
-            # Where nothing else holds outputs, the largest numbers do.
+            # An output without limit gets the largest number as limit.
             self.output_limits = rounded_within(np.clip(model.output_limits, -end, end), dtype)
         # A row per rule: share, radius, centre, and the factor row by row up to the diagonal.
         self.support = None if model.support is None else _support(model, reference)
 
 
 def rounded_within(limits, dtype):
-    """Limits, low and high (2, n_outputs), in a type; none is beyond what is given."""
+    """Limits, low and high (2, n_outputs), in a type, rounded inwards."""
     low, high = limits.astype(dtype)
     inf = dtype.type(np.inf)
     low = np.where(low < limits[0], np.nextafter(low, inf), low)
@@ -94,10 +95,10 @@ def rounded_within(limits, dtype):
 
 
 def _rounded(values, dtype, what, counts=None):
-    """Values in a type; what it has only with fewer digits (subnormal numbers) becomes zero.
+    """Values in a type; numbers that would be subnormal, with fewer digits, become zero.
 
-    ValueError where that happens to one that ``counts``, by default the largest, or one is beyond
-    the type.
+    ValueError if this happens to a value that ``counts`` (default: the largest), or if a value is
+    too large for the type.
     """
     values, sizes = np.asarray(values, dtype=float), np.abs(values)
     least, most = float(np.finfo(dtype).tiny), float(np.finfo(dtype).max)
@@ -126,7 +127,7 @@ def _term_tables(model, reference):
 
 
 def _consequents(model, reference):
-    """Offset, coefficients (n_rules, n_outputs, 1 + n_slopes) about it, and inputs with slopes."""
+    """Offset, coefficients (n_rules, n_outputs, 1 + n_slopes) minus it, and inputs with slopes."""
     coefficients = model.coefficients.transpose(0, 2, 1).copy()
     shift = reference.astype(float) - model.reference
     coefficients[:, :, 0] += coefficients[:, :, 1:] @ shift[: coefficients.shape[2] - 1]
@@ -137,7 +138,7 @@ def _consequents(model, reference):
 
 
 def _support(model, reference):
-    """What coverage takes of each rule, about the reference as it is rounded."""
+    """The numbers of each rule for coverage, relative to the rounded reference."""
     support, dtype = model.support, reference.dtype
     rows, columns = np.tril_indices(model.n_inputs)
     center, factor = support.center - reference.astype(float), support.factor[:, rows, columns]

@@ -13,14 +13,14 @@ _ROUNDING = 1e-9  # of a sum of shares
 
 
 class Level(NamedTuple):
-    """A level of a raw column, and all other levels; none of these if there may be unknown ones."""
+    """A level of a raw column, and all other levels; these are empty if not all are known."""
 
     column: str
     level: str
     others: tuple[str, ...]
 
     def said(self, value):
-        """Say "fibre is PM" of a 1; of a 0 "fibre is not PM", or, of two levels, the other."""
+        """Say "fibre is PM" for 1; for 0 "fibre is not PM", or the other one of two levels."""
         is_not = self.others[0] if len(self.others) == 1 else f"not {self.level}"
         return f"{self.column} is {self.level if value else is_not}"
 
@@ -33,34 +33,34 @@ class Column:
     name: str
     offset: float = 0.0
     scale: float = 1.0
-    place: int = -1  # of the indicator among an encoder's outputs
-    level: Level | None = None  # that it indicates
+    place: int = -1  # position of the indicator among an encoder's outputs
+    level: Level | None = None  # the level that it indicates
 
     def values(self, X, z):
-        """The input as the user's table has it; an indicator, and what was missing, out of z."""
+        """The input as in the user's table; indicators and missing values are taken from z."""
         scaled_back = self.offset + self.scale * z
         if self.level is not None:
-            # 0 or 1 again, whatever scalers behind the encoder have made of it.
+            # 0 or 1 again, after scalers that follow the encoder.
             return np.round(scaled_back)
         numbers = as_numbers(safe_indexing(X, [self.source], axis=1))[:, 0]
         return np.where(np.isnan(numbers), scaled_back, numbers)
 
 
 class Category(NamedTuple):
-    """The inputs that indicate levels of one raw column, and what each of them tells."""
+    """The inputs that indicate levels of one raw column, and the level of each."""
 
     inputs: list[int]
     levels: list[str]
-    others: list[str]  # of training rows that have none of these, if there are such rows
+    others: list[str]  # other levels, if some training rows have none of these
 
 
 def columns_of(model):
-    """The column that each input is of; those of one category by its name."""
+    """The raw column of each input; indicators of one category share its name."""
     return [model.levels.get(name, (name,))[0] for name in model.input_names]
 
 
 def categories(model, among=None):
-    """By raw column its :class:`Category`, of all inputs of a model or of those ``among`` them."""
+    """The :class:`Category` of each raw column, for all inputs of a model, or those ``among``."""
     found: dict[str, Category] = {}
     for j in range(model.n_inputs) if among is None else among:
         if level := model.levels.get(model.input_names[j]):
@@ -79,17 +79,17 @@ def categories(model, among=None):
 class Reader:
     """Takes the inputs of a model out of tables with columns of these names.
 
-    The steps before the model tell what imputers fill and encoders indicate.
+    The steps before the model give imputed values and indicators.
     """
 
     inputs: list[Column]
-    places: list[int]  # of these among what the last step hands on
+    places: list[int]  # of these among the outputs of the last step
     steps: list[Any]
     names: list[str]
     is_named: bool
 
     def __call__(self, X) -> np.ndarray:
-        """The rows; ValueError for other columns, and for numbers that are not finite."""
+        """The rows of the inputs; ValueError for other columns or numbers that are not finite."""
         refuse_lazy(X=X)
         given, known = getattr(X, "columns", None), ", ".join(map(repr, self.names))
         if self.is_named and given is not None and list(given) != self.names:
@@ -97,12 +97,12 @@ class Reader:
                 f"X must have the columns {known}, in this order; it has "
                 f"{', '.join(map(repr, given))}."
             )
-        # What does not reach the model need not be numbers.
+        # Columns that do not reach the model need not be numbers.
         X = X if hasattr(X, "shape") else np.asarray(X, dtype=object)
         if X.shape[1:] != (len(self.names),) or X.shape[0] == 0:
             raise ValueError(f"X has the shape {X.shape}: the estimator takes rows of {known}.")
         Z = X
-        # Steps warn where there are names in one of fit and transform alone.
+        # Steps warn if only one of fit and transform gets names: give X the form of fit.
         if self.steps and self.is_named == (given is None):
             Z = pd.DataFrame(X, columns=self.names) if self.is_named else np.asarray(X)
         for step in self.steps:

@@ -1,9 +1,9 @@
-"""Scalers in front of a model, and on its target, folded into it: one model of the raw columns.
+"""Fold the scalers and encoders of a pipeline into its model: one model of the raw columns.
 
 A scaler maps every column alone, x = offset + scale z with a positive scale. Rules about z are
-rules about x: memberships, box and consequents change their units, nothing else does. The same
-holds for the target, y = offset + scale t. A OneHotEncoder makes indicators of a column, which are
-inputs of the folded model in its place.
+then rules about x: only the units of memberships, box and consequents change. The same holds for
+the target, y = offset + scale t. A OneHotEncoder turns a column into indicators, which are inputs
+of the folded model in place of the column.
 """
 
 from collections import UserList
@@ -43,23 +43,23 @@ def fold(estimator: Any) -> TSKModel:
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
-        An ANFIS estimator; a Pipeline that ends in one, with steps in front that scale every column
-        alone, select columns, impute (SimpleImputer: what is missing stays with who applies the
-        model) or encode them (OneHotEncoder), or a ColumnTransformer of these; a
+        An ANFIS estimator; a Pipeline that ends in one, after steps that scale every column alone,
+        select columns, encode them (OneHotEncoder) or impute (SimpleImputer, which is not folded:
+        the user of the model must impute), or a ColumnTransformer of these; a
         TransformedTargetRegressor of these whose transformer is such a scaler; a search such as
         GridSearchCV or a FrozenEstimator over these. A TSKModel is returned as it is.
 
     Returns
     -------
     model : TSKModel
-        Its inputs are the raw columns that reach the model, in the order of X, by their names in X
-        ("x0", "x1", ... where it has none), and in the place of one that is one-hot encoded its
-        indicators ("fibre_PM"). It predicts what ``estimator`` does, to rounding errors.
+        Its inputs are the raw columns that reach the model, in the order of X, with their names in
+        X ("x0", "x1", ... if it has none). A one-hot encoded column is replaced by its indicators
+        ("fibre_PM"). It predicts what ``estimator`` does, up to rounding errors.
 
     Raises
     ------
     ValueError, TypeError
-        If a step cannot be folded, which is named; if ``estimator`` is no such estimator.
+        If a step cannot be folded (the message names it), or ``estimator`` is no such estimator.
 
     Examples
     --------
@@ -79,13 +79,13 @@ def fold(estimator: Any) -> TSKModel:
 
 
 def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, Any]:
-    """Return what :func:`fold` does, and the rows of the model's inputs out of a table.
+    """Return the folded model of :func:`fold`, and the rows of its inputs from a table.
 
     Parameters
     ----------
     estimator : fitted estimator or TSKModel
     X : array-like or DataFrame of shape (n_rows, n_features)
-        Checked: other columns than in training are refused, and numbers that are not finite. None
+        Checked: columns other than in training, and numbers that are not finite, are refused. None
         gives no rows.
 
     Returns
@@ -108,7 +108,7 @@ def fold_with_rows(estimator: Any, X: Any) -> tuple[TSKModel, Any]:
 
 
 def _fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
-    """Return what :func:`fold` does, and what takes the rows of its inputs out of a table."""
+    """Return the folded model of :func:`fold`, and the reader of its inputs from a table."""
     if isinstance(estimator, TSKModel):
         inputs = [Column(j, name) for j, name in enumerate(estimator.input_names)]
         places, names = list(range(len(inputs))), list(estimator.input_names)
@@ -122,7 +122,7 @@ def _fold_with_reader(estimator: Any) -> tuple[TSKModel, Reader]:
     columns = [Column(j, name) for j, name in enumerate(names)]
     for label, step in steps:
         columns = _columns_after(label, step, columns)
-    # Inputs are in the order of these keys, which must be different.
+    # Inputs are sorted by these keys, which must differ.
     keys = [(column.source, column.place) for column in columns]
     for column, key in zip(columns, keys, strict=True):
         if keys.count(key) > 1:
@@ -153,7 +153,7 @@ def last_step(estimator: Any) -> Any:
 
 
 def final_step(estimator: Any, X: Any = None) -> tuple[Any, Any]:
-    """The last step, inside searches, frozen estimators and Pipelines; and X as that takes it."""
+    """The last step inside searches, frozen estimators and Pipelines; and X transformed for it."""
     estimator = found_by_search(estimator)
     if not isinstance(estimator, Pipeline):
         return estimator, X
@@ -163,7 +163,7 @@ def final_step(estimator: Any, X: Any = None) -> tuple[Any, Any]:
 
 
 def found_by_search(estimator: Any) -> Any:
-    """What searches have kept, and what is frozen, by itself; any other estimator as it is."""
+    """The best estimator of a search, or the one that is frozen; any other is returned as it is."""
     if isinstance(estimator, FrozenEstimator):
         return found_by_search(estimator.estimator)
     found = getattr(estimator, "best_estimator_", None)
@@ -176,9 +176,9 @@ def _described(label, step):
 
 
 def _steps_of(label, estimator):
-    """The steps of nested pipelines one after the other, the model's estimator last.
+    """The steps of nested pipelines one after the other, with the model's estimator last.
 
-    And the transformers of the target from the outermost to the innermost.
+    Also the transformers of the target, from the outermost to the innermost.
     """
     estimator = found_by_search(estimator)
     if isinstance(estimator, TransformedTargetRegressor):
@@ -218,7 +218,7 @@ def _columns_after(label, step, columns):
 
 
 def _imputed(label, imputer, columns):
-    """The columns as they are: what is missing is no matter of the rules."""
+    """The columns unchanged: rules do not depend on how missing values are filled."""
     if imputer.add_indicator or not pd.isna(imputer.missing_values):
         _refuse(label, imputer, "it needs add_indicator=False and missing_values=nan")
     if pd.isna(imputer.statistics_).any():
@@ -234,7 +234,7 @@ def _encoded(label, encoder, columns):
     given = None if hasattr(encoder, "feature_names_in_") else list(sources)
     by_column = copy(encoder).set_params(feature_name_combiner=lambda name, _: name)
     of_each = (one.get_feature_names_out(given).tolist() for one in (by_column, encoder))
-    # All that there can be.
+    # All levels are known only if unknown ones raise an error and none are merged.
     is_all = encoder.handle_unknown == "error" and not hasattr(encoder, "infrequent_categories_")
     known = dict(zip(sources, encoder.categories_, strict=True)) if is_all else {}
     found = []
@@ -250,13 +250,13 @@ def _chosen(chosen, transformer):
     """Positions of the columns that a ColumnTransformer's entry takes."""
     columns = getattr(transformer, "feature_names_in_", range(transformer.n_features_in_))
     places = pd.DataFrame([range(len(columns))], columns=columns)
-    # A list of a class of its own: a remainder, before scikit-learn 1.7.
+    # Before scikit-learn 1.7 a remainder is a list of a special class.
     chosen = chosen.data if isinstance(chosen, UserList) else chosen
     return np.ravel(safe_indexing(places, chosen, axis=1))
 
 
 def _offsets_and_scales(label, scaler, n_columns):
-    """Of x = offset + scale z, for every column of a fitted scaler."""
+    """Offset and scale of x = offset + scale z, for every column of a fitted scaler."""
     kind = type(scaler)
     if getattr(scaler, "clip", False):
         _refuse(label, scaler, "clip=True bends it at the edge; out_of_bounds='clip' does the same")
@@ -266,7 +266,7 @@ def _offsets_and_scales(label, scaler, n_columns):
     (offset,) = scaler.inverse_transform(np.zeros((1, n_columns)))
     scale = getattr(scaler, "scale_", None)
     scale = np.ones(n_columns) if scale is None else scale
-    # That of MinMaxScaler is the inverse of the others'.
+    # The scale_ of MinMaxScaler is the inverse of the others'.
     return zip(offset, 1.0 / scale if kind is MinMaxScaler else scale, strict=True)
 
 
@@ -281,7 +281,7 @@ def _refuse(label, step, reason):
 
 
 def _model_of(label, estimator):
-    """The frozen model of the last step, with the policy that its parameters ask for now."""
+    """The frozen model of the last step, with the estimator's present ``out_of_bounds``."""
     if isinstance(estimator, type) or not hasattr(estimator, "fit"):
         hint = " Its model is one." * isinstance(getattr(estimator, "model", None), TSKModel)
         raise TypeError(
@@ -307,7 +307,7 @@ def _with_raw_inputs(model, columns, order):
     coefficients = model.coefficients.copy()
     if model.order:
         coefficients[:, 1:] = (coefficients[:, 1:] / scale[:, None])[:, order]
-    # Edges that are computed lie two roundings farther out: the rows that made them stay inside.
+    # Computed edges are widened by a few rounding errors: the training rows stay inside.
     low, high = offset + scale * model.minimum, offset + scale * model.maximum
     is_computed = (offset != 0.0) | (scale != 1.0)
     low, high = (
@@ -334,7 +334,7 @@ def _with_raw_inputs(model, columns, order):
         tangent_at=at if at is None else np.clip(offset + scale * at, low, high)[order],
     )
     if model.term_names == default_term_names(model):
-        # Scattered terms are called by where they stand, which is elsewhere in other units.
+        # Scattered terms are named by their places, which change with the units.
         return replace(folded, term_names=default_term_names(folded))
     return folded
 

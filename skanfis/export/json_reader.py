@@ -1,4 +1,4 @@
-"""Reading a model from JSON, every entry checked.
+"""Read a model from JSON, and check every entry.
 
 What an object must hold is a table: under each key the function that checks its value, given the
 value and its place in the file.
@@ -27,14 +27,14 @@ from ..support import RuleSupport
 from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, numbers, shown
 
 FORMAT = "skanfis-model"
-# The first knew no trees.
+# Version 1 had no trees.
 VERSION = 2
 KINDS: dict[type[Antecedent], str] = {
     GridAntecedent: "grid",
     RuleTableAntecedent: "table",
     TreeAntecedent: "tree",
 }
-# Of weights, each of which is a part of the whole.
+# Rounding error of the sum of weights, which are shares of the whole.
 _ROUNDING = 1e-6
 
 
@@ -45,7 +45,7 @@ def _list(value, where, least=1):
 
 
 def _text(value, where):
-    # Half a surrogate pair is no character: no file can hold it.
+    # Half a surrogate pair is no character, and cannot be written to a file.
     if not isinstance(value, str) or value != value.encode(errors="ignore").decode():
         raise ValueError(f"{where}: {shown(value)} is not a name in quotes.")
     return value
@@ -96,7 +96,7 @@ _POSTERIOR = ["noise", "inputs", "consequents", "premises", "cross", "pinned"]
 
 
 def parse_json(text):
-    """The model that a JSON text describes; ValueError where it is none."""
+    """The model that a JSON text describes; ValueError if it is none."""
     return model_of(json.loads(text, parse_constant=_refuse, object_pairs_hook=_without_repetition))
 
 
@@ -159,7 +159,7 @@ def _without_repetition(pairs):
 
 
 def _members(item, readers, where):
-    """The values of exactly these keys, each as its reader gives it."""
+    """The values of an object with exactly these keys, each read by its reader."""
     if not isinstance(item, dict):
         raise ValueError(f"{where} is {shown(item)}, not an object.")
     if missing := [key for key in readers if key not in item]:
@@ -177,13 +177,13 @@ def _columns(items, readers, where):
 
 
 def _check_all(holds, message):
-    """Raise ValueError with the place of the first for which a condition does not hold."""
+    """Raise ValueError with the first place where a condition does not hold."""
     if not np.all(holds):
         raise ValueError(message.format(np.argmin(holds)))
 
 
 def _of_version_1(document):
-    """The same in the present form: no tangents of their own, a triangle as one list."""
+    """The document in the present form: with ``tangent_at``, and a triangle as one list."""
     found = dict(document)
     if isinstance(found.get("inputs"), list):
         no_tangent = {"tangent_at": None}
@@ -200,7 +200,7 @@ def _of_version_1(document):
 
 
 def _inputs(inputs):
-    """What the model has of every input."""
+    """The model's arrays and names of the inputs."""
     found = _columns(inputs, INPUT, "inputs")
     names, arrays = tuple(found.pop("name")), {key: np.array(own) for key, own in found.items()}
     low, high, at = arrays["minimum"], arrays["maximum"], arrays.pop("tangent_at")
@@ -212,7 +212,7 @@ def _inputs(inputs):
 
 
 def _outputs(outputs):
-    """Names of the outputs, and the range of the target, which is known of all or of none."""
+    """Names of the outputs, and the range of the target, known for all outputs or none."""
     found = _columns(outputs, OUTPUT, "outputs")
     names = tuple(found.pop("name"))
     values = [value for column in found.values() for value in column]
@@ -302,14 +302,14 @@ def _support(items, n_rules, n_inputs):
     found = {
         key: np.array(of_rules) for key, of_rules in _columns(items, readers, "support").items()
     }
-    # Asked for now that the file has shown to be as large.
+    # Memory is taken only now that the file has turned out to hold as many numbers.
     factor = np.zeros((n_rules, n_inputs, n_inputs))
     factor[:, *np.tril_indices(n_inputs)] = found["factor"]
     return RuleSupport(**found | {"factor": factor})
 
 
 def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
-    """The posterior that an object describes; ValueError where it is not one of such a model."""
+    """The posterior that an object describes; ValueError if it does not fit the model."""
     found = _members(item, dict.fromkeys(_POSTERIOR, _list_or_empty), "posterior")
     index = _whole(0, n_inputs - 1)
     inputs = [index(value, "posterior.inputs") for value in found.pop("inputs")]
@@ -341,7 +341,7 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
 
 
 def rule_base(kind, groups, table):
-    """The rule base of a kind with these terms; ValueError where its rules are not the table's."""
+    """The rule base of a kind with these terms; ValueError if its rules differ from the table."""
     antecedent: Antecedent = RuleTableAntecedent(groups, table)
     inputs, fits = antecedent.term_inputs, True
     if kind == "grid":
@@ -360,7 +360,7 @@ def rule_base(kind, groups, table):
 
 
 def _tree(groups, table):
-    """The tree whose leaves these are; ValueError where they are none."""
+    """The tree with these rules as leaves; ValueError if there is none."""
     if [group.family.name for group in groups] != ["sigmoid_rising", "sigmoid_falling"]:
         raise ValueError(
             'terms: those of a "tree" are sigmoid_rising first, above each cut, then as many '

@@ -1,20 +1,20 @@
-"""What a file may describe: of what size, known before memory is asked for, by which numbers."""
+"""Limits of model files: size, checked before memory is taken, and range of the numbers."""
 
 import os
 
 import numpy as np
 
-# A rule base holds rules x terms, its consequents rules x (1 + inputs) x outputs: 160 MB.
+# 160 MB: a rule base has rules x terms numbers, consequents rules x (1 + inputs) x outputs.
 MOST_NUMBERS = 20_000_000
 # Squares of numbers up to this size, and of their ratios, are finite.
 LARGEST_NUMBER = 1e50
-# Lengths and factors are no smaller: something is divided by them.
+# Lengths and factors are no smaller, because they are divided by.
 SMALLEST_NUMBER = 1e-50
 _SHOWN = 60  # characters of a value in a message
 
 
 def check_size(n_rules, n_terms, n_inputs, n_outputs):
-    """Raise ValueError where the model would be larger than this reader takes."""
+    """Raise ValueError if the model is larger than this reader takes."""
     needed = n_rules * (n_terms + (1 + n_inputs) * n_outputs)
     if needed > MOST_NUMBERS:
         raise ValueError(
@@ -24,7 +24,7 @@ def check_size(n_rules, n_terms, n_inputs, n_outputs):
 
 
 def number(value, where, lowest=-LARGEST_NUMBER, highest=LARGEST_NUMBER, kind=float):
-    """A number of a file; ValueError, with its place, where it is out of its range."""
+    """A number from a file; ValueError, with its place, if it is out of range."""
     if type(value) not in (int, kind) or not lowest <= value <= highest:
         noun = "number" if kind is float else "whole number"
         ends = f"from {lowest:g} to {highest:g}"
@@ -51,7 +51,7 @@ def shown(value):
 
 
 def read_bytes(path, most_bytes):
-    """The bytes of a file; ValueError if there are more than so many, which are not read."""
+    """The bytes of a file; ValueError, without reading all, if there are over ``most_bytes``."""
     text = os.fsdecode(path)
     if "\n" in text or text.lstrip().startswith("{"):
         raise ValueError(

@@ -1,4 +1,4 @@
-"""A model as JSON: to be read by people, kept in version control, and loaded without pickle.
+"""Write and read a model as JSON, which people can read and which needs no pickle.
 
 docs/files.rst has the format. Numbers are written so that the same double comes back.
 """
@@ -17,7 +17,7 @@ from .folding import fold
 from .json_reader import FORMAT, INPUT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
 from .limits import read_bytes
 
-# A model of 27 rules takes 10 kB: there is room for thousands, and none to fill the memory.
+# A model of 27 rules takes 10 kB: enough for thousands of rules, too little to fill the memory.
 _MOST_BYTES = 2**24
 
 
@@ -44,7 +44,8 @@ def export_json(
     Raises
     ------
     ValueError, TypeError
-        As :func:`fold`; ValueError if :func:`read_json` would refuse it, or has no posterior.
+        As :func:`fold`; ValueError if :func:`read_json` would refuse the text, or if ``posterior``
+        is asked of a model that has none.
 
     Examples
     --------
@@ -106,7 +107,7 @@ def export_json(
 
 
 def read_json(path: str | PathLike[str]) -> TSKModel:
-    """Read a model that :func:`export_json` has written; no pickle, nothing is ever run.
+    """Read a model that :func:`export_json` has written, without pickle and running no code.
 
     Parameters
     ----------
@@ -115,8 +116,8 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
     Returns
     -------
     model : skanfis.model.TSKModel
-        It predicts what the model written does, to the last bit. Give it to ``ANFISRegressor`` as
-        ``partition`` to train on, or with ``max_iter=0`` to predict with as it is.
+        It predicts what the written model does, to the last bit. Give it to ``ANFISRegressor`` as
+        ``partition`` to train it further, or with ``max_iter=0`` to predict with it as it is.
 
     Raises
     ------
@@ -147,7 +148,7 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
 
 
 def _terms(model):
-    """Every term's name, input, function and theta by name, after training and before it."""
+    """Every term's name, input, function and named parameters, after training and before it."""
     before = [theta for _, _, theta in model.initial_antecedent.terms]
     every = zip(model.term_names, model.antecedent.terms, before, strict=True)
     for name, (j, family, theta), start in every:
@@ -173,11 +174,11 @@ def _laid_out(document):
 
 
 def _items(**columns):
-    """An object per row of what the keys hold."""
+    """One object per row, from columns by key."""
     lists = [getattr(values, "tolist", lambda v=values: v)() for values in columns.values()]
     return [dict(zip(columns, map(_or_null, row), strict=True)) for row in zip(*lists, strict=True)]
 
 
 def _or_null(value):
-    """Null for what JSON has no number: no limit, nothing known."""
+    """Null for NaN and infinity, which JSON lacks: not known, or no limit."""
     return None if isinstance(value, float) and not isfinite(value) else value

@@ -1,8 +1,8 @@
-"""ONNX: a converter that skl2onnx takes up for estimators and the pipelines they end.
+"""Convert models to ONNX: a converter that skl2onnx uses for estimators, alone or in pipelines.
 
-The graph does what the model does, in the same order: inputs held in the box, log memberships,
-strengths by a softmax over the rules, consequents weighed by the strengths. The continuation
-"linear" carries the derivative along the way out of the box through the same operations.
+The graph computes what the model computes, in the same order: inputs clipped to the box, log
+memberships, strengths by a softmax over the rules, consequents weighted by the strengths. For
+"linear", the derivative along the way out of the box goes through the same operations.
 """
 
 from functools import partialmethod
@@ -14,9 +14,9 @@ from ..options import policy_of
 from ._families import FORMULAS
 from ._numbers import Numbers
 
-# Softmax along one axis and ReduceSum with axes as an input are of this version.
+# The first version with Softmax along one axis, and ReduceSum with axes as an input.
 _OLDEST_OPSET = 13
-# onnxruntime leaves out the addition of one number that is zero in single precision.
+# onnxruntime drops the addition of a scalar that is zero in single precision.
 _TAKEN_FOR_ZERO = 1e-45
 
 
@@ -83,7 +83,7 @@ def _convert(scope, node, container):
     is_double = isinstance(node.outputs[0].type, DoubleTensorType)
     dtype, kind = (np.float64, TensorProto.DOUBLE) if is_double else (np.float32, TensorProto.FLOAT)
     graph = _Graph(scope, container, np.dtype(dtype))
-    # One input of all columns, or, of a frame, one of each, which may be in another order.
+    # One input with all columns, or, from a frame, one per column, in any order.
     named, given = {one.raw_name: one for one in node.inputs}, node.inputs
     if named.keys() == set(model.input_names):
         given = [named[name] for name in model.input_names]
@@ -99,7 +99,7 @@ class _Graph:
         self.scope, self.container, self.dtype = scope, container, dtype
 
     def node(self, operation, *inputs, output=None, **attributes):
-        """The output of a new node; inputs that are no values become constants."""
+        """Add a node and return its output; inputs that are not of the graph become constants."""
         output = output or self.scope.get_unique_variable_name(operation.lower())
         self.container.add_node(
             operation,
@@ -149,7 +149,7 @@ class _Value:
     abs = partialmethod(_node, "Abs")
     at_most = partialmethod(_node, "Min")
     at_least = partialmethod(_node, "Max")
-    # Of a comparison: one value where it holds, another where not.
+    # Method of a comparison: one value where it holds, another where it does not.
     where = partialmethod(_node, "Where")
     softmax = partialmethod(_node, "Softmax", axis=1)
 
@@ -161,7 +161,7 @@ class _Value:
         return self._node("Reshape", np.array([0, *shape], dtype=np.int64))
 
     def sum(self, keep=True):
-        """Over axis 1, which stays with length one if ``keep``."""
+        """Sum over axis 1, which is kept with length one if ``keep``."""
         return self._node("ReduceSum", np.array([1], dtype=np.int64), keepdims=int(keep))
 
 
@@ -181,7 +181,7 @@ class _Formula:
         z = inside - numbers.reference
         if self.policy == "linear":
             followed = (x - inside).at_least(-numbers.reach).at_most(numbers.reach)
-            # First along a part of the way, since products could overflow.
+            # Derivatives are taken along a part of the way only, since products could overflow.
             far = (followed.abs() * numbers.inverse_spread).sum() + 1.0
             way_out, group = followed / far, numbers.tangent_group
         y, change = self._rules(z, way_out if group is None else None)
@@ -192,7 +192,7 @@ class _Formula:
             change = part if change is None else change + part
         y = y + numbers.offset
         if change is not None:
-            # All of it at once: infinities of opposite sign have no sum.
+            # Scaled back after the sum: infinities of opposite sign have no sum.
             y = y + far * change
         if numbers.output_limits is not None:
             low, high = numbers.output_limits
@@ -204,7 +204,7 @@ class _Formula:
         return y
 
     def _rules(self, z, way_out):
-        """What the rules say about their offset, and its change along the way out, or None."""
+        """The rules' output minus the offset, and its change along the way out, or None."""
         zero = z.columns([0]) * 0.0
         strengths, changes = self._strengths(z, way_out, zero)
         by_rule = self._by_rule(zero + 1.0, z)
@@ -215,7 +215,7 @@ class _Formula:
         return self._weigh(strengths, by_rule), change
 
     def _strengths(self, z, way_out, zero):
-        """Of rules (n_rows, n_rules), and the change of their logarithms along the way out."""
+        """Strengths (n_rows, n_rules), and the change of their logarithms along the way out."""
         numbers, logs, slopes = self.numbers, [], []
         for terms in numbers.terms:
             positions = numbers.term_input[terms.start : terms.start + len(terms.constants)]
@@ -224,7 +224,7 @@ class _Formula:
             logs.append(value())
             if way_out is not None:
                 slopes.append(slope() * way_out.columns(positions))
-        # 1 where rule r has term t; the last one is none.
+        # 1 where rule r has term t; the last row stands for no term.
         has_term = np.zeros((numbers.model.antecedent.n_terms + 1, numbers.model.n_rules))
         has_term[numbers.rule_terms.T, np.arange(numbers.model.n_rules)] = 1.0
         shares = (self._joined(*logs, zero) @ has_term).softmax()
@@ -234,7 +234,7 @@ class _Formula:
         return shares, change - (shares * change).sum()
 
     def _by_rule(self, one, z):
-        """The constants times ``one`` plus what slopes make of z, (n_rows, n_rules, n_outputs)."""
+        """Constants times ``one`` plus slopes times z, (n_rows, n_rules, n_outputs)."""
         n_rules, n_outputs, n_basis = self.numbers.consequents.shape
         sloped = [z.columns(self.numbers.slope_input)] * (n_basis > 1)
         by_output = self.numbers.consequents.reshape(-1, n_basis).T

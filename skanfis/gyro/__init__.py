@@ -52,7 +52,7 @@ def __dir__():
 
 
 def __getattr__(name):
-    # Libraries load when they are needed: the command sees to Ctrl-C before, in __main__.py.
+    # Imported on demand, so that __main__.py can handle Ctrl-C before libraries load.
     for home in _HOMES.split() if name in __all__ else ():
         if hasattr(module := import_module(f".{home}", __name__), name):
             return getattr(module, name)

@@ -1,11 +1,11 @@
-"""``python -m skanfis.gyro``, and the script ``skanfis-gyro``."""
+"""Entry point of ``python -m skanfis.gyro`` and of the script ``skanfis-gyro``."""
 
 import signal
 import sys
 
 
 def main(arguments=None):
-    """Run the command; returns its exit code. While libraries load, Ctrl-C ends it in silence."""
+    """Run the command and return its exit code; while libraries load, Ctrl-C ends it silently."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     from . import command
 

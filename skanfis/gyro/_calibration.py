@@ -1,7 +1,7 @@
-"""From a checked log to a compensator, to predictions of every row by models new to it, a verdict.
+"""Calibration: fit a compensator to a checked log, predict held-out rows, give a verdict.
 
 docs/gyro_command.rst says what is recommended. Gains are geometric means over groups: a mean of
-squares would be decided by a group ten times larger than the others.
+squares would be decided by the one group with the largest errors.
 """
 
 import warnings
@@ -28,10 +28,10 @@ from .metrics import rms, scale_factor
 
 _TIME_CONSTANT = 30.0  # of the rate of the temperature [s]
 _MOST_FIT_ROWS = 10_000
-# Degree in temperature of the law beside rules: with 1, rules would be spent on its curvature.
+# Degree in temperature of the law beside rules: with 1, rules would have to model its curvature.
 _DEGREE = 2
-# Rules are looked for among so many rows, and fitted to all. More than so many rules gained 1 % on
-# 16 simulated logs, and looking at them takes as long again.
+# Rows on which rules are searched, before they are fitted to all; largest number of rules. More
+# rules gained only 1 % on 16 simulated logs, and the search took twice as long.
 _ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 12
 # The model's name in a verdict, and the gain that a compensation must exceed to be worth having.
 _MODEL, _LEAST_GAIN = "this model", 1.02
@@ -42,15 +42,15 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a calibration is asked to do.
+    """The settings of a calibration.
 
-    ``terms`` is "search" or numbers, one per input. ``units`` are those of the files by part, and
-    ``assumed`` has sentences on those that were neither named nor told.
+    ``terms`` is "search" or numbers, one per input. ``units`` are the units in the files, by part;
+    ``assumed`` has a sentence on each unit that neither the file nor the user named.
     """
 
     inputs: tuple[str, ...]
     output_unit: str = "deg/s"
-    scale_factor: float = 1.0  # of a raw signal at one rate, which does not tell it
+    scale_factor: float = 1.0  # of a raw signal, if the log has only one rate
     write: str = "recommended"  # or "rules", or one of NAMES in _simpler
     terms: str | tuple[int, ...] = "search"
     physics: bool = False
@@ -61,7 +61,7 @@ class Recipe:
 
 @dataclass(frozen=True)
 class Gain:
-    """How many times smaller one error is than another; ``low``, ``high``: NaN for one group."""
+    """How many times smaller one error is than another; ``low``, ``high`` are NaN for one group."""
 
     factor: float
     low: float
@@ -70,13 +70,13 @@ class Gain:
 
     @property
     def is_decisive(self):
-        """Whether it is above what scatter alone could give, and worth having."""
+        """Whether the gain exceeds the scatter between groups, and is worth having."""
         return self.low > _LEAST_GAIN and self.of_all_rows > _LEAST_GAIN
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """RMS errors [deg/s] by name, the simplest first and the model last, and which is recommended.
+    """RMS errors [deg/s] by compensation, the simplest first and the model last; which to use.
 
     ``gains`` are those of the model over each of the others.
     """
@@ -95,12 +95,12 @@ class Verdict:
 class Calibration:
     """A compensator, and what was found out about it.
 
-    ``compensator`` is the one that is written, ``written`` its name in the verdict, and ``model``
-    the estimator of law and rules, which may be another. ``before`` and ``after`` are the indicated
-    rate and the held-out compensated one of every row, ``inside`` whether the row was in the bounds
-    of the model that had not seen it.
-    ``simpler`` are compensations without rules, judged with the model by ``verdict`` on the rows in
-    range. ``warnings`` are those of the fit; ``glitches`` sentences on rows that no other supports.
+    ``compensator`` is the one written, and ``written`` its name in the verdict. ``model`` is the
+    estimator of law and rules, written or not. For every row, ``before`` is the indicated rate,
+    ``after`` the rate compensated by a model that had not seen the row, and ``inside`` whether the
+    row was in that model's bounds. ``simpler`` are compensations without rules; ``verdict`` judges
+    them and the model on the rows in range. ``warnings`` are those of the fit, ``glitches``
+    sentences on rows that no other row supports.
     """
 
     recipe: Recipe
@@ -118,11 +118,11 @@ class Calibration:
     n_fit_rows: int
     warnings: list
     glitches: list
-    fold_models: list  # of what is written, those that had not seen the test rows of each fold
+    fold_models: list  # of the written compensation: per fold, the one fitted without its test rows
 
     @property
     def rules(self):
-        """The pipeline of the rules: beside the arcsine law, what adds to it."""
+        """The pipeline of the rules; with the arcsine law, the part that adds to it."""
         return rules_of(self.model)
 
     @property
@@ -135,11 +135,11 @@ class Calibration:
 
     @property
     def in_range(self):
-        """Rows that were in the bounds of a model new to them, and have its answer."""
+        """Rows in the bounds of a model that had not seen them, with a finite prediction."""
         return self.inside & np.isfinite(self.after)
 
     def cautions(self, unit="deg/s"):
-        """Sentences that say why the compensator should not be used as it is; errors in a unit."""
+        """Sentences on why the compensator should not be used as it is; errors in ``unit``."""
         found = list(self.split.cautions)
         if "output" not in self.recipe.inputs and np.abs(self.rate).max() > LARGEST_AT_REST:
             found.append(
@@ -161,9 +161,9 @@ class Calibration:
 
 
 def calibrate(log, split, recipe, tell, name_row="row {}".format):
-    """Compensate every row by a model that is new to it, fit to all rows, and judge.
+    """Predict every row by a model that has not seen it, fit all rows, and give a verdict.
 
-    ``tell`` is called with a line of text for every step; ``name_row`` says where a row is found.
+    ``tell`` is called with a line of text for every step; ``name_row`` names a row in messages.
     """
     factor = recipe.scale_factor
     if recipe.output_unit in SIGNALS and np.ptp(log["rate"]) > 0.0:
@@ -186,7 +186,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     estimator, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
     predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
     model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
-    # The same rows for all: those that the model answered in range.
+    # All compensations are judged on the same rows: those that the model answered in range.
     judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]
     errors = {each.name: (each.after - rate)[judged] for each in every}
@@ -224,7 +224,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
 
 
 def fit_model(X, target, groups, recipe):
-    """The fitted estimator of a recipe; groups tell the rules that are not given."""
+    """Fit the estimator of a recipe; ``groups`` guide the search for rules that are not given."""
     law = make_law(recipe.inputs, _DEGREE, recipe.outside) if recipe.physics else None
     if not isinstance(recipe.terms, str):
         structure: dict[str, Any] = {"n_mfs": list(recipe.terms)}
@@ -237,19 +237,19 @@ def fit_model(X, target, groups, recipe):
             return found
         structure = {"partition": found[-1].model_}
     rules = _make_rules(recipe, **structure)
-    # The rules are searched once, in what the law leaves: every round begins with them.
+    # Rules are searched once, in the residual of the law; every round starts from them.
     whole = rules if law is None else ResidualRegressor(law, rules, n_rounds=ROUNDS)
     return whole.fit(X, target)
 
 
 def _make_rules(recipe, **structure):
-    """A scaler and rules, of a given structure or such as is looked for."""
+    """A scaler and rules, with a given structure or one to be searched."""
     rules = ANFISRegressor(**structure, simplicity=0.0, out_of_bounds=recipe.outside)
     return make_pipeline(StandardScaler(), rules)
 
 
 def some_rows(rows, n_rows, X, rng):
-    """At most so many of the rows in their order, with those at the ends of every input's range."""
+    """At most ``n_rows`` random rows in order, plus those at the ends of every input's range."""
     if rows.size <= n_rows:
         return rows
     values = X.to_numpy()[rows]
@@ -259,7 +259,7 @@ def some_rows(rows, n_rows, X, rng):
 
 
 def _held_out(X, target, groups, split, recipe, tell, rng):
-    """Predictions of every row by a model new to it; which rows are in range; folds; models."""
+    """Predict every row by a model that has not seen it; also rows in range, folds and models."""
     predicted, inside = np.full(len(X), np.nan), np.zeros(len(X), dtype=bool)
     folds, models = [], []
     for number, (train, test) in enumerate(split.folds, 1):
@@ -282,10 +282,10 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
 
 
 def _fit(X, target, groups, recipe, tell):
-    """The model of all rows, and what warnings said."""
+    """The model fitted to all rows, and the texts of its warnings."""
     tell(f"fitting to {len(X):,} rows")
     with warnings.catch_warnings(record=True, action="always") as caught:
-        # Trial fits warn of rows that they have not seen; the final fit is asked of none.
+        # Trial fits warn of held-out rows out of range; the final fit predicts no such rows.
         warnings.simplefilter("ignore", OutOfBoundsWarning)
         estimator = fit_model(X, target, groups, recipe)
     tell(counted(rules_of(estimator)[-1].n_rules_, "rule"))
@@ -305,8 +305,8 @@ def _to_write(recipe, verdict, simpler):
 def judge(errors, groups, most=""):
     """Judge compensations by their errors on the same rows, in groups that were held out together.
 
-    ``errors`` are by name and in the order of complexity: "no compensation" first, the model last.
-    ``most`` is what the groups can recommend at most: beyond it errors may be those of a memory.
+    ``errors`` are by name, in order of complexity: "no compensation" first, the model last.
+    ``most`` is the most complex one that the groups can support: others may have memorised the log.
     """
     codes = np.unique(groups.astype(str), return_inverse=True)[1]
     counts = np.bincount(codes)
@@ -320,7 +320,7 @@ def judge(errors, groups, most=""):
     recommended = next(
         name
         for place, name in enumerate(names)
-        # It errs no more than what is simpler: one bad group hides a gain over it in the scatter.
+        # Nothing simpler may have a smaller error: one bad group can hide that in the scatter.
         if of_all[name] == min(of_all[other] for other in names[: place + 1])
         and not any(_gain(logs[name] - logs[other]).is_decisive for other in names[place + 1 :])
     )
@@ -332,7 +332,7 @@ def judge(errors, groups, most=""):
 
 
 def _gain(logs):
-    """From logarithms of ratios of RMS errors, by group and over all rows."""
+    """The gain from logarithms of ratios of RMS errors: one per group, then over all rows."""
     *by_group, of_all = logs
     n, mean = len(by_group), np.mean(by_group)
     half = np.nan

@@ -1,4 +1,4 @@
-"""Refusing a log that no compensator should learn from, and naming rows that spoil one."""
+"""Checks that refuse a log unfit for calibration, and name rows that look like glitches."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -23,34 +23,34 @@ _PLAUSIBLE = {
 _LARGEST_SIGNAL = 1e30  # counts or volts, beyond any converter
 _LONGEST_RUN = 31 * 86_400.0  # s
 _FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
-_LEAST_SPAN = 10.0  # degC, to learn from
+_LEAST_SPAN = 10.0  # degC, the least to learn from
 _NOISE = 5.0  # degC by which a few rows may differ
-# Fewer rows determine neither a line in every input nor the errors that it leaves; an output that
-# stands still in so many, while the rate goes on, is stuck.
+# Fewer rows determine neither a line in every input nor its residual errors. An output that keeps
+# one value in this many rows, while the rate changes, is stuck.
 _FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
 LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
 _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
-# Steps of 20 times the usual one are no noise; glitches are rare.
+# Steps of 20 times the usual one are not noise; if they are not rare, they are not glitches.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
 _LEAST_CORRELATION = 0.9  # of output and rate
-# An output is saturated where it has its largest or smallest value in so many rows or more, at
-# rates that differ by more than this part of their range.
+# An output is saturated if at least this many rows have its largest or smallest value, at rates
+# that differ by more than this part of their range.
 _FEWEST_SATURATED, _SATURATED = 3, 0.02
-# Messages have this text; where a file was read, ``LogFile.located`` puts the column's name in.
+# Placeholder in messages: if a file was read, ``LogFile.located`` puts in the column's name.
 RATE_COLUMN = "column of the rate"
 
-# More than so many rows of a kind support one another.
+# Largest number of rows named; more rows of alike errors support one another.
 _MOST_GLITCHES = 3
-# A row is alone if it deviates so many times as much as the next one: Gaussian noise never comes
-# near, nor does Student's with three degrees of freedom in a thousand logs.
+# A row is alone if it deviates this many times as much as the next one. Gaussian noise never comes
+# near; Student's t with three degrees of freedom did not in a thousand logs.
 _ALONE = 5.0
-# A row is compared with the median of so many, which bears one other glitch among them.
+# A row is compared with the median of this many others, which one more glitch does not upset.
 _N_NEIGHBOURS = 8
-_MOST_CANDIDATES = 2_000  # the rows farthest off
+_MOST_CANDIDATES = 2_000  # rows with the largest errors
 # A temperature moves slowly: a step of this part of its range, from row to row, is a glitch.
 _SMOOTH = 0.2
-_SOUND = 0.9  # part of the rows, at least, that are no glitches
+_SOUND = 0.9  # smallest share of the rows that are no glitches
 
 
 def check_log(
@@ -125,13 +125,13 @@ def check_log(
 
 
 def columns_of(inputs):
-    """Columns of a log that the inputs of a compensator are made of."""
+    """Columns of a log from which the inputs of a compensator are computed."""
     made = {"temperature_rate": ("time", "temperature")}
     return dict.fromkeys(part for name in inputs for part in made.get(name, (name,)))
 
 
 def check_rows(log, units, runs, may_lack=()):
-    """LogError for the first bad row; ``runs`` are the numbers of each row's run."""
+    """Raise LogError for the first bad row; ``runs`` has the number of each row's run."""
     for part in QUANTITIES:
         if part not in log:
             continue
@@ -185,7 +185,7 @@ def _check_time(log, unit, runs):
 def check_at_rest(log, unit):
     """Refuse a log of a gyro that has turned; ``unit`` is that of the output.
 
-    A raw signal, whose scale is not known, is told by its jumps alone, those of a rate table.
+    The scale of a raw signal is not known: only the jumps of a rate table show that it turned.
     """
     if "rate" in log:
         rate = log["rate"].to_numpy()
@@ -217,7 +217,7 @@ def check_at_rest(log, unit):
 
 
 def check_values(values, part, allow_missing=False):
-    """LogError for the first value of a part that is missing or infinite."""
+    """Raise LogError for the first value of a part that is missing or infinite."""
     values = np.asarray(values)
     missing = np.asarray(pd.isna(values))
     bad = np.zeros_like(missing) if allow_missing else missing
@@ -243,7 +243,7 @@ def _check_plausible(values, part, unit):
     ends = convert_back(np.array([values.min(), values.max()]), unit)
     ranges = {other: convert(ends, other) for other in units_of(part) if other not in SIGNALS}
     others = [other for other, (least, most) in ranges.items() if low <= least and most <= high]
-    # More than half: the unit; few: glitches of the measurement.
+    # If more than half are implausible, the unit is wrong; if few are, they are glitches.
     if others and bad.mean() > 0.5:
         advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
     row = int(np.argmax(bad))
@@ -258,7 +258,7 @@ def _check_plausible(values, part, unit):
 def _check_output_follows_rate(log, units):
     output, rate = log["output"].to_numpy(), log["rate"].to_numpy()
     several = "Log at several rates"
-    # At another rate than zero the scale factor's error would be learnt as the bias.
+    # At any other rate than zero the scale factor error would be learnt as bias.
     several += ", or learn the bias: leave output out of the inputs." if not rate.any() else "."
     other = "Is another column the gyro's (--columns output=NAME)?"
     for part, values, advice in (("rate", rate, several), ("output", output, other)):
@@ -282,7 +282,7 @@ def _check_output_follows_rate(log, units):
     slope = np.polyfit(rate, output, 1)[0]
     if units["output"] in SIGNALS or 0.5 < slope < 2.0:
         return
-    # What a slope far from 1 tells.
+    # A slope far from 1 shows a reversed sign or a wrong unit.
     told = "its sign is reversed." if -2.0 < slope < -0.5 else "are the units right?"
     for part, power in (("rate", -1), ("output", 1)):
         for unit in units_of("rate"):
@@ -297,15 +297,15 @@ def _check_output_follows_rate(log, units):
 
 
 def _check_saturation(output, rate):
-    """LogError where the output stands at its largest or smallest while the rate goes on."""
+    """Raise LogError if the output stays at its largest or smallest while the rate changes."""
     ends = [np.flatnonzero(output == value) for value in (output.min(), output.max())]
     _check_standing(output, rate, ends, "rows", "saturated")
 
 
 def _check_stuck(output, rate):
-    """LogError where the output stands still between its ends, row after row, as the rate goes on.
+    """Raise LogError if the output keeps one value, row after row, while the rate changes.
 
-    At an end it is saturated, or of a column that is not the gyro's.
+    Its largest and smallest value do not count: there it is saturated, or not the gyro's column.
     """
     starts = np.flatnonzero(np.diff(output, prepend=np.nan) != 0.0)
     lengths = np.diff(starts, append=output.size)
@@ -316,7 +316,7 @@ def _check_stuck(output, rate):
 
 
 def _check_standing(output, rate, places, rows, what):
-    # As many rates as the resolution of the output leaves to one value, and no more than noise.
+    # One output may belong to a range of rates, by its resolution and by noise.
     step = np.ptp(rate) * max(_SATURATED, 3.0 / np.unique(output).size)
     for at in places:
         low, high = rate[at].min(), rate[at].max()
@@ -327,16 +327,16 @@ def _check_standing(output, rate, places, rows, what):
 
 
 def find_glitches(log, error):
-    """Rows that no other row supports, and what is odd about each; ``error`` is of every row.
+    """Rows that no other row supports, and what is odd about each; ``error`` has one per row.
 
-    Two things are looked at: the error, beside that of the rows nearest in temperature, rate and
-    order, and the temperature, which lies between those of the rows before and after in the run.
-    Least squares bends the whole model towards one such row. Of many, the first ones are named.
+    The error of a row is compared with those of the rows nearest in temperature, rate and order;
+    its temperature should lie between those of the rows before and after in the run. Least squares
+    bends the whole model towards one such row. If there are many, the first ones are named.
     """
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
     by_run = pd.Series(temperature).groupby(runs)
-    # At the ends of a run those on the one side count twice. Of two rows nothing is known.
+    # At an end of a run the rows on the one side count twice. Two rows alone tell nothing.
     shifted = [by_run.shift(step).fillna(by_run.shift(-step)) for step in (-2, -1, 1, 2)]
     _, low, high, _ = np.sort(np.column_stack(shifted), axis=1).T
     beyond = np.nan_to_num(np.maximum(low - temperature, temperature - high))
@@ -346,14 +346,14 @@ def find_glitches(log, error):
     found = {row: f"the temperature of {temperature[row]:.4g} degC" for row in named}
     if more > 0:
         found[named[-1]] += f" (and that of {counted(f'{more:,}', 'row')} more)"
-    # What is far from its neighbours by more than all errors spread is far from the middle too.
+    # A row farther from its neighbours than the spread of all errors is far from the median too.
     far = np.argsort(-np.abs(error - np.median(error)), kind="stable")[:_MOST_CANDIDATES]
     places = np.column_stack([temperature, rate, np.arange(len(log))])
     scale = _spread(places)
     places /= np.where(scale > 0.0, scale, 1.0)
     # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
     tree = cKDTree(places, balanced_tree=False)
-    # The row itself is among them, which a median bears too.
+    # The row itself is among its neighbours, which does not upset the median.
     nearest = tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
     sizes = np.abs(error[far] - np.median(error[nearest], axis=1))
     order = np.argsort(-sizes, kind="stable")[: _MOST_GLITCHES + 1]

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..export.folding import final_step
 
-# By unit: its factor to the canonical one, and spellings in lower case, without blanks.
+# For each unit: its factor to the canonical unit, and spellings in lower case without blanks.
 _TABLE = {
     "time": {
         "s": (1.0, "sec secs second seconds"),
@@ -52,7 +52,7 @@ _MEANT = {
 }
 _FACTORS = {unit: factor for units in _TABLE.values() for unit, (factor, _) in units.items()}
 SIGNALS = tuple(_TABLE["signal"])
-_ZERO = {"K": -273.15, "degF": -160.0 / 9.0}  # of each scale, in degC
+_ZERO = {"K": -273.15, "degF": -160.0 / 9.0}  # zero of each scale, in degC
 CANONICAL = {"time": "s", "temperature": "degC", "rate": "deg/s", "output": "deg/s"}
 PER_HOUR = 3600.0  # 1 deg/s in deg/h
 RATE_UNITS = {"deg/s": 1.0, "deg/h": PER_HOUR}  # of each in 1 deg/s
@@ -68,7 +68,7 @@ def units_of(quantity):
 
 
 def convert(values, unit):
-    """Values in the canonical unit; those of a raw signal as they are."""
+    """Convert values to the canonical unit; a raw signal stays as it is."""
     return values * _FACTORS[unit] + _ZERO.get(unit, 0.0)
 
 
@@ -77,7 +77,7 @@ def convert_back(values, unit):
 
 
 def declared_units(units):
-    """``units`` with the usual name of each; ValueError where there is no such unit."""
+    """``units`` with the usual name of each unit; ValueError if there is no such unit."""
     found = {}
     for quantity, name in (units or {}).items():
         if quantity not in CANONICAL:
@@ -91,12 +91,12 @@ def declared_units(units):
 
 
 def rate_unit_of(unit):
-    """The rate that a unit begins with, or None."""
+    """The unit of rate that a unit such as "deg/h/degC" begins with, or None."""
     return next((rate for rate in RATE_UNITS if unit == rate or unit.startswith(f"{rate}/")), None)
 
 
 def in_rate_unit(unit, wanted):
-    """A unit such as "deg/h/degC" with its rate as wanted, and the factor that this takes."""
+    """A unit such as "deg/h/degC" with the wanted unit of rate, and the factor to convert to it."""
     own = rate_unit_of(unit)
     if own is None:
         return unit, 1.0
@@ -104,7 +104,7 @@ def in_rate_unit(unit, wanted):
 
 
 def check_column(values, name, n_rows=None, *, may_lack=False) -> np.ndarray:
-    """``values`` as a float array of shape (n_rows,), or ValueError; NaN where some may lack."""
+    """``values`` as a float array of shape (n_rows,), or ValueError; ``may_lack`` admits NaN."""
     try:
         numbers = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:
@@ -144,12 +144,12 @@ def column_position(names, role, given) -> int:
 
 
 def evenly_chosen(n_rows, most) -> np.ndarray:
-    """Positions of some rows, the first and the last among them, at most so many."""
+    """At most ``most`` evenly spaced positions of rows, with the first and the last."""
     return np.unique(np.linspace(0, n_rows - 1, min(n_rows, most)).astype(int))
 
 
 def ask(estimator, method, X):
-    """``estimator.method(X)``, or for a Pipeline that of its last step for what it is given."""
+    """``estimator.method(X)``; for a Pipeline, of its last step, on X as transformed before it."""
     final, X = final_step(estimator, X)
     if not hasattr(final, method):
         raise ValueError(f"{type(final).__name__} has no method {method!r}.")

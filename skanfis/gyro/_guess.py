@@ -1,4 +1,4 @@
-"""Which column of a file plays which part: as told, as it is called, or by words and units."""
+"""Find the column of each quantity in a log: as the user says, by its name, words or units."""
 
 import difflib
 import re
@@ -22,7 +22,7 @@ _OUTPUT = (
     "imu dut uut kreisel"
 )
 _TRUTH = "true truth table turntable drehtisch ref reference stage encoder enc"
-# What a table was told to do, it does a little later.
+# Words for a commanded rate: a measured one is better, since the table follows a little later.
 _WISH = "commanded command cmd demand setpoint soll consigne"
 # Scores: how much a word in a column's name speaks for a part. A chamber's thermometer is not the
 # gyro's; a rate of a temperature is no rotation.
@@ -46,7 +46,7 @@ _SCORES = {
 }
 _STRANGER = -0.5  # score of any other word
 _SIGNAL, _UNIT = 3.0, 0.25  # scores of a raw signal's unit, for the output; of any unit
-# Of the axis that the table turns: its correlation with the rate, its part of all that turns.
+# The axis that the table turns: least correlation with the rate, and least share of all turning.
 _FOLLOWS = 0.9
 _OF_NO_PART = (
     "residual fit fitted error err noise random walk std sigma var variance status flag valid crc "
@@ -67,7 +67,7 @@ _QUANTITIES = {
 }
 
 _BRACKETED = re.compile(r"[\[({<]([^\])}>]*)[\])}>]\s*$|[,/]\s*([^,/\s][^,]*)$")
-# mV first: it is one word, for all its letters of two cases.
+# mV first: it is one word in spite of its two cases.
 _WORD = re.compile(r"mV(?![A-Za-z])|[A-Z]?[a-zµäöüß°]+|[A-Z]+(?![a-z])|[0-9]+|[^\W\d_a-zA-Z]+")
 
 _AXIS = re.compile("(?:gyro|gyr|omega|rate|imu|g|w)([xyz])(?![a-z])", re.IGNORECASE)  # in a word
@@ -75,17 +75,17 @@ _AXIS = re.compile("(?:gyro|gyr|omega|rate|imu|g|w)([xyz])(?![a-z])", re.IGNOREC
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked of a reading; ValueError where it names a part or unit that is unknown.
+    """What to read from a log; ValueError for a part or unit that is unknown.
 
-    With ``guess``, as the command reads: columns are guessed, the clock tells runs, rows that lack
-    a value are left out, but of the ``optional`` parts, and every row is checked.
+    With ``guess``, as for the command, columns are guessed, the clock tells runs apart, every row
+    is checked, and rows that lack a value are left out, unless it is of an ``optional`` part.
     """
 
     columns: dict = field(default_factory=dict)
     units: dict = field(default_factory=dict)
     require: tuple[str, ...] = ("temperature", "output", "rate")
     guess: bool = False
-    assumed: dict | None = None  # units of columns that name none; else by the values
+    assumed: dict | None = None  # units of columns that name none; None: by the values
     optional: tuple[str, ...] = ()
 
     def __post_init__(self):
@@ -101,7 +101,7 @@ class Request:
 class Layout:
     """Places of the parts in a file, and their units there.
 
-    ``others`` are columns that would do as well, ``assumed`` parts whose units nothing tells.
+    ``others`` are columns that would do as well; ``assumed`` are parts whose units nobody named.
     """
 
     header: list
@@ -110,7 +110,7 @@ class Layout:
     notes: list = field(default_factory=list)
     others: dict = field(default_factory=dict)
     assumed: list = field(default_factory=list)
-    dates: list = field(default_factory=list)  # places of those of a time without a date
+    dates: list = field(default_factory=list)  # places of the dates, if the time has none
     axis: str = ""  # of the output, by its name: "x", "y" or "z"
 
     def name(self, part):
@@ -124,7 +124,7 @@ def settle(source, request, first=None):
         names |= {part: first.name(part) for part in first.places}
     names |= request.columns
     layout = Layout(source.header, {}, dict(request.units))
-    # Names that were told go first: what they have taken is not there for the others.
+    # Names that the user gave go first: their columns are not free for other parts.
     for part in sorted(names, key=lambda part: part not in request.columns):
         told = {name for other, name in request.columns.items() if other != part}
         place = _place(source, names[part], told)
@@ -150,8 +150,8 @@ def settle(source, request, first=None):
 
 
 def _guess(source, request, layout, first):
-    """Add the parts that names and units tell, and the units."""
-    # Of the first file, a column that is called rate may be the gyro's own.
+    """Add to the layout the parts found by names and units, and the units."""
+    # In the first file, a column called rate may be the gyro's own output.
     is_told = "rate" in request.columns or first is not None
     called_rate = None if is_told else layout.places.pop("rate", None)
     places = range(len(source.header))
@@ -189,7 +189,7 @@ def _guess(source, request, layout, first):
 
 
 class _Column:
-    """A column's name, read (its words, unit, what that is a unit of), and its first values."""
+    """A column: what its name says (words, unit, quantity of the unit), and its first values."""
 
     def __init__(self, place, name, values, decimal):
         self.place, self.name = place, name
@@ -219,24 +219,24 @@ class _Column:
         self.quantity, self.unit = meant or ("time" if self.is_time else None, None)
 
     def can_be(self, part):
-        """Whether neither unit nor values speak against a part, nor a word against all."""
+        """Whether neither unit nor values exclude this part, and no word excludes all parts."""
         if self.words & set(_OF_NO_PART.split()) or self.quantity not in (None, *_QUANTITIES[part]):
             return False
         if part == "time":
             steps = np.diff(self.numbers)
-            against = min(np.sum(steps < 0.0), np.sum(steps > 0.0))  # the last may come first
+            against = min(np.sum(steps < 0.0), np.sum(steps > 0.0))  # rows may be in reverse order
             return self.is_time or (self.numbers.size > 0 and against <= 0.1 * steps.size)
         if self.numbers.size == 0:
-            # Texts that begin like numbers, and no labels: reading them will say what is wrong.
+            # Texts that begin like numbers are taken: reading them will say what is wrong.
             is_label = self.words & _OF_LABELS.union(*_LABELS.values())
             return self.text.lstrip("+-.,\u2212")[:1].isdigit() and not (self.is_time or is_label)
         # A flag or a trend takes a few whole values.
         return part != "temperature" or not np.isin(self.numbers, (-1.0, 0.0, 1.0)).all()
 
     def score(self, part):
-        """How much the name speaks for a part; zero and less where it does not."""
+        """How much the name speaks for a part; zero or less if it does not."""
         score = sum(_SCORES[part].get(word, _STRANGER) for word in self.words)
-        # A supply voltage never changes.
+        # A signal that never changes is no output, but a supply voltage.
         if part == "output" and self.quantity == "signal" and np.unique(self.numbers).size > 1:
             score += _SIGNAL
         return score + (_UNIT if self.unit else 0.0)
@@ -253,7 +253,7 @@ def _by_name(part, columns, layout):
     if most <= 0.0:
         return
     best = [columns[place] for place, score in scores.items() if score == most]
-    # Numbers before texts; of one truth in two units that which needs no conversion.
+    # Numbers before texts; of one quantity in two units, the one that needs no conversion.
     best.sort(key=lambda c: (c.numbers.size == 0, c.unit not in CANONICAL.values()))
     chosen = best[0]
     layout.places[part] = chosen.place
@@ -261,14 +261,14 @@ def _by_name(part, columns, layout):
 
 
 def _by_unit(part, columns, layout):
-    """The only column that is left with a unit of the part, or with times."""
+    """Take the only free column that has a unit of the part, or times."""
     found = [column for column in _free(part, columns, layout) if column.quantity]
     if part != "rate" and len(found) == 1:
         layout.places[part] = found[0].place
 
 
 def _settle_axis(columns, layout):
-    """Of outputs whose names say as much, that of the axis which the table turns."""
+    """Among outputs with equally good names, take the axis that the table turns."""
     others = [column for column in columns if column.name in layout.others.get("output", [])]
     if not others or "rate" not in layout.places:
         return
@@ -276,7 +276,7 @@ def _settle_axis(columns, layout):
     own = [columns[layout.places["output"]], *others]
     table = pd.DataFrame({c.place: convert(c.aligned, c.unit or CANONICAL["output"]) for c in own})
     correlation = table.corrwith(pd.Series(rate)).abs()
-    # How much each turns: those askew by a little feel the table too.
+    # How much each turns: slightly misaligned axes sense the table too.
     turned = ((correlation * table.std()) ** 2)[correlation > _FOLLOWS]
     if turned.max() > _FOLLOWS * turned.sum():
         layout.places["output"] = int(turned.idxmax())
@@ -284,7 +284,7 @@ def _settle_axis(columns, layout):
 
 
 def _settle_units(columns, layout, of_first):
-    """Units that the names say; or else those of the first file, or what the values tell."""
+    """Set the units: by the names; else as in the first file, or from the values."""
     values, own = {}, {}
     for part in _QUANTITIES.keys() & layout.places.keys():
         column = columns[layout.places[part]]
@@ -318,7 +318,7 @@ def _sentence(layout):
 
 
 def _place(source, name, taken):
-    """Position of a column by its name, or by that but for blanks around it and capitals."""
+    """Position of a column by its name; if there is none, ignoring outer blanks and case."""
     header, plain = source.header, name.strip().casefold()
     found = [place for place, other in enumerate(header) if other == name] or [
         place
@@ -333,7 +333,7 @@ def _place(source, name, taken):
 
 def _no_column(part, name, header, taken=()):
     found = ", ".join(map(repr, header[:20])) + (", ..." if len(header) > 20 else "")
-    # Columns that are called as another part are that.
+    # A column named after another part is not suggested for this one.
     left = [other for place, other in enumerate(header) if place not in taken]
     free = [other for other in left if other.strip().casefold() not in PARTS]
     close = [part] if part in header else difflib.get_close_matches(name, free, n=1, cutoff=0.4)

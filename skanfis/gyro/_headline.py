@@ -1,4 +1,4 @@
-"""What is told of a calibration: which compensation to use, what is proven, and formulas."""
+"""A calibration in words: which compensation to use and why, what is proven, formulas."""
 
 import numpy as np
 import pandas as pd
@@ -20,13 +20,13 @@ from .targets.error_model import ErrorModel
 
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
-# What the log cannot tell, what it was all learnt from, and what to log; of one thermal cycle.
+# What a log cannot show, and what it has too few of: rates or temperatures; thermal cycles.
 _FEW = "So few rates or temperatures cannot tell what is left at others", "few: log five or more"
 _CYCLE = "One cycle cannot tell whether this repeats", "cycle: record two more"
-_DIGITS = 4  # of what the noise makes of numbers: with them the text errs as the rules do
+_DIGITS = 4  # of the noise: to these, numbers are exact enough for the text to err as the rules do
 _MOST_ROWS = 20_000  # evenly chosen, to see whether the rules can be read
 _MANY_FLAGGED = 0.2  # of the rows
-_MOST_BOXES = 20_000  # for each bound; what is reached with them holds, and could be tighter
+_MOST_BOXES = 20_000  # per bound; more boxes would only make it tighter
 
 
 def headline(calibration, unit):
@@ -109,7 +109,7 @@ def flagged_text(calibration):
 
 
 def beyond(parts):
-    """In how many rows each input is out of its range, in words: of tables, lows and highs."""
+    """In how many rows each input is out of range, in words; ``parts`` are tables, lows, highs."""
     counts = sum(((rows < low) | (rows > high)).sum() for rows, low, high in parts)
     named = [f"{name} in {n:,}" for name, n in counts.sort_values(ascending=False).items() if n]
     return f" ({', '.join(named)})" if named else ""
@@ -159,28 +159,28 @@ def of_rates(compensator, log, rates):
 
 
 def written_text(calibration):
-    """What is written, and whether that is what is recommended."""
+    """Which compensation is written, and whether it is the recommended one."""
     asked = calibration.recipe.write != "recommended"
     others = "as --write asks" if asked else "as recommended; --write chooses another"
     return f"{ARTICLES.get(calibration.written, 'the fuzzy rules')}, {others}"
 
 
 def against_reading(calibration):
-    """What speaks against reading the rules; not that they err in few digits: the text has more."""
+    """Reasons against reading the rules one by one; rounding is none, as the text has digits."""
     places = evenly_chosen(len(calibration.X), _MOST_ROWS)
     X, left = calibration.X.iloc[places], (calibration.before - calibration.rate)[places]
     if calibration.recipe.physics:
         left = calibration.rate[places] - calibration.model.base_.predict(X)
-    # Rows that the law refuses are no business of the rules.
+    # The rules are not judged on rows that the law refuses.
     known = np.isfinite(left)
     return readability(calibration.rules, X[known], left[known]).on_rules
 
 
 def proven_bounds(calibration):
-    """What is proven of the rules, or a cubic, in the range of the calibration.
+    """What is proven about the rules, or a cubic, in the range of the calibration.
 
-    The size that no compensation exceeds [deg/s]; and whether the compensated rate always follows
-    the output: None if the output is no input, or what stands beside the rules is not bounded.
+    First the size that no compensation exceeds [deg/s], then whether the compensated rate always
+    follows the output: None if output is no input, or the part beside the rules is not bounded.
     """
     compensator, X = calibration.compensator, calibration.X
     per_output, rules = 1.0 / compensator.scale_factor, compensator.estimator
@@ -192,7 +192,7 @@ def proven_bounds(calibration):
     largest = float(np.abs([found.lower, found.upper]).max())
     if compensator.predicts == "rate" or "output" not in X:
         return largest, None
-    # rate = output / factor - error: its slope has the factor's sign where the error's is less.
+    # rate = output / factor - error: it follows the output if 1 / factor outweighs error's slope.
     slope = gradient_bounds(rules, "output", max_boxes=_MOST_BOXES)
     follows = slope.upper < per_output if per_output > 0.0 else slope.lower > per_output
     return largest, bool(follows[0])
@@ -213,7 +213,7 @@ def formula_of(calibration, name):
 
 
 def rules_text(calibration):
-    """What is written, as text: units; a formula, or rules behind what speaks against reading."""
+    """The written compensation as text: units, then a formula, or cautions and rules."""
     recipe, law, caution = calibration.recipe, "", ""
     units = input_units(calibration.compensator)
     inputs = "".join(f", {name} in {units[name]}" for name in recipe.inputs)
@@ -224,7 +224,7 @@ def rules_text(calibration):
         caution = "\n".join(["What speaks against reading the rules one by one:", *against, "", ""])
     if recipe.physics:
         law = f"{law_text(calibration.model.base_, recipe)}\nTo this rate the rules add:\n\n"
-    # Folded, a model knows of no readability in training, and the text has the caution once.
+    # A folded model has no readability from training: so the text has the caution only once.
     names = ["rate beyond the law" if recipe.physics else "error"]
     rules = export_text(fold(calibration.rules), precision=_DIGITS, output_names=names)
     return f"{told}{law}{caution}{rules}\n"
@@ -246,19 +246,19 @@ def law_text(law, recipe):
 
 
 def _in_powers(coefficients):
-    """Of t, the lowest first."""
+    """A polynomial in t as text, the lowest power first."""
     powers = enumerate(coefficients[1:], start=1)
     terms = [_term(value, " t" if power == 1 else f" t^{power}") for power, value in powers]
     return f"{coefficients[0]:.8g}{''.join(terms)}"
 
 
 def _term(value, factor=""):
-    """What is to be added, with its sign; nothing for zero."""
+    """A summand as text, with its sign; empty for zero."""
     return f" {'-' if value < 0 else '+'} {abs(value):.8g}{factor}" if value else ""
 
 
 def _line(what, estimator, inputs):
-    """What a single rule gives: a constant or a line."""
+    """The output of a single rule as text: a constant or a line."""
     model = FrozenRules.of(estimator, len(inputs)).model
     constant, *slopes = model.coefficients.ravel()
     lines = [f"{what} = {constant:.9g}"]
@@ -268,7 +268,7 @@ def _line(what, estimator, inputs):
 
 
 def _cubic(cubic, inputs):
-    """In standardised inputs, which keep the digits that count."""
+    """A cubic as text, in standardised inputs, so that no digits are lost."""
     names = [f"z{j + 1}" for j in range(len(inputs))]
     lines = [
         f"{name} = ({column} - ({center:.9g})) / {scale:.9g}"

@@ -24,10 +24,10 @@ from .errors import UsageError, shortened
 from .metrics import ALLAN_FIGURES, figures_of_merit
 
 PROGRAM = "python -m skanfis.gyro"
-_MOST_RULES = 500  # a grid that could neither be told nor learnt
+_MOST_RULES = 500  # a larger grid could be neither shown nor learnt
 _FORM = re.compile(r"\s*(?P<value>(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?)\s*(?P<unit>.*?)\s*")
 _UNITS = {figure.name: figure.unit for figure in figures_of_merit()} | ALLAN_FIGURES
-_AT_LEAST = ("reduction_factor",)  # of this more is better
+_AT_LEAST = ("reduction_factor",)  # figures of which more is better
 
 _TARGET = re.compile(
     r"(rate-)?table(:(float|double|q31|q15))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
@@ -123,7 +123,7 @@ def make_parser():
 
 
 def check_kind(parser, options):
-    """UsageError for options that have no say with --apply."""
+    """Raise UsageError for options that have no effect with --apply."""
     idle = vars(options).keys() - {"logs", "columns", "units", "output", "force", "quiet", "apply"}
     given = [name for name in sorted(idle) if getattr(options, name) != parser.get_default(name)]
     if options.apply and given:
@@ -132,7 +132,7 @@ def check_kind(parser, options):
 
 
 def request_of(options, require, assumed=None, optional=()):
-    """What the options ask of a reading; UsageError where they name an unknown part or unit.
+    """What to read, as the options say; UsageError for an unknown part or unit.
 
     ``assumed`` are units of columns that name none; None leaves them to the values. Rows that lack
     a value of the ``optional`` parts are kept.
@@ -196,7 +196,7 @@ def _terms(text):
 
 
 class Limit(NamedTuple):
-    """The size that a figure may have at most, or at least; ``text`` is what was typed of it."""
+    """The largest, or smallest, size that a figure may have; ``text`` is the value as typed."""
 
     figure: str
     value: float
@@ -208,7 +208,7 @@ class Limit(NamedTuple):
 
 
 def parse_limit(text):
-    """A limit such as ``bias=5deg/h``; ArgumentTypeError where it is none."""
+    """Parse a limit such as ``bias=5deg/h``; ArgumentTypeError if it is none."""
     figure, _, typed = text.partition("=")
     if figure not in _UNITS:
         raise ArgumentTypeError(
@@ -223,7 +223,7 @@ def parse_limit(text):
     wanted = dict.fromkeys(in_rate_unit(usual, rate)[0] for rate in RATE_UNITS)
     known = {signs(name): name for name in wanted}
     if rate_unit_of(usual) is None:
-        # Without its unit, and "ppm" alone, it is clear as well.
+        # Also clear: no unit at all, or its first word, such as "ppm".
         known |= {"": usual, usual.partition(" ")[0]: usual}
     unit = known.get(signs(found["unit"]))
     if unit is None:

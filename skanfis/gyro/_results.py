@@ -1,4 +1,4 @@
-"""What the report shows of a calibration: errors, figures of merit, limits, and pictures."""
+"""The contents of a calibration's report: errors, figures of merit, limits and pictures."""
 
 import base64
 import io
@@ -26,10 +26,10 @@ from .thermal_displays import (
 )
 
 _PER_MINUTE = 60.0
-_SMALL = 0.05  # deg/s
+_SMALL = 0.05  # deg/s RMS, up to which errors are shown in deg/h
 _DOTS_PER_INCH = 160  # sharp in print
 _FORMULA = re.compile(r"^[=+\-@\t\r](?![\d.]+$)")
-_MOST_ROWS_SHOWN = 20_000  # rows beyond cover one another
+_MOST_ROWS_SHOWN = 20_000  # more rows would hide one another
 # Display and caption by name of the files; a caption's first sentence is also the alternative text.
 _PICTURES = {
     "error-by-time": (ErrorDisplay, "Error against time, before and after."),
@@ -64,9 +64,9 @@ _COVERAGE = (
 
 
 class Picture(NamedTuple):
-    """What a page shows: a PNG image, what those who cannot see it are told, CSV files; in base64.
+    """A picture on the page: PNG image, alternative text, caption and CSV files, in base64.
 
-    ``is_tall`` tells how the picture stands on paper.
+    ``is_tall`` is whether it is higher than wide, for its place on paper.
     """
 
     image: str
@@ -77,15 +77,15 @@ class Picture(NamedTuple):
 
     @classmethod
     def of(cls, subject, figure, tables, caption):
-        """The figure painted, and its tables as files."""
+        """Render a figure as an image, and its tables as CSV files."""
         from matplotlib.backends.backend_agg import FigureCanvasAgg
 
         file = io.BytesIO()
-        # No software and date, for reports on one log to be the same. savefig would draw it twice.
+        # Without software and date, reports on one log are equal. savefig would draw it twice.
         FigureCanvasAgg(figure).print_png(file, metadata={"Software": None})
         files = {}
         for name, table in tables.items():
-            # What a spreadsheet would take for a formula has an apostrophe in front.
+            # An apostrophe keeps a spreadsheet from taking a text for a formula.
             texts = table.select_dtypes(exclude="number").map(str)
             table = table.assign(**texts.replace(_FORMULA, r"'\g<0>", regex=True))
             text = table.to_csv(index=False, float_format="%.9g", lineterminator="\n")
@@ -97,10 +97,10 @@ class Picture(NamedTuple):
 
 
 class Results:
-    """What the sections of the report need; rates are NaN where a row was out of range.
+    """Data for the sections of the report; rates are NaN on rows out of range.
 
-    What was asked for may all be missing: limits, the command line as typed, name, size [bytes] and
-    SHA-256 of files, and entries of the page's own table.
+    All of these are optional: limits; the command line as typed; name, size [bytes] and SHA-256 of
+    files; entries of the page's own table.
     """
 
     def __init__(self, calibration, *, limits=(), typed="", files=(), **entries):
@@ -115,18 +115,18 @@ class Results:
         self.run = self.log["run"].astype(str) if "run" in self.log else None
         self.temperature_rate = None
         if self.time is not None:
-            # Whether or not it is an input: what temperature alone leaves is seen by it.
+            # Needed even if it is no input: it shows what temperature alone cannot compensate.
             change = features(
                 self.log, ("temperature_rate",), calibration.compensator.time_constant
             )
             self.temperature_rate = _PER_MINUTE * change["temperature_rate"].to_numpy()
-        # That in which errors are no long row of zeros.
+        # The unit in which errors do not begin with many zeros.
         is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
         self.unit = "deg/s" if is_large else "deg/h"
         self.symbol = signs(self.unit)
 
     def shown(self, error):
-        """An error [deg/s] in the unit for errors, without it; a dash where it is not known."""
+        """An error [deg/s] as a number in the unit for errors; a dash if it is not known."""
         return three_digits(RATE_UNITS[self.unit] * error)
 
     @cached_property
@@ -148,7 +148,7 @@ class Results:
 
     @cached_property
     def no_allan(self):
-        """Why there is no Allan deviation; empty where there is one."""
+        """Why there is no Allan deviation; empty if there is one."""
         if find_spec("allantools") is None:
             return "allantools is not installed (pip install allantools)"
         if self.time is None:
@@ -166,7 +166,7 @@ class Results:
 
     @cached_property
     def pictures(self):
-        """The pictures of the held-out rows that have a sense on this log, by name."""
+        """The pictures of the held-out rows that make sense for this log, by name."""
         heat, change = {"temperature": self.temperature}, self.temperature_rate
         label = "temperature [degC]"
         found = {
@@ -195,7 +195,7 @@ class Results:
         return pictures
 
     def coverage(self):
-        """The picture of the coverage; none where temperature or output is no input."""
+        """The picture of the coverage; none if temperature or output is no input."""
         calibration = self.calibration
         X = calibration.X[list(calibration.compensator.inputs)]
         if not {"temperature", "output"} <= set(X):
@@ -211,7 +211,7 @@ class Results:
         yield Picture.of("coverage", figure, display.tables(), _COVERAGE)
 
     def memberships(self):
-        """The picture of the membership functions; none where no input has terms."""
+        """The picture of the membership functions; none if no input has terms."""
         rules, X = self.calibration.rules, self.calibration.X
         n_inputs = len({term["input"] for term in rules[-1].memberships_})
         if not n_inputs:
@@ -231,7 +231,7 @@ class Results:
 
 
 def _figure(**options):
-    """A figure that is not pyplot's, which would look for a screen."""
+    """A figure made without pyplot, which would look for a screen."""
     from matplotlib.figure import Figure
 
     return Figure(layout="constrained", dpi=_DOTS_PER_INCH, **options)

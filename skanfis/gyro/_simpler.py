@@ -1,8 +1,8 @@
-"""Compensations that are simpler than rules, held out on the same rows: rules must beat them.
+"""Simpler compensations, judged on the same held-out rows as the rules, which must beat them.
 
-They are written, applied and exported as rules are: each has a single rule, whose box, coverage and
-policy are those of the rows that it was fitted to. A constant or a line is what that rule gives;
-beside the arcsine law, or a cubic, it gives that line or zero.
+Each has a single rule, so that it is written, applied and exported as rules are, with the box,
+coverage and policy of its training rows. A constant or a line is that rule itself. Beside the
+arcsine law or a cubic the rule adds a line or zero.
 """
 
 import warnings
@@ -19,11 +19,11 @@ from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
 from .compose import FrozenRules, Polynomial, ResidualRegressor, joined, law_and_rules
 from .physics import OpenLoopArcsineRegressor
 
-# Law and rules are fitted in turn: a law fitted once bends towards what dies away after power-on.
+# Law and rules are fitted in turn: a law fitted once is bent by the transient after power-on.
 ROUNDS = 2
 NOTHING = "no compensation"
 LAW_AND_LINE = "arcsine law and a line"
-# By what the command's --write calls them.
+# Compensations by their value of the command's option --write.
 NAMES = {
     "none": NOTHING,
     "constant": "constant",
@@ -39,8 +39,8 @@ class Simpler:
     """A simple compensation.
 
     ``after`` is the compensated rate of every row, by the model of ``fold_models`` that had not
-    seen its group; ``estimator`` is fitted to all rows. There are none where the log does not allow
-    it: ``missing`` says why.
+    seen its group; ``estimator`` is fitted to all rows. Both are None if the log does not allow
+    this compensation: ``missing`` says why.
     """
 
     name: str
@@ -58,7 +58,7 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
     """
     parts = [train for train, _ in folds] + [rows]
     with warnings.catch_warnings():
-        # Not warned of: what each compensation is worth is measured.
+        # Warnings are not needed: the worth of each compensation is measured.
         for category in (ConvergenceWarning, ConstantInputWarning, OutOfBoundsWarning):
             warnings.simplefilter("ignore", category)
         for name, predicts, fit in kinds(list(X), policy):
@@ -72,7 +72,7 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
                         n_lost = np.count_nonzero(is_lost)
                         raise ValueError(f"it has no finite prediction for {n_lost} rows")
             except ValueError as error:
-                # Only the law has reasons: the rate never changes, or rows are too few for it.
+                # Only the law fails: the rate never changes, or it has too few rows.
                 yield Simpler(name, predicts, missing=str(error))
                 continue
             after = predicted if predicts == "rate" else before - predicted
@@ -87,7 +87,7 @@ def kinds(inputs, policy):
 
     def law(X, y):
         fitted = make_law(inputs, 1, policy).fit(X, y)
-        places = np.sort(fitted.columns_)  # the inputs that it is asked for, and flagged by
+        places = np.sort(fitted.columns_)  # the law's inputs, which alone flag rows
         return joined(fitted, replace(zero(X.iloc[:, places], y), positions=places))
 
     def law_and_line(X, y):
@@ -114,7 +114,7 @@ def make_law(inputs, degree, outside):
     return OpenLoopArcsineRegressor(
         "output",
         "temperature" if "temperature" in inputs else None,
-        # The lag of the thermometer is part of the law where it can be known.
+        # The thermometer lag is part of the law if the inputs allow to fit it.
         temperature_rate="temperature_rate" if knows_lag else None,
         amplitude_degree=degree,
         bias_degree=degree,

@@ -1,4 +1,4 @@
-"""The table in a file: its header, its rows, and columns as numbers."""
+"""Read the table in a log file: its header, its rows, and columns as numbers."""
 
 import codecs
 import contextlib
@@ -14,16 +14,16 @@ from ._columns import unit_in
 from ._tables import EXCEL, HEAD_ROWS, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
 from .errors import LogError
 
-# What loggers write where there is no value, beside what pandas knows.
+# Marks of missing values that loggers write, beside those that pandas knows.
 NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
 
-# Refused at once: csv would take minutes over such a line.
+# Longer lines are refused at once: csv would take minutes for one.
 _LONGEST_LINE, _MOST_COLUMNS = 2**22, 10_000
 _HEAD_BYTES = 2**16
 _END_OF_PREAMBLE = "***End_of_Header***"
 _SEPARATORS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "", " ": "blanks"}
 _NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
-# A number or a moment, in full; a number with a fraction.
+# A cell that is a number, a date or a time; a number with a decimal fraction.
 _VALUE = re.compile(r"[+\u2212-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
 _FRACTION = re.compile(r"[+\u2212-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
 
@@ -38,7 +38,7 @@ _FORMATS = [
         for clock in ("%H:%M:%S", "%H:%M:%S.%f", "%I:%M:%S %p", "%H:%M")
     ),
 ]
-_CLOCK_ROWS = 200  # by which the form of a clock is told
+_CLOCK_ROWS = 200  # from which the format of a clock is found
 _EPOCH = pd.Timestamp(0, tz="UTC")
 _DAY = 86_400.0  # s
 
@@ -57,7 +57,7 @@ class _TextSource:
     """A text file with a header and one record per line.
 
     ``header`` are the names of the columns, ``decimal`` is the sign of the decimal fraction;
-    ``notes`` tell what was found out.
+    ``notes`` say what was detected.
     """
 
     def __init__(self, path):
@@ -74,11 +74,11 @@ class _TextSource:
         self._check_lengths()
 
     def _find_separator(self):
-        """The first sign that is on all lines, those of a preamble aside; else a comma."""
+        """Take the first separator that is on all lines but a preamble's; else a comma."""
         for sign, name in _SEPARATORS.items():
             self._separator = sign
             lengths = [len(values) for _, values in islice(self._records(), HEAD_ROWS)]
-            # A comma on the last line goes before blanks, of which any text has some.
+            # A comma need only be on the last line: blanks, the next choice, are in any text.
             ends = lengths[len(lengths) // 3 :] if sign != "," else lengths[-1:]
             if min(ends, default=0) > 1:
                 self.notes += [f"columns are separated by {name}"] if name else []
@@ -106,7 +106,7 @@ class _TextSource:
             )
 
     def _check_lengths(self):
-        """Refuse rows longer than the header, which pandas would cut without a word."""
+        """Refuse rows longer than the header, which pandas would cut silently."""
         n_columns = len(self.header)
         with contextlib.suppress(UnicodeError), open(self.path, encoding=self._encoding) as file:
             if all(line.count(self._separator) < n_columns for line in file):
@@ -119,9 +119,9 @@ class _TextSource:
                 )
 
     def _records(self):
-        """First line, from 1, and values of every record that is not blank; quotes hide line ends.
+        """Yield line number (from 1) and values of each record; quoted line ends do not split one.
 
-        LogError where the file is no such table.
+        Blank records are left out. LogError if the file is no such table.
         """
         limit = csv.field_size_limit(_LONGEST_LINE)
         line = 1
@@ -135,7 +135,7 @@ class _TextSource:
                             f"{self.path}, line {line}: has {len(values):,} columns; a log has "
                             f"{_MOST_COLUMNS:,} at most."
                         )
-                    # The sign of a comment stands before names, and is none.
+                    # A comment sign before the first name is not part of the name.
                     first = values[0].lstrip("#%/ ") if values else ""
                     if first or self._separator == " ":
                         values[:1] = [first] if first else []
@@ -161,14 +161,14 @@ class _TextSource:
             yield line
 
     def place_of(self, row):
-        """In words, on which line of the file, from 1, a row starts."""
+        """The line of the file, from 1, on which a row starts, in words."""
         lines = (line for line, _ in self._records())
         return f"line {next(islice(lines, row + self._n_above, None), row + self._n_above + 1)}"
 
     def table(self, places, labels=(), n_rows=None):
         """The first rows, or all; columns by their places, those of ``labels`` as texts.
 
-        The index is the position in the file. LogError where the file is no such table.
+        The index is the position in the file. LogError if the file is no such table.
         """
         try:
             with open(self.path, encoding=self._encoding, newline="") as file:
@@ -191,7 +191,7 @@ class _TextSource:
         except pd.errors.EmptyDataError:
             return pd.DataFrame(columns=list(places), dtype="string")
         except pd.errors.ParserError as error:
-            # Of an interrupt pandas says no more.
+            # pandas reports an interrupt by this text alone.
             if "Calling read(nbytes) on source failed" in str(error):
                 raise KeyboardInterrupt from error
             raise LogError(f"{self.path}: is no table: {str(error).strip()}") from error
@@ -200,11 +200,11 @@ class _TextSource:
 
 
 def header_place(rows):
-    """Places of the header and of the first row below it, among the first rows; the names.
+    """Find the header among the first rows: its place, that of the first row below, the names.
 
     The header is the last line before those of numbers. Units may have a line of their own.
     """
-    # LabVIEW's own end of a preamble, which has lines of numbers.
+    # LabVIEW marks the end of its preamble, which has lines of numbers.
     ends = [k for k, values in enumerate(rows) if values[0].strip() == _END_OF_PREAMBLE]
     start = ends[-1] + 1 if ends else 0
     data = [k >= start and _is_data(values) for k, values in enumerate(rows)]
@@ -239,7 +239,7 @@ def _find_encoding(path):
         return "utf-16"
     for encoding in ("utf-8-sig", "cp1252"):
         with contextlib.suppress(UnicodeDecodeError):
-            # The last sign of the head may be cut.
+            # Incremental, because the head may end within a character.
             text = codecs.getincrementaldecoder(encoding)().decode(head)
             if not _NO_TEXT.search(text):
                 return encoding
@@ -260,7 +260,7 @@ def _is_data(values):
 
 
 def as_numbers(column, decimal=".", form=""):
-    """A column as floats; dates, durations and texts of a form in s, NaN for all else."""
+    """A column as floats; dates, durations and texts in the format ``form`` in s; else NaN."""
     if form:
         return _moments(_plain(column), form)
     if column.dtype.kind == "M":
@@ -274,7 +274,7 @@ def as_numbers(column, decimal=".", form=""):
 
 
 def clock_form(column):
-    """The form of most of the first texts of a column; empty where these are no times."""
+    """The time format of most of a column's first texts; empty if they are no times."""
     texts = _plain(column).dropna()[:_CLOCK_ROWS]
     fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
     best = max(_FORMATS, key=lambda form: fits[form])
@@ -282,9 +282,9 @@ def clock_form(column):
 
 
 def going_on(time, form, counter):
-    """Times [s], some NaN, that go on at midnight, or where a counter begins again; rows of that.
+    """Unwrap times [s], some NaN, at midnight or where a counter overflows; also return such rows.
 
-    A ``counter`` goes back by its range [s], unless it was set anew instead.
+    An overflow goes back by the range ``counter`` [s]; any other step back is a reset, and stays.
     """
     known = np.flatnonzero(np.isfinite(time))
     steps = np.diff(time[known], prepend=time[known[:1]])
@@ -301,7 +301,7 @@ def going_on(time, form, counter):
 
 
 def dated(dates, times):
-    """Dates and times of day of two columns as texts of one."""
+    """Join a column of dates and one of times of day to one of texts."""
     return _texts(dates).str.cat(_texts(times), sep=" ")
 
 

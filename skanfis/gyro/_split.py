@@ -1,4 +1,4 @@
-"""What a split must not tear apart (runs, devices, levels of a rate table), and which to choose.
+"""Cross-validation splits that keep runs, devices or rate levels whole, and which to choose.
 
 Groups are integers, one per row, as scikit-learn's splitters take them. docs/gyro_splits.rst says
 why levels must be held out.
@@ -15,42 +15,42 @@ from ..inspection.text import counted
 from ._columns import check_column
 from .errors import LogError
 
-# Relative to the largest rate: rates closer than that are one to any table.
+# Relative to the largest rate: no table tells closer rates apart.
 _SMALLEST_TOLERANCE = 1e-4
-# Gaps between levels are at least so many times those within a level.
+# Smallest ratio of a gap between levels to a gap within a level.
 _CLEAR_JUMP = 3.0
-# Of the rows: so many may lie in clusters too wide for a level.
+# Largest share of the rows that may lie in clusters too wide for a level.
 _SHARE_TOO_WIDE = 0.05
-# Of the range: rates without a clear jump that reach so much of it are spread over it.
+# Rates without a clear jump that cover more than this share of their range are spread over it.
 _SHARE_COVERED = 0.05
-# A cluster of so few rows, relative to a typical level, is of a table on its way.
+# A cluster with fewer rows, relative to a typical level, is a table between levels.
 _FEW_ROWS = 0.1
 
 KINDS = ("auto", "device", "run", "level", "device+level", "run+level", "leg", "piece")
 
-# With two legs each way, one can be held out while another tells its direction.
+# Fewest groups of a kind. Of two legs each way, one is held out, and the other shows its direction.
 _FEWEST = {"device": 3, "run": 3, "level": 5, "leg": 4, "piece": 2}
 # As in scikit-learn's cross-validation: each fold trains on four fifths.
 _N_FOLDS = 5
-# Of the levels, where runs are held out too: every fold then trains on two thirds of them.
+# Folds of the levels if runs are held out too: every fold then trains on two thirds of the levels.
 _N_LEVEL_FOLDS_BESIDE = 3
-# More levels than a few per term of any model cannot be memorised.
+# No model can memorise more levels than a few per term.
 _MOST_LEVELS = 100
-# Of the levels, beyond which runs are taken to share them.
+# Share of levels that several runs have, beyond which runs count as sharing levels.
 _SHARED = 0.1
 # A level is a dwell of a few rows, not a rate that came up once.
 _ROWS_PER_LEVEL = 3
-# Of the range of the temperature, between neighbours: three soaks leave a half.
+# Widest gap between temperatures, relative to their range: three soaks leave gaps of a half.
 _WIDEST_GAP = 0.4
-# What a temperature must come back by for a turn: of its range, and at least [degC].
+# From a turning point the temperature comes back by at least this share of its range, and [degC].
 _TURN, _SMALLEST_TURN = 0.2, 3.0
-# A turning point is looked for among so many rows of each run.
+# Rows of each run among which turning points are searched.
 _MOST_POINTS = 5_000
 _NO_CLOCK = (
     " No column of the time was found, whose gaps would tell runs apart: name it with --columns "
     "time=NAME."
 )
-# Cautions where there are several of a kind, and too few of them.
+# Cautions if there are several groups of a kind, but too few to hold one out.
 _TOO_FEW = {
     "level": "the table stood still at {} rates alone, but for their sign, too few to hold one "
     "out: what is left at all others is not known, and may be any.",
@@ -70,10 +70,10 @@ _WORDS = {
 
 
 def group_by_rate_level(rate: ArrayLike) -> np.ndarray:
-    """Groups that hold a level of the rate table together, found from the rates themselves.
+    """Group rows by the level of the rate table, found from the rates themselves.
 
-    Rates are of one level where the gap between neighbours is smaller than the clearest jump of the
-    gaps, sorted. Rows of a table on its way count to the nearest level.
+    Gaps between neighbouring rates are sorted, and their clearest jump separates gaps within a
+    level from gaps between levels. Rows of a table between levels count to the nearest level.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def group_by_rate_level(rate: ArrayLike) -> np.ndarray:
 
 
 def level_numbers(rate, fewest=1):
-    """Number of each row's level, lowest first, of ``fewest`` rows each; None if most have none."""
+    """Number of each row's level, from the lowest; None if most rows are in no level of enough."""
     values, inverse, n_rows = np.unique(rate, return_inverse=True, return_counts=True)
     gaps = np.diff(values)
     smallest = _SMALLEST_TOLERANCE * np.abs(values).max()
@@ -137,7 +137,7 @@ def level_numbers(rate, fewest=1):
     is_spread = len(levels) * smallest > _SHARE_COVERED * (high[-1] - low[0]) > 0
     if tolerance == smallest and is_spread:
         return None
-    # Each cluster to the nearest level, which is its own if it is one.
+    # Each cluster goes to the nearest level, which for a level is the cluster itself.
     return np.searchsorted(0.5 * (levels[1:] + levels[:-1]), centers)[clusters]
 
 
@@ -155,8 +155,9 @@ def _clearest_tolerance(gaps, smallest):
 class Split:
     """Folds of a cross-validation: every row is tested once, by a model that is new to its group.
 
-    ``labels`` are those that a report lists, ``sentence`` says what was held out and why, and
-    ``cautions`` what that cannot show. It recommends ``most`` at most, as ``--write`` calls that.
+    ``labels`` name the groups in a report, ``sentence`` says what was held out and why, and
+    ``cautions`` what this cannot show. ``most``, a value of ``--write``, is the most complex
+    compensation that it can recommend.
     """
 
     kind: str
@@ -168,7 +169,7 @@ class Split:
 
 
 def choose_split(log, kind="auto", *, uses_output=True):
-    """The split of the kind asked for; of "auto", of the kind that the log calls for.
+    """The split of the kind asked for; with "auto", of the kind that suits the log.
 
     ``uses_output``: only a compensator that sees the output can memorise levels of the rate.
     """
@@ -193,7 +194,7 @@ def choose_split(log, kind="auto", *, uses_output=True):
     for part in parts:
         _check(part, counts)
     numbers = np.column_stack([fold_numbers(part, groups[part], len(parts)) for part in parts])
-    # Rows that share one part with those that are tested, the run or the level, are left out.
+    # Rows that share only the run, or only the level, with tested rows are neither side's.
     sides = ((numbers != fold, numbers == fold) for fold in np.unique(numbers, axis=0))
     folds = [tuple(np.flatnonzero(side.all(axis=1)) for side in pair) for pair in sides]
     what = " and ".join(_WORDS[part][0] for part in parts)
@@ -206,14 +207,14 @@ def choose_split(log, kind="auto", *, uses_output=True):
     if "temperature" in log and (gap := _gap(log["temperature"].to_numpy())):
         cautions, most = (*cautions, _NO_ROWS.format(*gap)), most or "law-line"
     if "level" in few:
-        # Four tell more than the two coefficients that bend the law; fewer could be learnt by it.
+        # Two coefficients bend the law: four levels test it, fewer could be memorised by it.
         most = "law-line" if counts["level"] == _FEWEST["level"] - 1 else "line"
     return Split(kind, folds, _labels(log, parts[0], groups[parts[0]]), sentence, cautions, most)
 
 
 def _gap(temperature):
-    """Ends of the widest gap between temperatures; None where it is small beside their range."""
-    # One or two that are far from all others are no soak.
+    """Ends of the widest gap between temperatures; None if it is small beside their range."""
+    # One or two rows far from all others are no soak.
     values = np.sort(temperature)[_ROWS_PER_LEVEL - 1 : 1 - _ROWS_PER_LEVEL]
     if values.size < 2:
         return None
@@ -240,7 +241,7 @@ def _choose(groups, counts, has_time):
         return whole, "too few runs to hold out"
     if "level" in enough and counts["level"] <= _MOST_LEVELS:
         pairs = np.unique(np.column_stack([groups["level"], groups[whole]]), axis=0)
-        # Levels, on average, that are met by two groups or more.
+        # Share of the levels that two groups or more have.
         if np.mean(np.unique(pairs[:, 0], return_counts=True)[1] > 1) > _SHARED:
             return f"{whole}+level", f"the {whole}s share rate levels, which could be memorised"
     return whole, f"rows of one {whole} are alike"
@@ -263,10 +264,10 @@ def fold_numbers(part, groups, n_parts):
     if part == "level":
         return groups % (_N_LEVEL_FOLDS_BESIDE if n_parts > 1 else _N_FOLDS)
     if part == "piece":
-        # The pieces of every leg in turn: with one of a leg that warms goes one at another
-        # temperature of the next, which cools. The model has seen each temperature one way.
+        # Hold out one piece of every leg. A warming leg and the next, cooling one lose different
+        # temperatures, so that the model has seen each temperature in one direction.
         return (_pieces(groups) + 2 * groups) % _N_FOLDS
-    # In their order, whatever their sizes: a row more or less moves no group to another fold.
+    # By order and not by size, so that a row more or less moves no group to another fold.
     return groups % min(_N_FOLDS, np.unique(groups).size)
 
 
@@ -287,7 +288,7 @@ def _labels(log, part, groups):
 
 
 def find_legs(temperature, run=None):
-    """Number of each row's leg, from one turning point of the temperature to the next, by runs."""
+    """Number of each row's leg, run by run; turning points of the temperature separate legs."""
     least = max(_TURN * float(np.ptp(temperature)), _SMALLEST_TURN)
     runs = np.zeros(temperature.size) if run is None else np.asarray(run)
     legs, n_legs = np.empty(temperature.size, dtype=int), 0
@@ -300,12 +301,12 @@ def find_legs(temperature, run=None):
 
 def _turns(temperature, least):
     """Rows at which the temperature turns, and comes back by ``least`` or more before the next."""
-    # Of some rows: a soak with many that are equally high takes the square of their number.
+    # Some rows suffice: for a soak of equal values the time grows as the square of their number.
     every = -(-temperature.size // _MOST_POINTS)
     some = temperature[::every]
     highs, lows = (find_peaks(side, prominence=least)[0] for side in (some, -some))
     turns = pd.concat([pd.Series("high", highs), pd.Series("low", lows)]).sort_index()
-    # Of several that are equally high, as rounding leaves at a soak, the first.
+    # Of several highs or lows in a row, as rounding leaves at a soak, take the first.
     return turns.index[turns != turns.shift()] * every
 
 

@@ -1,4 +1,4 @@
-"""Tables in files of Parquet, MATLAB and Excel, in the form of a source of a log."""
+"""Read tables from files of Parquet, MATLAB and Excel, as sources of a log."""
 
 from collections.abc import Mapping
 from contextlib import contextmanager
@@ -10,12 +10,12 @@ from .errors import LogError, needed
 
 PARQUET, MATLAB, EXCEL = (".parquet", ".pq"), (".mat",), (".xlsx", ".xlsm")
 _HDF5 = b"\x89HDF"
-# Lines above the header that a logger may write, and a few rows.
+# Enough for the lines that a logger may write above the header, and a few rows.
 HEAD_ROWS = 60
 
 
 class TableSource:
-    """As a text file, of a table that is held whole; ``first`` is the number of its first row."""
+    """A table held in memory, as a source; ``first`` is the number of its first row."""
 
     decimal = "."
 
@@ -31,15 +31,15 @@ class TableSource:
 
 
 class ParquetSource(TableSource):
-    """A table of which no columns are held but those asked for."""
+    """A table of which only the columns asked for are read."""
 
     def __init__(self, path):
         told = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
         parquet = needed("pyarrow.parquet", told)
         with open(path, "rb"):
-            pass  # what cannot be opened is told as of any other file
+            pass  # raises the same errors as for any other file
         with _read_as("Parquet", path):
-            # Not buffered ahead: what was read would stay as long as the file is open.
+            # No buffer: it would keep the data as long as the file is open.
             self._file = parquet.ParquetFile(path, pre_buffer=False)
         super().__init__(path, pd.DataFrame(columns=self._file.schema_arrow.names), [])
         if len(set(self.header)) < len(self.header):
@@ -57,7 +57,7 @@ class ParquetSource(TableSource):
 
 
 def matlab_source(path):
-    """The vectors of one length in a .mat file, of variables or of the fields of structs."""
+    """The vectors of the commonest length in a .mat file, from variables or fields of structs."""
     with open(path, "rb") as file:
         head = file.read(516)
     with _read_as("MATLAB file", path):
@@ -81,13 +81,13 @@ def matlab_source(path):
 
 @contextmanager
 def _read_as(kind, path):
-    """LogError where a library finds that a file is none of its kind."""
+    """Raise LogError if a library cannot read the file as its kind."""
     try:
         yield
     except (ImportError, MemoryError):
         raise
     except Exception as error:
-        # Of a damaged archive, XML or compression, by many names.
+        # Damaged archives, XML and compression raise errors of many types.
         reason = str(error).strip().partition("\n")[0].removesuffix(".")
         raise LogError(f"{path}: is no {kind} that can be read: {reason}.") from error
 

@@ -1,6 +1,6 @@
-"""Units that no name tells: settled by the values where one reading of them is plausible.
+"""Find the units that no name gives, from the values, if only one reading is plausible.
 
-What tells: how warm a chamber gets and that a log reaches room temperature; the full scales of
+The evidence: how warm a chamber gets, and that a log reaches room temperature; the full scales of
 gyros; the earth's rate; levels of a rate table, which are round numbers in its own unit; how fast a
 chamber heats; and that the output of a gyro, if it is a rate, changes as the true rate does.
 """
@@ -11,29 +11,29 @@ from ._columns import CANONICAL, SIGNALS, convert, convert_back, units_of
 from .errors import UsageError
 
 _NO_TEMPERATURE = 500.0  # marks of no value, such as 9999, are beyond it in any unit
-_COLDEST_IN_KELVIN = 150.0  # no log is above it throughout in degrees
-# A log that is always warmer, or reaches the second, may be in degF; one that reaches the third is.
+_COLDEST_IN_KELVIN = 150.0  # no log in degrees is above it throughout
+# A log always above the first, or reaching the second, may be in degF; beyond the third it is.
 _WARM, _HOT, _HOTTEST = 30.0, 86.0, 130.0
 _SINCE_1970 = 9e8, 4.1e9  # s, of clocks that tell a date from 1998 to 2099
 _STEPS = 1e-4, 600.0  # s, from one row to the next
-_HEATING = 5e-4, 60.0  # degC/min over a run, between which a time may be in s
-_CHAMBER = 0.02, 60.0  # between which it may be in another unit: as a chamber or a warm-up heats
+_HEATING = 5e-4, 60.0  # degC/min over a run: the range in which a time may be in s
+_CHAMBER = 0.02, 60.0  # the same for other units: as fast as a chamber or a warm-up heats
 _FAST = 10.0  # degC/min if in s, beyond which it may be in min or h: hardly any chamber is as fast
-_LEAST_HEATING = 1.0  # degC, below which heating tells nothing
+_LEAST_HEATING = 1.0  # degC; less heating tells nothing
 _SMALLEST_SCALE, _LARGEST_SCALE = 1.0, 2_200.0  # deg/s: the largest rate of a log that turns
 _LARGEST_BIAS = 20.0  # deg/s
 _EARTH_RATE = 15.041 / 3600.0  # deg/s
 _RATES = ("deg/s", "rad/s", "deg/h")
-_LARGEST_RATE = 1000  # of whole numbers at rest, beyond which they are taken for counts
-_MOST_LEVELS, _ROUND = 100, 0.5  # levels of a rate table, multiples of so many of its units
+_LARGEST_RATE = 1000  # larger whole numbers at rest are taken for counts
+_MOST_LEVELS, _ROUND = 100, 0.5  # most levels of a rate table; their step, in its unit
 _AS_THE_RATE = 0.7, 1.4  # slope of an output that is a rate
 
 
 def settle_units(values, units, *, is_all=True):
-    """Units of the parts that ``units`` lacks, by values of all (NaN where there is none).
+    """Find the units of the parts that ``units`` lacks, from the values of all (NaN: missing).
 
-    UsageError, with the options to copy, where more than one reading is plausible; but not of some
-    values alone, since all of them may tell.
+    If several readings are plausible, UsageError gives the options to copy; unless ``is_all`` is
+    false, when later values may still decide, and the first reading is returned.
     """
     heat = values.get("temperature", np.empty(0))
     values = values | {"temperature": np.where(np.abs(heat) < _NO_TEMPERATURE, heat, np.nan)}
@@ -44,7 +44,7 @@ def settle_units(values, units, *, is_all=True):
             ways = find(values, units)
             readings = [known | {part: unit} for known in readings for unit in ways]
     readings = [known | more for known in readings for more in _of_rates(values, units)]
-    # More values do not tell more of the clock: it is told by the first run.
+    # More values would not help for the time: its unit is found from the first run.
     if len(readings) > 1 and (is_all or len({each.get("time") for each in readings}) > 1):
         raise UsageError(_question(values, readings))
     return readings[0]
@@ -60,7 +60,7 @@ def settle_by_all(log, layout):
 
 
 def assumed_text(values, part, layout):
-    """What was assumed of a part, with its range and another reading; of values as in a log."""
+    """The assumed unit of a part in words, with its range and another unit; values as in a log."""
     name, unit = layout.name(part), layout.units[part]
     values = convert_back(np.array([values.min(), values.max()]), unit)
     if unit in SIGNALS:
@@ -116,7 +116,7 @@ def _of_time(values, units):
     steps = np.diff(time)
     if not (steps > 0.0).any() or not np.isfinite(heat).any():
         return ["s"]
-    # Of the first run, if the clock begins anew after it: not of a few rows before a glitch.
+    # Only the first run, if the clock restarts after it; a few rows are a glitch, not a run.
     ends = np.flatnonzero(steps < 0.0)
     end = ends[0] + 1 if ends.size and ends[0] > 10 else time.size
     degrees = convert(heat[:end], units.get("temperature", "degC"))
@@ -138,7 +138,7 @@ def _of_time(values, units):
 
 
 def _of_rates(values, units):
-    """Units of the output and the rate, which tell one another where the gyro turns."""
+    """Units of the output and the rate; if the gyro turns, each is evidence for the other."""
     output, rate = (values.get(part, np.empty(0)) for part in ("output", "rate"))
     own, true = units.get("output"), units.get("rate")
     lacking = [part for part in ("output", "rate") if part in values and part not in units]

@@ -1,7 +1,7 @@
-"""The arcsine law, or a cubic, and the rules for what it leaves, as one C function.
+"""Write the arcsine law, or a cubic, and the rules for its residual as one C function.
 
 The rules are written by ``skanfis.export`` under the name NAME_r as a static function of the same
-file; the law is written here. What is asked of an exported function stays: constant tables, no
+file; the law is written here. The requirements on exported functions hold: constant tables, no
 heap, no state, the status word.
 """
 
@@ -136,18 +136,18 @@ def export_c_physics(
     units: Mapping[str, str] | None = None,
     notes: Sequence[str] = (),
 ) -> CCode:
-    """Write the arcsine law and the rules for what it leaves as C: one header, one source file.
+    """Write the arcsine law and the rules for its residual as C: one header, one source file.
 
     The function ``int NAME_predict(const double x[], double y[])`` gives the compensated rate from
     one row of raw inputs, and a status, as :func:`skanfis.export.export_c` does for rules alone.
-    Of rows outside the range of either part see :doc:`/gyro_physics`.
+    For rows outside the range of either part see :doc:`/gyro_physics`.
 
     Parameters
     ----------
     estimator : fitted ResidualRegressor
-        Of an :class:`OpenLoopArcsineRegressor`, and an ANFIS or a Pipeline of scalers, selections
-        of columns and an ANFIS; or a search over such. The inputs of the function are the columns
-        that either part takes, in the order of X; the header names them.
+        With an :class:`OpenLoopArcsineRegressor` as base, and an ANFIS, or a Pipeline of scalers,
+        column selections and an ANFIS, as residual; or a search over such. The inputs of the
+        function are the columns that either part takes, in the order of X; the header names them.
     path, name, dtype, std, min_coverage
         As of :func:`skanfis.export.export_c`; ``name`` has at most 14 characters.
     units, notes
@@ -156,7 +156,7 @@ def export_c_physics(
     Returns
     -------
     code : CCode
-        The text of both files, and the most that an evaluation takes beside one arcsine.
+        The text of both files, and the largest cost of an evaluation, apart from one arcsine.
 
     Raises
     ------
@@ -196,11 +196,11 @@ def export_c_physics(
 
 
 class _Composition:
-    """Both parts on the inputs of the function, ``names``, and what of the law is rounded.
+    """Law and rules on the inputs of the C function, ``names``, with constants rounded as in C.
 
-    Rounded to the type are the law's range, the model of the rules, ``reference`` and ``tables``;
-    not the law's coefficients. ``arrays`` are all that C has of the law, these tables among them. A
-    Polynomial may stand for the law.
+    The law's range, the model of the rules, ``reference`` and ``tables`` are rounded to the C type;
+    the law's own coefficients are not. ``arrays`` are all arrays of the law in C, these tables
+    included. A Polynomial may stand for the law.
     """
 
     def __init__(self, law, rules, part, dtype):
@@ -212,7 +212,7 @@ class _Composition:
         self.rules = replace(rules, model=part.model, positions=positions)
         self.law, self.is_cubic = copy(law), isinstance(law, Polynomial)
         own = vars(self.law)
-        # It takes rows without names, of these columns alone, and says by NaN that it is silent.
+        # The copy takes rows of these columns without names, and gives NaN for no answer.
         own.pop("feature_names_in_", None)
         own |= {key: self.rounded(own[key]) for key in ("minimum_", "maximum_")}
         keys = {key: key for key in ("center", "scale", "coefficients")}
@@ -238,7 +238,7 @@ class _Composition:
 
     @property
     def box(self):
-        """Of every input, within which both parts know it."""
+        """The range of every input that both parts know."""
         low, high = np.full((2, len(self.names)), [[-np.inf], [np.inf]])
         for places, least, most in (
             (self.law.columns_, self.law.minimum_, self.law.maximum_),
@@ -321,7 +321,7 @@ def _cost(whole):
     of_rules = whole.part.cost
     sizes = [values.size for values in whole.tables.values()]
     n_inputs, n_rules_inputs = whole.law.columns_.size, whole.rules.positions.size
-    # Per polynomial its degree; the lag of the thermometer, and the slope beyond the phase.
+    # One product per degree of each polynomial, for the thermometer lag, and the slope beyond.
     products, divisions = sum(sizes) - len(sizes) + (n_inputs > 2), 2
     products += whole.law.out_of_bounds == "linear"
     if whole.is_cubic:
@@ -337,9 +337,9 @@ def _cost(whole):
 
 
 def _known_answers(whole):
-    """Rows, rates, status and tolerance, as for rules alone; some rows lie far up the sine.
+    """Rows, rates, status and tolerance, as for rules alone; some rows have large phases.
 
-    Rows so near to the largest phase or the coverage asked for that rounding decides are left out.
+    Rows so close to the largest phase or the least coverage that rounding decides are left out.
     """
     law, rules, part = whole.law, whole.rules, whole.part
     low, high = whole.box
@@ -350,15 +350,15 @@ def _known_answers(whole):
         output = law.columns_[0]
         X[3::4, output] = 3.0 * law.amplitude_[0] * (points[3::4, output] - 0.5)
     X = np.vstack([low, high, X]).astype(whole.dtype).astype(float)
-    # NaN past the amplitude.
+    # The phase is NaN where the output exceeds the amplitude.
     phase, limit = (0.0 * X[:, 0], 1.0) if whole.is_cubic else (phase_of(law, X), law.max_phase)
     phase, coverage = np.abs(phase), rules.coverage(X)
-    # Where no coverage is asked for, every row has enough.
+    # Without a least coverage, every row is covered.
     asked = -1.0 if part.min_coverage is None else part.min_coverage
     sure = ~(np.abs(phase - limit) < 1e-3) & (np.abs(coverage - asked) > 1e-3 * asked)
     chosen = np.flatnonzero(sure)[:ROWS]
     X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= limit)[chosen]
-    # The status tells, row by row.
+    # The status replaces the warning, row by row.
     with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
         of_law = law.predict(X)
     model, z = rules.model.with_out_of_bounds(_said(rules.model)), X[:, rules.positions]
@@ -373,7 +373,7 @@ def _known_answers(whole):
 
 
 def _steepest(whole, y):
-    """What rounding is magnified by: of the sine, or of an input that lies far from zero."""
+    """Factor that magnifies rounding errors of the sine, or of an input far from zero."""
     law = whole.law
     if not whole.is_cubic:
         return max(np.abs(y).max(), np.tan(law.max_phase) / np.abs(law.sagnac_factor_[0]))
@@ -384,5 +384,5 @@ def _steepest(whole, y):
 
 
 def _said(part):
-    """The policy of a part, where it raises that which says so row by row."""
+    """The policy of a part, but "nan" in place of "raise", to know the rows one by one."""
     return "nan" if part.out_of_bounds in SILENT else part.out_of_bounds

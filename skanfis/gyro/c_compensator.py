@@ -1,4 +1,4 @@
-"""A compensator as C: the function, units of inputs and rate, and what to do with the output."""
+"""Write a compensator as C, with notes on its inputs, their units, and the use of its output."""
 
 from typing import Any
 
@@ -10,7 +10,7 @@ from .compose import FrozenRules, ResidualRegressor
 SUBTRACT = "y[0] is the error of the raw rate: subtract y[0] from the raw rate."
 _TAKE = "y[0] is the compensated rate: take it in the place of the raw rate."
 
-# Of inputs of a compensator: units, and how they are made.
+# Units of the inputs of a compensator, and how the inputs are computed.
 _UNITS = {"time": "s", "temperature": "degC", "temperature_rate": "degC/s"}
 _NOTES = {
     "time": "time is that since power-on: zero at the first sample.",
@@ -42,7 +42,7 @@ def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
 
 
 def notes_on(compensator):
-    """What to do with the output, and how inputs are made, as sentences."""
+    """How to use the output, and how inputs are computed, as sentences."""
     use = SUBTRACT if compensator.predicts == "error" else _TAKE
     notes = [f"{use} {raw_rate_of(compensator)}"]
     notes += [note for name, note in _NOTES.items() if name in compensator.inputs]

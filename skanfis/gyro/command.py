@@ -1,6 +1,6 @@
 """The command ``python -m skanfis.gyro``: from a calibration log to a checked compensator.
 
-It writes files all together or not at all.
+It writes all files, or none.
 """
 
 import contextlib
@@ -31,21 +31,21 @@ from .log import find_logs, read
 from .targets.autopilots import NOTES
 from .targets.write import FILES, write_targets
 
-DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # and 2, of argparse
+DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # 2 is argparse's own
 INCOMPLETE = 5  # a target was refused; all else is written
 NOT_KEPT = 6  # all is written; a limit is not kept, or not measured
-INTERRUPTED = 130  # as a shell says of Ctrl-C
+INTERRUPTED = 130  # a shell's code for Ctrl-C
 
-# What a calibration may write.
+# All files that a calibration may write.
 _FILES = (
     *("compensator.json", "compensator.h", "compensator.c", "report.html", "report.pdf"),
     *("rules.txt", *chain.from_iterable(FILES.values())),
 )
-_STAGED = ".skanfis-"  # of folders that hold files until all are written
+_STAGED = ".skanfis-"  # prefix of temporary folders that hold files until all are written
 
 
 def main(arguments=None):
-    """Run the command; returns its exit code."""
+    """Run the command and return its exit code."""
     parser = make_parser()
     options = parser.parse_args(arguments)
     tell = _progress(options.quiet)
@@ -53,7 +53,7 @@ def main(arguments=None):
         check_kind(parser, options)
         options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
         if arguments is None:
-            # Ctrl-C is an exception from here on; __main__ let it end the process.
+            # From here on Ctrl-C raises an exception; until now it ended the process (__main__).
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, signal.default_int_handler)
         return (_apply if options.apply else _calibrate)(options, tell)
@@ -62,7 +62,7 @@ def main(arguments=None):
     except (LogError, ExistsError) as error:
         return _say_error(error, REFUSED if isinstance(error, LogError) else EXISTS)
     except (OSError, ImportError, ValueError, ArithmeticError, MemoryError) as error:
-        # Of what the log made of the arithmetic: one sentence too.
+        # Arithmetic errors come from odd logs: they too get one sentence.
         return _say_error(error, FAILED)
     except KeyboardInterrupt:
         return _say_error("interrupted; nothing was written.", INTERRUPTED)
@@ -99,7 +99,7 @@ def _calibrate(options, tell):
 
 
 def _where_from_and_to(options):
-    """The folder to write to and the logs, once the options are found to make sense."""
+    """Check the options; return the folder to write to and the paths of the logs."""
     check_once("--inputs", options.inputs or ())
     check_once("--target", [text.partition(":")[0] for text in options.target])
     paths = options.logs = find_logs(options.logs)
@@ -112,7 +112,7 @@ def _where_from_and_to(options):
 
 
 def _read(options, paths, tell):
-    """The reading of a checked log, and what the options ask of it. What was found out is told."""
+    """Read and check the log; return the reading and the recipe, and tell what was found."""
     required = dict.fromkeys(["temperature", "output", *columns_of(options.inputs or ())])
     request = request_of(options, required)
     reading = read(paths, request, tell=tell)
@@ -134,7 +134,7 @@ def _read(options, paths, tell):
     try:
         at_rest = _settle_rest(reading, tell)
         recipe = _recipe(options, reading, at_rest)
-        # Whatever the inputs, the rates tell a scale factor that is not given.
+        # A scale factor that is not given is found from the rates, whatever the inputs.
         told = ("output",) if recipe.output_unit in SIGNALS and not options.scale_factor else ()
         check_log(reading.log, units=reading.units, inputs=recipe.inputs + told)
     except LogError as error:
@@ -143,7 +143,7 @@ def _read(options, paths, tell):
 
 
 def _settle_rest(reading, tell):
-    """Whether the gyro was at rest; the log then has a rate of zero."""
+    """Find whether the gyro was at rest; if so, set the rate in the log to zero."""
     log, layout = reading.log, reading.files[0].layout
     try:
         check_at_rest(log, reading.units["output"])
@@ -167,7 +167,7 @@ def _settle_rest(reading, tell):
 
 
 def _recipe(options, reading, at_rest):
-    """What the options ask for; UsageError where the log does not go with them."""
+    """The recipe from the options; UsageError if they do not fit the log."""
     unit = reading.units["output"]
     inputs = tuple(options.inputs or _default_inputs(reading.log, at_rest))
     asked = "--physics" if options.physics else f"--write {options.write}"
@@ -201,7 +201,7 @@ def _recipe(options, reading, at_rest):
 
 
 def _default_inputs(log, at_rest):
-    """All that the log has; the time only where several runs can tell it from all else."""
+    """All inputs that the log has; time only if three runs separate its effect from others."""
     inputs: tuple[str, ...] = INPUTS
     if "time" not in log:
         inputs = ("temperature", "output")
@@ -211,7 +211,7 @@ def _default_inputs(log, at_rest):
 
 
 def _write(calibration, options, files, folder):
-    """Write all but the targets; what became of the limits is returned."""
+    """Write all files but the targets; return the checks of the limits."""
     more = f" and {len(files) - 1} more" if len(files) > 1 else ""
     results = Results(
         calibration,
@@ -250,8 +250,8 @@ def _apply(options, tell):
     needed = {"output", *columns_of(compensator.inputs)}
     units = dict(compensator.units)
     if units.get("output") in SIGNALS and "output" not in compensator.assumed:
-        del units["output"]  # which is asked for again
-    # The true rate is no input: where it is known, the errors are told.
+        del units["output"]  # must be named again
+    # The true rate is no input; if the log has it, the errors are reported.
     optional = tuple({"temperature", "rate"} - needed)
     reading = read(paths, request_of(options, sorted(needed), units, optional), tell=tell)
     unit, due = reading.units["output"], compensator.output_unit
@@ -273,7 +273,7 @@ def _apply(options, tell):
     labels = [name for name in ("device", "run", "time") if name in log]
     tell(f"writing {target}")
     with _staged(target.parent) as folder:
-        # Twelve digits are beyond any gyro, and short beside the 17 of a double.
+        # Twelve digits are more than any gyro resolves, and shorter than the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
     _say([f"written        {target}: {n_rows}", *of_rates(compensator, log, rates)])
     _say(f"note           {note}" for note in reading.notes)
@@ -282,7 +282,7 @@ def _apply(options, tell):
 
 
 def _progress(quiet):
-    """What writes lines to stderr, with the time since the start."""
+    """A function that writes a line to stderr, with the time since the start."""
     start = time.monotonic()
 
     def tell(text):
@@ -294,7 +294,7 @@ def _progress(quiet):
 
 
 def _say(lines):
-    """Lines to stdout, with escapes for what its encoding lacks, as stderr has them by itself."""
+    """Write lines to stdout; characters that its encoding lacks are escaped, as stderr does."""
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     for line in lines:
         told = printable(line).encode(encoding, "backslashreplace").decode(encoding)
@@ -310,7 +310,7 @@ def _say_error(error, code):
 
 
 def _refuse_existing(paths, force, read=()):
-    """Refuse to replace files, and with ``force`` those that are ``read``."""
+    """Refuse to replace existing files; with ``force`` only those that are ``read``."""
     for path in paths:
         if any(path.resolve() == Path(other).resolve() for other in read):
             raise ExistsError(
@@ -324,10 +324,10 @@ def _refuse_existing(paths, force, read=()):
 
 @contextlib.contextmanager
 def _staged(folder, replaced=()):
-    """A folder to write to; at the end its files go to ``folder`` all together.
+    """A temporary folder to write to; at the end all its files are moved to ``folder``.
 
-    What else has one of the names ``replaced`` is of an earlier run, and is removed then. Where
-    that cannot be, or an error ends it, no file or folder is left behind.
+    Other files in ``folder`` with a name in ``replaced`` are from an earlier run, and are removed
+    then. An error before the move leaves no new file or folder behind.
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:

@@ -1,4 +1,4 @@
-"""GyroCompensator: a fitted estimator, and all that it takes to apply it to a log."""
+"""GyroCompensator: a fitted estimator with all that is needed to apply it to a log; its file."""
 
 import json
 import warnings
@@ -24,15 +24,15 @@ from .thermal_rate import ThermalRate
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 
 _FORMAT, _VERSION = "skanfis gyro compensator", 1
-# Of a law, by what they are: lists of coefficients, numbers, lists of a number per column.
+# Entries of a law in the file: lists of coefficients; numbers; lists with a number per column.
 _POLYNOMIALS = ("amplitude", "sagnac_factor", "bias")
 _NUMBERS = ("thermometer_lag", "reference_temperature")
 _RANGE = ("minimum", "maximum")
 _OF_POLYNOMIAL = ("center", "scale", "coefficients")
 _PARAMETERS = ("max_phase", "out_of_bounds")
-# As of a model alone: see skanfis.export.model_json.
+# The limit for a model alone, too: see skanfis.export.model_json.
 _MOST_BYTES = 2**24
-# It is shown in tables and on axes.
+# The name of a unit is shown in tables and on axes.
 _LONGEST_UNIT = 40
 
 
@@ -45,26 +45,26 @@ class GyroCompensator:
     Parameters
     ----------
     estimator : fitted estimator
-        Predicts from the columns ``inputs``, in this order; it, or the last step of a Pipeline, has
-        ``in_bounds`` and ``coverage``.
+        Predicts from the columns ``inputs``, in this order. It, or a Pipeline's last step, must
+        have ``in_bounds`` and ``coverage``.
     inputs : tuple of str
         Of "time" (since power-on [s]), "temperature" [degC], "temperature_rate" (low-passed
         [degC/s], see :class:`ThermalRate`) and "output" (in ``output_unit``).
     predicts : {"error", "rate"}, default="error"
         Whether the estimator predicts the error, indicated minus true rate, or the rate [deg/s].
     scale_factor : float, default=1.0
-        Output per deg/s: the indicated rate is the output over this.
+        Output per deg/s: the indicated rate is the output divided by this.
     output_unit : str, default="deg/s"
         Unit of the output, "deg/s" or a raw signal such as "counts".
     time_constant : float, default=60.0
         Time constant of "temperature_rate" [s].
     min_coverage : float, default=0.1
-        Rows that the training data cover less are flagged.
+        Rows with less coverage by the training data are flagged.
     units : dict of str to str, default={}
-        Units of the calibration's files by part, such as {"temperature": "degF"}: for columns of
-        other files that name none.
+        Units of the calibration's files by part, such as {"temperature": "degF"}. They are assumed
+        for columns of other files that name no unit.
     assumed : dict of str to str, default={}
-        Sentences by part on those of these units that neither a name nor an option told.
+        Sentences by part on the units that neither a column's name nor an option gave.
 
     Raises
     ------
@@ -99,7 +99,7 @@ class GyroCompensator:
         _check_roles(list(self.inputs), self.predicts)
 
     def apply(self, log: pd.DataFrame) -> pd.DataFrame:
-        """Compensate a log, and flag the rows in which that cannot be trusted.
+        """Compensate a log, and flag the rows whose compensation cannot be trusted.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class GyroCompensator:
         """
         X = features(log, self.inputs, self.time_constant)
         indicated = log["output"].to_numpy() / self.scale_factor
-        # The status tells, row by row.
+        # The status replaces the warning, row by row.
         with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
             predicted = self.estimator.predict(X)
         compensated = indicated - predicted if self.predicts == "error" else predicted.copy()
@@ -128,26 +128,26 @@ class GyroCompensator:
         return pd.DataFrame(columns, index=X.index)
 
     def write_json(self, path: str | PathLike[str]) -> None:
-        """Write it as text that runs nothing when it is read.
+        """Write the compensator as JSON: reading it runs no code.
 
         Raises
         ------
         ValueError, TypeError
-            If the estimator is neither an ANFIS behind scalers, nor a :class:`ResidualRegressor` of
-            the arcsine law and such, nor one of the simple compensations that the command writes;
-            or a number is beyond what :meth:`read_json` takes.
+            If the estimator is neither an ANFIS after scalers, nor a :class:`ResidualRegressor` of
+            the arcsine law and such an ANFIS, nor one of the command's simple compensations; or if
+            a number is beyond what :meth:`read_json` takes.
         OSError
             If the file cannot be written.
         """
         text = _text_of(self)
-        _settings(json.loads(text))  # what could not be read again is not written
+        _settings(json.loads(text))  # so that nothing is written that cannot be read again
         Path(path).write_text(text, encoding="utf-8", newline="\n")
 
     @classmethod
     def read_json(cls, path: str | PathLike[str]) -> Self:
-        """Read one that :meth:`write_json` has written.
+        """Read a compensator that :meth:`write_json` has written.
 
-        It does what that did which was written. Its estimator can predict, not be fitted.
+        It gives the same results as the one written. Its estimator can predict, but not be fitted.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class GyroCompensator:
             If the file is not such a compensator, or a number in it is out of its range. The
             message says where, as in ``model.inputs[0].spread``.
         OSError
-            If it cannot be opened.
+            If the file cannot be opened.
         """
         data = read_bytes(path, _MOST_BYTES)
         try:
@@ -171,12 +171,12 @@ _KEYS = [each.name for each in fields(GyroCompensator) if each.name != "estimato
 
 
 def as_written(compensator):
-    """What reading a compensator gives that is written: to the last bit, at its edges too."""
+    """The compensator as written and read again: equal to the last bit, at its edges too."""
     return GyroCompensator(**_settings(json.loads(_text_of(compensator))))
 
 
 def _text_of(compensator):
-    """What is written of a compensator, whose inputs are those that its parts take."""
+    """The JSON text of a compensator; its inputs are only those that its parts take."""
     found, law, polynomial = found_by_search(compensator.estimator), None, None
     if isinstance(found, ResidualRegressor):
         fitted, rules = law_and_rules(found)
@@ -208,7 +208,7 @@ def _text_of(compensator):
 
 
 def features(log, inputs, time_constant):
-    """Columns that are known on board, in the order of ``inputs``; time is since power-on."""
+    """The columns ``inputs``, which are known on board; time counts from power-on."""
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log))
     columns = {}
     for name in inputs:
@@ -232,7 +232,7 @@ def _check_roles(inputs, predicts):
 
 
 def _settings(document):
-    """Arguments of a compensator out of a file's content; ValueError where it is none."""
+    """Check a file's content and return the arguments of the compensator; else ValueError."""
     if not isinstance(document, dict) or document.get("format") != _FORMAT:
         raise ValueError(f'its "format" is not "{_FORMAT}"')
     if document.get("version") != _VERSION:
@@ -271,7 +271,7 @@ def _settings(document):
 
 
 def _read_law(document, inputs):
-    """The fitted law that a file's content describes; ValueError where it is none."""
+    """The fitted law that a file's content describes; ValueError if it is none."""
     keys = ("columns", *_POLYNOMIALS, *_NUMBERS, *_RANGE, *_PARAMETERS)
     if not isinstance(document, dict) or set(document) != set(keys):
         raise ValueError(f"its law must be an object with the keys {', '.join(keys)}")
@@ -306,7 +306,7 @@ def _read_law(document, inputs):
 
 
 def _read_polynomial(document, rule, inputs):
-    """The cubic that a file's content describes; ValueError where it is none."""
+    """The cubic that a file's content describes; ValueError if it is none."""
     if not isinstance(document, dict) or set(document) != set(_OF_POLYNOMIAL):
         raise ValueError(f"its polynomial must be an object of {', '.join(_OF_POLYNOMIAL)}")
     if not isinstance(rule, FrozenRules) or rule.positions.tolist() != list(range(len(inputs))):
@@ -321,7 +321,7 @@ def _read_polynomial(document, rule, inputs):
 
 
 def _divisor(value, where):
-    """A number of either sign that something is divided by."""
+    """Check a number of either sign that may be divided by."""
     size = number(abs(number(value, where)), f"{where}, in size", SMALLEST_NUMBER)
     return size if value > 0 else -size
 

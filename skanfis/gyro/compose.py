@@ -1,4 +1,4 @@
-"""Two regressors in a row: the second learns what the first leaves."""
+"""A law plus rules: a base regressor, and a second one that learns the residual of the first."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -20,7 +20,7 @@ from .physics import OpenLoopArcsineRegressor, check_parameters
 
 
 class ResidualRegressor(RegressorMixin, BaseEstimator):
-    """A base regressor, and another that learns what it leaves: the prediction is their sum.
+    """A base regressor, and another that learns its residual: the prediction is their sum.
 
     With the physics of the sensor as the base, the residual model stays small, and far from the
     data the sum falls back to physics plus an edge value.
@@ -28,14 +28,14 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
     Parameters
     ----------
     base : regressor, default=None
-        Fitted to the target; None is ``OpenLoopArcsineRegressor()``. It must be stiff, as a law of
-        few coefficients is: its residual is taken on the rows that it is fitted to.
+        Fitted to the target; None is ``OpenLoopArcsineRegressor()``. It must be stiff, such as a
+        law of few coefficients, because its residual is taken on its own training rows.
     residual : regressor, default=None
-        Fitted to what the base leaves; None is ``ANFISRegressor()``. A Pipeline will do.
+        Fitted to the residual of the base; None is ``ANFISRegressor()``. A Pipeline will do.
     n_rounds : int, default=1
         How often both are fitted in turn (backfitting: Buja, Hastie and Tibshirani, Annals of
-        Statistics 17, 1989), the base then to the target minus what the residual model predicts.
-        Three are enough; the residual model must be too small to do the base's work.
+        Statistics 17, 1989); the base is then fitted to the target minus the residual model's
+        prediction. Three are enough. The residual model must be too small to replace the base.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
             If ``n_rounds`` is less than 1, or the base has no finite prediction for a training row.
         """
         check_scalar(self.n_rounds, "n_rounds", (int, np.integer), min_val=1)
-        # Each part checks X for itself, here and in predict; only its columns are taken note of.
+        # Each part checks X itself, here and in predict; this only records the columns.
         validate_data(self, X, skip_check_array=True)
         target: np.ndarray = column_or_1d(y, dtype=float, warn=True)
         base = OpenLoopArcsineRegressor() if self.base is None else self.base
@@ -113,7 +113,7 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
                 )
             fitted_residual = clone(residual).fit(X, left, **given)
             learnt = fitted_residual.predict(X)
-        # Both at once: a fit that is interrupted leaves no parts of two fits.
+        # Set both at once, so that an interrupted fit does not mix parts of two fits.
         self.base_, self.residual_ = fitted_base, fitted_residual
         return self
 
@@ -123,19 +123,19 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
         return self.base_.predict(X) + self.residual_.predict(X)
 
     def in_bounds(self, X: ArrayLike) -> np.ndarray:
-        """Tell which rows lie in bounds of every part that has such; through Pipelines too."""
+        """Tell which rows lie in the bounds of every part that has bounds, Pipelines included."""
         return np.logical_and.reduce(self._answers("in_bounds", X))
 
     def coverage(self, X: ArrayLike) -> np.ndarray:
-        """Tell how well the training data cover each row, 0 to 1: the least that a part says."""
+        """Tell how well the training data cover each row, 0 to 1: the smallest of the parts."""
         return np.minimum.reduce(self._answers("coverage", X))
 
     def _answers(self, method, X):
-        """What the parts that have ``method`` answer."""
+        """The results of ``method`` from the parts that have it."""
         check_is_fitted(self)
         parts = [self.base_, self.residual_]
         able = [part for part in parts if hasattr(final_step(part)[0], method)]
-        # Of parts of which none is able, the residual model says so.
+        # If no part has the method, the residual model raises the error.
         return [ask(part, method, X) for part in able or parts[1:]]
 
 
@@ -150,7 +150,7 @@ class FrozenRules:
     positions: np.ndarray
 
     def predict(self, X):
-        """What the rules give."""
+        """The output of the rules."""
         return self.model.predict(self._rows(X))[:, 0]
 
     def in_bounds(self, X):
@@ -166,7 +166,7 @@ class FrozenRules:
 
     @classmethod
     def of(cls, estimator, n_columns):
-        """The rules of an estimator that takes so many columns, its scalers folded in."""
+        """The rules of an estimator that takes ``n_columns``, with its scalers folded in."""
         if isinstance(estimator, cls):
             return estimator
         # A row that holds the number of every column tells which of them reach the model.
@@ -176,15 +176,16 @@ class FrozenRules:
 
 @cache
 def cubic_powers(n_inputs):
-    """Of all terms up to the third degree, in the order of scikit-learn."""
+    """Exponents of all terms up to the third degree, in the order of scikit-learn."""
     return PolynomialFeatures(3).fit(np.zeros((1, n_inputs))).powers_
 
 
 @dataclass(frozen=True, eq=False)
 class Polynomial:
-    """sum_k c_k prod_j z_j^p_kj with z = (x - center) / scale, x held in a box; a fitted base.
+    """A cubic: sum_k c_k prod_j z_j^p_kj, z = (x - center) / scale, x held in a box; fitted.
 
-    Inputs are all columns of X, terms all up to the third degree, in the order of scikit-learn.
+    It takes all columns of X, and has all terms k up to the third degree, in scikit-learn's order,
+    with coefficients c and powers p.
     """
 
     minimum_: np.ndarray
@@ -197,7 +198,7 @@ class Polynomial:
 
     @classmethod
     def fitted(cls, X, y, box):
-        """That of least squares, of a table X; ``box`` are the ends of its columns."""
+        """Fit by least squares to a table X; ``box`` holds the ends of its columns."""
         scaler, line = StandardScaler(), LinearRegression()
         make_pipeline(scaler, PolynomialFeatures(3, include_bias=False), line).fit(X, y)
         coefficients, names = [line.intercept_, *line.coef_], np.array(X.columns, dtype=object)
@@ -209,7 +210,7 @@ class Polynomial:
     n_features_in_ = property(lambda self: self.center.size)
 
     def predict(self, X):
-        """What the polynomial gives."""
+        """The value of the polynomial."""
         z = np.clip(np.asarray(X, dtype=float), self.minimum_, self.maximum_) - self.center
         terms = np.tile(self.coefficients, (len(z), 1))
         for column, powers in zip((z / self.scale).T, self.powers.T, strict=True):
@@ -241,7 +242,7 @@ def law_and_rules(estimator):
 
 
 def rules_of(estimator):
-    """The rules of a fitted estimator: beside a law what adds to it, else the whole."""
+    """The rules of a fitted estimator: the part that adds to a law, or else the whole."""
     return getattr(estimator, "residual_", estimator)
 
 

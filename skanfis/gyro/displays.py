@@ -1,4 +1,4 @@
-"""Pictures of a compensation, after scikit-learn's Displays: they store tables and draw them."""
+"""Plots of a compensation, in the style of scikit-learn's Displays: they store tables and draw."""
 
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
@@ -14,9 +14,9 @@ from .metrics import allan_deviation, allan_figures, rms, table_of
 # Colours that the colour-blind can tell apart.
 SIDES = {"before": "#d55e00", "after": "#0072b2"}
 _SIGNS = {"degC": "°C", "deg/": "°/", "sqrt(h)": "√h"}
-# Bands about two dots wide in the picture; points beyond cover one another.
+# Bands, each about two dots wide in the picture; points, of which more would hide one another.
 _N_BANDS, _N_POINTS = 300, 3_000
-# The worst groups: more lines cannot be read.
+# Only the worst groups are shown: more lines could not be read.
 _MOST_GROUPS = 30
 _CAUTION = """\
 Smoothing is not compensation: a filter lowers the left of a curve and hides
@@ -25,12 +25,12 @@ long averaging times."""
 
 
 class GyroDisplay:
-    """A picture drawn from tables; ``figure_``, ``axes_`` and ``ax_``, the first, once drawn."""
+    """A picture drawn from tables; it then has ``figure_``, ``axes_`` and ``ax_``, the first."""
 
     # Options with a value per row; those of _PER_ROW must be given.
     _PER_ROW: ClassVar[tuple[str, ...]] = ()
     _OPTIONAL: ClassVar[tuple[str, ...]] = ()
-    # The first is that of from_predictions unless another is given.
+    # The first is the default unit of from_predictions.
     _UNITS: ClassVar[tuple[str, ...]] = ("deg/s", "deg/h")
     _PANELS = 1, 1  # rows and columns
     _size: tuple[float, float] = (6.2, 4.4)
@@ -42,7 +42,7 @@ class GyroDisplay:
     _draw: Callable[..., None]
 
     def tables(self) -> dict[str, pd.DataFrame]:
-        """What is drawn, by name; columns carry their units."""
+        """The tables that are drawn, by name; columns have their units in their names."""
         return self._tables
 
     def plot(self, ax: Any = None) -> Self:
@@ -209,7 +209,7 @@ class GroupResidualDisplay(GyroDisplay):
 class AllanDisplay(GyroDisplay):
     """Allan deviation of the error against averaging time, before and after compensation.
 
-    The legend has N and B where the curve has them, the title a caution against smoothing.
+    The legend has N and B if the curve has them; the title cautions against smoothing.
     ``from_predictions`` takes ``time`` [s] and ``run``, labels of the runs or None. The curves are
     of all stretches of ten rows or more that follow one another evenly, none of them NaN.
 
@@ -230,7 +230,7 @@ class AllanDisplay(GyroDisplay):
         errors = {side: rows[side].where(both).to_numpy() for side in SIDES}
         curves = {side: allan_deviation(error, time, run) for side, error in errors.items()}
         table = pd.concat(curves, names=["curve"]).reset_index("curve")
-        # It takes deg/s and gives deg/h: 3600 times the unit of what it is given.
+        # allan_deviation takes deg/s and gives deg/h, 3600 times the unit of its argument.
         table[["deviation", "error"]] /= PER_HOUR
         names = "averaging time [s]", f"Allan deviation [{unit}]", f"error [{unit}]"
         table.columns = ["curve", *names]
@@ -251,7 +251,7 @@ class AllanDisplay(GyroDisplay):
         panel.set_title(_CAUTION, loc="left", fontsize="small")
 
     def _coefficients(self, time, deviation):
-        """What is read off a curve, in words."""
+        """N and B of a curve, in words."""
         factor = RATE_UNITS[self._unit] / RATE_UNITS["deg/h"]
         try:
             (walk, _), (instability, _), *_ = allan_figures(time, deviation / factor).values()
@@ -292,13 +292,13 @@ def three_digits(value):
     """A number with three digits that count, without an exponent where it can be; NaN is a dash."""
     if value == 0 or not np.isfinite(value):
         return "–" if np.isnan(value) else f"{value:g}"
-    # The exponent once it is rounded: 9.996 is 10.0.
+    # The exponent after rounding: 9.996 becomes 10.0.
     decimals = max(2 - int(f"{value:.2e}".partition("e")[2]), 0)
     return f"{value:,.{decimals}f}" if decimals < 8 else f"{value:.2e}"
 
 
 def mark_decades(axis, low, high):
-    """Numbers on a logarithmic axis as they are spoken: 0.01, 0.1, 1, not powers of ten."""
+    """Label a logarithmic axis with plain numbers, 0.01, 0.1, 1, not with powers of ten."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     decades = np.log10(high / low)

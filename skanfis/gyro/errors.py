@@ -1,4 +1,4 @@
-"""Errors: of a log, of options, of files that exist, of packages that are not installed."""
+"""Errors of the gyro application: bad logs or options, existing files, missing packages."""
 
 from importlib import import_module
 
@@ -11,7 +11,7 @@ class LogError(ValueError):
     Parameters
     ----------
     reason : str
-        What was found and what would do.
+        What was found, and what to do about it.
     column : str, default=None
         The column's part: "time", "temperature", "output", "rate", "run" or "device".
     row : int, default=None
@@ -35,7 +35,7 @@ class LogError(ValueError):
 
 
 class UsageError(ValueError):
-    """Options that make no sense."""
+    """Options of the command that make no sense."""
 
 
 class ExistsError(Exception):
@@ -43,7 +43,7 @@ class ExistsError(Exception):
 
 
 def needed(module, told):
-    """A module that may not be installed; ``told`` then says what to do."""
+    """Import an optional module; if it is missing, raise ImportError with the text ``told``."""
     try:
         return import_module(module)
     except ImportError as error:
@@ -51,6 +51,6 @@ def needed(module, told):
 
 
 def shortened(value, show=repr):
-    """A value as a message shows it, its end left out where it is long."""
+    """A value as shown in a message, cut if it is long."""
     shown = show(value)
     return shown if len(shown) <= _LONGEST_SHOWN else f"{shown[:50]}...{shown[-1]}"

@@ -1,4 +1,4 @@
-"""The report of a calibration as one page of HTML: verdict, tables, pictures, rules, limits."""
+"""Write the report of a calibration as one HTML page: verdict, tables, pictures, rules, limits."""
 
 import platform
 from importlib.resources import files as resources
@@ -31,13 +31,13 @@ from .compose import rules_of
 from .displays import signs, three_digits
 from .metrics import rms
 
-# On the first page, with a picture; the others follow.
+# Figures on the first page, with a picture; the others follow.
 _FIRST = (
     "residual_rms", "residual_peak", "reduction_factor", "bias", "bias_temperature_sensitivity",
     "hysteresis", "scale_factor_error", "scale_factor_nonlinearity",
 )  # fmt: skip
 _ON_FIRST_PAGE = "error-by-temperature"
-# What the standards call the figures; docs/gyro_metrics.rst says how each is computed.
+# Names of the figures in the standards; docs/gyro_metrics.rst says how each is computed.
 _TERMS = {
     "scale_factor_error": "scale factor error (528, 1780)",
     "scale_factor_nonlinearity": "linearity error, largest (528, 952)",
@@ -102,12 +102,12 @@ def report_page(results, title):
 
 
 def check_installed(pdf=False):
-    """ImportError where the report could not be made: at the end that would be found out late."""
+    """Raise ImportError if a package for the report is missing, before the long calibration."""
     for name in ("matplotlib", "jinja2", *(["weasyprint"] if pdf else [])):
         try:
             __import__(name)
         except (ImportError, OSError) as error:
-            # OSError: of Pango, which draws the text of a PDF.
+            # OSError comes from Pango, which draws the text of a PDF.
             reason = printable(str(error)).partition("\n")[0]
             told = f"the report needs {name}: pip install {name} ({reason})"
             raise ImportError(told + pdf * "; or print report.html from a browser") from error
@@ -125,7 +125,7 @@ def _template():
 
 
 def _without_hidden_signs(value):
-    """Text for the page; what the template has made of it already stays as it is."""
+    """Text for the page; text that is markup already stays as it is."""
     if hasattr(value, "__html__"):
         return value
     return "\n".join(map(printable, str(value).split("\n")))
@@ -142,7 +142,7 @@ def specification(checks):
 
 
 def _summary(results):
-    """For whoever reads one page: the figures that count, and where they hold."""
+    """For readers of one page: the figures that count, and where they hold."""
     calibration, figures = results.calibration, results.merit.set_index("figure")
     known = figures.reindex(_FIRST)[["before", "after", "unit"]].dropna(subset="after")
     lines = [
@@ -160,7 +160,7 @@ def _summary(results):
 
 
 def _identity(results):
-    """What is needed to find this calibration again, and to repeat it."""
+    """What identifies this calibration, and is needed to repeat it."""
     names = {"serial": "device, serial number", "operator": "operator", "made": "made"}
     lines = [(name, results.entries.get(key) or "not given") for key, name in names.items()]
     blocks = [_table(["what", "entry"], lines)]
@@ -174,7 +174,7 @@ def _identity(results):
 
 
 def _check(results):
-    """How it was checked, and what is simpler on the same rows."""
+    """How the calibration was checked, and simpler compensations on the same rows."""
     calibration, verdict = results.calibration, results.calibration.verdict
     text = (
         "Every row was compensated by a model that had not seen its group: "
@@ -275,7 +275,7 @@ def _sure(results):
 
 
 def _written(results):
-    """What is written: a formula, or rules in pictures and as text, and whether to read them."""
+    """The written compensation: a formula, or rules in pictures and text, with cautions."""
     calibration, name = results.calibration, results.calibration.written
     if not calibration.writes_model:
         text = (

@@ -1,8 +1,8 @@
-"""Reading a calibration log from its files.
+"""Read a calibration log from its files.
 
-The columns of a log play parts: ``time``, ``temperature``, ``output`` (the gyro's own signal),
+The columns of a log are its parts: ``time``, ``temperature``, ``output`` (the gyro's own signal),
 ``rate`` (the truth, from the rate table), ``run`` (from one power-on to the next) and ``device``.
-A log that has been read has its columns by these names, in s, degC and deg/s.
+Once read, a log has these names as columns, in s, degC and deg/s.
 """
 
 import hashlib
@@ -25,13 +25,13 @@ from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_sou
 from ._units import assumed_text, settle_by_all
 from .errors import LogError, shortened
 
-# A gap between two runs is so long, and so many steps: longer than what a logger drops.
+# A gap between two runs is at least this long, and this many steps: more than a logger drops.
 _SHORTEST_GAP = 60.0  # s
 _STEPS = 50.0
-_FEWEST_ROWS = 20  # shorter pieces are no runs, but a logger that stutters
+_FEWEST_ROWS = 20  # if pieces are shorter, the logger stutters, and they are no runs
 _SHORTEST_RUN = 3  # rows, at the end of a file
-_NEXT = 2.5  # steps from file to file of one run, of which a row may be lost
-_BEGINNING = 0.1  # a clock that goes back to this part of a run has begun anew
+_NEXT = 2.5  # most steps between two files of one run, between which a row may be lost
+_BEGINNING = 0.1  # a clock that goes back to this first part of a run has restarted
 
 
 def read_log(
@@ -43,17 +43,17 @@ def read_log(
 ) -> pd.DataFrame:
     r"""Read one log from one or several files.
 
-    Only the columns that play a part are read. Without a column for the run, each file is a run.
-    A run never extends over two files or devices: two that only share a label are told apart.
+    Only the columns of the parts are read. Without a column for the run, each file is a run. A run
+    never extends over two files or devices: equal labels there are different runs.
 
     Parameters
     ----------
     paths : str, path, or sequence of these
-        Text files with a header line, whose encoding, separator and decimal sign are found out;
-        or files of MATLAB, Excel or Parquet (:doc:`/gyro_command`).
+        Text files with a header line, whose encoding, separator and decimal sign are detected, or
+        files of MATLAB, Excel or Parquet (:doc:`/gyro_command`).
     columns : dict of str to str, default=None
-        Names in the file by part ("time", "temperature", "output", "rate", "run", "device"), where
-        they differ from it; blanks around names, and capitals, do not matter.
+        Names in the file by part ("time", "temperature", "output", "rate", "run", "device"), if
+        they differ from the part's; blanks around names, and case, do not matter.
     units : dict of str to str, default=None
         Units in the file of "time" (s, ms, us, ns, min, h), "temperature" (degC, K, degF), "rate"
         and "output" (deg/s, deg/h, rad/s, mdeg/s, mrad/s, rpm); "output" may also be in counts, V
@@ -70,8 +70,8 @@ def read_log(
     Raises
     ------
     LogError
-        If a file is no table or there twice, a required column or a value is missing, or a value
-        is no number.
+        If a file is no table or is given twice, if a required column or a value is missing, or if
+        a value is no number.
     ValueError
         If an argument names an unknown part or unit.
     OSError
@@ -98,11 +98,11 @@ def read_log(
 
 @dataclass
 class Reading:
-    """A log that has been read, with what was found out on the way, in sentences (``notes``).
+    """A log that has been read; ``notes`` are sentences on what was found.
 
-    The column "power_on" of ``log`` is where the clock was when the run began [s]. Row k is row
-    ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences on units, by part, that neither
-    names nor options tell.
+    The column "power_on" of ``log`` is the clock's time when the run began [s]. Row k is row
+    ``row[k]`` of ``files[file[k]]``. ``assumed`` has sentences, by part, on units that neither
+    names nor options give.
     """
 
     log: pd.DataFrame
@@ -123,18 +123,18 @@ class Reading:
         return [(Path(file.path).name, file.size, file.digest) for file in self.files]
 
     def name_row(self, row):
-        """In words, where a row of the log is found."""
+        """The file and line of a row of the log, in words."""
         file = self.files[self.file[row]]
         return f"{file.path}, {file.source.place_of(int(self.row[row]))}"
 
     def located(self, error):
-        """An error of a check of the whole log in the words of the files."""
+        """An error from a check of the whole log, with the file's names and lines."""
         file = self.files[0 if error.row is None else self.file[error.row]]
         return file.located(error, self.row, None if len(self.files) == 1 else "the log")
 
 
 def read(paths, request, *, tell=lambda text: None):
-    """Read files as :func:`read_log` does; returns a :class:`Reading`.
+    """Read files as :func:`read_log` does; return a :class:`Reading`.
 
     ``tell`` is called with a line of text for every file.
     """
@@ -168,7 +168,7 @@ def read(paths, request, *, tell=lambda text: None):
     if layout.assumed and request.assumed is None:
         found = settle_by_all(log, layout)
         if not found.items() <= layout.units.items():
-            # All rows tell otherwise than the first ones.
+            # All rows give other units than the first ones did: read again with these.
             retold = replace(request, assumed=layout.units | found)
             return read(paths, retold, tell=tell)
     names = _names_of_runs(runs, paths)
@@ -186,9 +186,9 @@ def read(paths, request, *, tell=lambda text: None):
 
 
 class LogFile:
-    """A file of a log; ``first`` is the first file of the same log, whose columns hold.
+    """A file of a log; ``first`` is the log's first file, whose column names hold for all.
 
-    LogError where it is no log, or not like the first.
+    LogError if it is no log, or not like the first.
     """
 
     def __init__(self, path, request, first=None):
@@ -199,7 +199,7 @@ class LogFile:
             self.size = opened.tell()
         self.layout = settle(self.source, request, None if first is None else first.layout)
         self.notes = [*self.source.notes, *self.layout.notes]
-        self._form = ""  # of a clock of texts
+        self._form = ""  # format of a time given as text
         if first is None:
             return
         differ = sorted(set(self.layout.places) ^ set(first.layout.places))
@@ -215,22 +215,22 @@ class LogFile:
     def read(self):
         """The parts as a table in the units of a log, with labels of run and device.
 
-        The index is the row's position in the file. The command leaves out rows that lack a value,
-        and tells runs by the clock.
+        The index is the row's position in the file. For the command, rows that lack a value are
+        left out, and runs are told apart by the clock.
         """
         log = self._converted()
         if self._is_command:
             log = self._in_order(log)
         missing = log.isna()
         missing[[part for part in self._optional if part in log]] = False
-        # A gap in one column is none in the clock.
+        # Rows that lack another value stay for now: their times still belong to the clock.
         log = log[~missing[[part for part in ("time", *LABELS) if part in log]].any(axis=1)]
         log = log.assign(**{part: "" for part in LABELS if part not in log})
         if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
             runs = self._told_by_clock(log["time"].to_numpy())
             log = log[: len(runs)].assign(run=runs)
         if "time" in log:
-            # Of all rows, those that lack a value too.
+            # From all rows, also those that lack a value.
             log["power_on"] = log.groupby(list(LABELS), observed=True)["time"].transform("first")
         is_whole = ~missing.any(axis=1)
         if not is_whole.all():
@@ -265,7 +265,7 @@ class LogFile:
         return pd.DataFrame(parts, copy=False)
 
     def _in_order(self, log):
-        """The rows, but those that occur a second time, with the first row first."""
+        """The rows in order of time, without those that occur a second time."""
         time = log["time"].to_numpy() if "time" in log else np.arange(len(log))
         steps = np.diff(time[~np.isnan(time)])
         if (steps > 0.0).all():
@@ -274,9 +274,9 @@ class LogFile:
             self.notes.append(f"{self.path}: the last row comes first; rows are turned round")
             log = log[::-1]
         twice = log.duplicated() & log["time"].notna()
-        # Runs of one value all through are alike, and two runs.
+        # Two runs may be equal because all their values are constant.
         if log[twice].drop(columns="time").duplicated()[1:].all():
-            # A row that follows itself is no run.
+            # Then only a row that directly repeats the one before is left out.
             twice &= log["time"].diff() == 0.0
         if twice.any():
             first, last = map(self.source.place_of, log.index[twice][[0, -1]])
@@ -286,9 +286,9 @@ class LogFile:
         return log
 
     def _told_by_clock(self, time):
-        """Labels of runs: "1", "2" and so on, where the time begins anew or steps far.
+        """Labels of runs, "1", "2" and so on: a run starts where the time restarts or steps far.
 
-        A few rows at the end whose clock jumps are no run, and have none.
+        A few rows at the end, after a jump of the clock, are no run and get no label.
         """
         steps, longest = np.diff(time, prepend=time[0]), _longest_step(time)
         starts, begin = steps > longest, time[0]
@@ -329,7 +329,7 @@ class LogFile:
         form = self._form if part == "time" else ""
         numbers = as_numbers(column, form=form) if form else numbers
         bad = np.isnan(numbers)
-        # Logs that were joined have their header again.
+        # Joined logs repeat their header.
         no_value = [*NO_VALUE, self.layout.name(part)]
         bad[bad] = (column[bad].notna() & ~column[bad].isin(no_value)).to_numpy()
         if bad.any():
@@ -340,7 +340,7 @@ class LogFile:
         return numbers if is_in_seconds else convert(numbers, self.layout.units[part])
 
     def located(self, error, rows=None, where=None):
-        """An error of one part and row, in terms of this file; ``rows`` are positions in it."""
+        """An error with this file's column name and line; ``rows`` are positions in the file."""
         where = where or self.path
         if error.row is not None:
             where = f"{self.path}, {self.source.place_of(int(rows[error.row]))}"
@@ -354,7 +354,7 @@ class LogFile:
 
 
 def _joined_by_clock(table, runs, paths):
-    """The log with runs that go on in the next file, as the clock does, as one; runs; notes."""
+    """Join runs whose clock goes on in the next file; return the log, its runs, and notes."""
     ends, steps = np.flatnonzero(np.diff(table["run"])), np.diff(table["time"])
     is_new = (steps[ends] <= 0.0) | (steps[ends] >= _NEXT * np.median(steps))
     is_new = np.append(True, is_new | (np.diff(table["file"])[ends] == 0))
@@ -378,7 +378,7 @@ def _longest_step(time):
 
 
 def _names_of_runs(runs, paths):
-    """Labels of the runs that tell them apart, short ones if these do; None of a single run."""
+    """Different labels of the runs, as short as possible; None if nothing tells runs apart."""
     stems = [Path(path).stem for path in paths]
     files = stems if len(set(stems)) == len(stems) else list(map(os.fspath, paths))
     owners = ["file"] if len(paths) > 1 else []
@@ -390,11 +390,11 @@ def _names_of_runs(runs, paths):
         names = [" / ".join(filter(None, row)) for row in zip(*map(keys.get, parts), strict=True)]
         if set(parts) <= set(owners) and len(set(names)) == len(names):
             break
-    # Labels that hold a slash may read alike even with all that there is.
+    # Labels that contain a slash may be equal even when all parts are joined.
     return distinct(names)
 
 
 def find_logs(arguments):
-    """The files that are named, with patterns filled in for a shell that does not."""
+    """The files named; patterns are expanded, for shells that do not do it."""
     found = [[] if os.path.lexists(name) else sorted(glob(name)) for name in arguments]
     return [path for name, paths in zip(arguments, found, strict=True) for path in paths or [name]]

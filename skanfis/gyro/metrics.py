@@ -1,8 +1,8 @@
 """Figures of merit in the terms of IEEE 952, as one table of functions of columns of a log.
 
 Every column has one value per row: rates in deg/s, temperatures in degC, times in s. The error at
-the input is the output over its scale factor, less the true rate; biases are of it, in deg/h. Where
-a figure does not exist these functions raise ValueError with the reason; they never return NaN.
+the input is the output divided by its scale factor, minus the true rate; biases are means of this
+error, in deg/h. If a figure does not exist, its function raises ValueError with the reason.
 """
 
 from collections.abc import Callable
@@ -19,14 +19,14 @@ _PPM = 1e6
 # Bins of temperature in which warming and cooling are compared, and the rows that a mean needs.
 HYSTERESIS_BINS, ROWS_PER_MEAN = 20, 5
 SLOWEST = 0.05  # degC/min, below which a temperature neither rises nor falls
-# Powers of the rate, odd: what an error of the scale factor adds changes its sign with the rate.
+# Powers of the rate, odd, because a scale factor error changes its sign with the rate.
 _POWERS = (1, 3, 5, 7)
-_RATE_BINS = 101  # parts of the range of rates, in means over which a nonlinearity is looked for
-# A gyro is at rest up to this part of the largest rate; bias is read off so many such rows or more.
+_RATE_BINS = 101  # bins of the rate, over whose means the nonlinearity is computed
+# A gyro is at rest up to this part of the largest rate; the bias needs at least so many such rows.
 _AT_REST, _FEWEST_AT_REST = 1e-4, 10
-# They have no interval: the largest value of a resample says nothing of the largest to come.
+# Figures without interval: the largest value of a resample says nothing of the largest to come.
 LARGEST_VALUES = ("residual_peak", "residual_peak_to_peak")
-# Sizes of means, into which the noise of these goes.
+# Figures that are sizes of means, so that noise increases them.
 SIZES_WITH_NOISE = ("scale_factor_nonlinearity", "scale_factor_nonlinearity_rms", "hysteresis")
 ALLAN_FIGURES = {
     "angle_random_walk": "deg/sqrt(h)",
@@ -35,18 +35,18 @@ ALLAN_FIGURES = {
     "rate_random_walk": "deg/h/sqrt(h)",
 }
 _FLICKER = np.sqrt(2.0 * np.log(2.0) / np.pi)  # 0.664
-_POINTS_PER_SLOPE = 3  # two points have no check
+_POINTS_PER_SLOPE = 3  # a line through two would always fit
 # Neighbouring processes differ by a half in slope: a third of that tells them apart.
 _SLOPE_TOLERANCE = 0.15
-# A run is at least so many averaging times long: of fewer, a deviation says next to nothing.
+# A stretch has at least so many averaging times: with fewer, a deviation says next to nothing.
 _ROWS_PER_TIME = 10
 _UNEVEN = 0.01  # largest deviation of the time between rows, relative
 
 
 class _Figure(NamedTuple):
-    """A figure of merit: a function of the columns ``needs``, and of ``also`` where the log has it.
+    """A figure of merit: a function of the columns ``needs``, and of ``also`` if the log has it.
 
-    With ``combine``, the function is of one run, and ``combine`` of the values of all runs.
+    With ``combine``, the function takes one run, and ``combine`` takes the values of all runs.
     """
 
     name: str
@@ -117,7 +117,7 @@ def figures_of_merit(full_scale=1.0):
 
 
 def table_of(columns, labels=(), gaps=()):
-    """Columns of equal length as a table, those that are None left out.
+    """Columns of equal length as a table; those that are None are left out.
 
     All but ``labels`` must be numbers, and finite; those in ``gaps`` may be NaN.
     """
@@ -153,14 +153,14 @@ def scale_factor(rate, output) -> float:
 
 
 def input_error(rate, output):
-    """Error in units of the input [deg/s]; the scale factor of a rate that never changes is 1."""
+    """Error at the input [deg/s]; if the rate never changes, the scale factor is taken as 1."""
     return output / (1.0 if np.ptp(rate) == 0 else scale_factor(rate, output)) - rate
 
 
 def rows_of_bias(rate):
-    """Rows off which the bias is read: those at rest, or all of a log that has hardly any."""
+    """Rows for the bias: those at rest, or all rows of a log that has hardly any at rest."""
     at_rest = np.abs(rate) <= _AT_REST * np.abs(rate).max()
-    # All give the line's intercept, which has the nonlinearity in it.
+    # All rows give the intercept of the line, which includes the nonlinearity.
     return at_rest | (np.count_nonzero(at_rest) < _FEWEST_AT_REST)
 
 
@@ -179,8 +179,8 @@ def hysteresis(rate, error, temperature, temperature_rate) -> float:
 def biases_of_branches(edges, rate, error, temperature, temperature_rate):
     """Mean errors in bins of temperature while warming, and while cooling, at a rate of zero.
 
-    What the error owes to the rate, an odd polynomial that is linear in temperature, is fitted
-    together with them, and taken off (Frisch, Waugh).
+    The error's dependence on the rate, an odd polynomial that is linear in temperature, is fitted
+    jointly with these means and subtracted (Frisch, Waugh).
     """
     powers = (rate / (np.abs(rate).max() or 1.0))[:, None] ** np.array(_POWERS)
     columns = np.column_stack([error, powers, powers * _centred(temperature)[:, None]])
@@ -198,9 +198,9 @@ def biases_of_branches(edges, rate, error, temperature, temperature_rate):
 def allan_deviation(error, time, run=None):
     """Overlapping Allan deviation, by allantools, in octaves up to a tenth of a stretch.
 
-    Of an error [deg/s] over all stretches of the runs in which it is known and the time goes on
-    evenly; their variances are averaged. A table: averaging_time [s], deviation and its standard
-    error [deg/h], by IEEE 952: that of the differences of means that do not overlap.
+    The error [deg/s] is used on all stretches of a run where it is known and rows are evenly spaced
+    in time; their variances are averaged. Returns a table: averaging_time [s], deviation and its
+    standard error [deg/h], by IEEE 952, from the number of differences of non-overlapping means.
     """
     told = "The Allan deviation needs allantools: pip install allantools."
     oadev = needed("allantools", told).oadev
@@ -229,10 +229,10 @@ def allan_deviation(error, time, run=None):
 
 
 def allan_figures(tau, deviation):
-    """The value of each figure, NaN where the curve [s, deg/h] has none, and why it has none.
+    """The value of each figure, or NaN if the curve [s, deg/h] has none, and why it has none.
 
-    A slope is found where a line through three neighbouring points has it within 0.15; the lowest
-    such line counts, before the minimum and any rise for N, after it for K. No end is a minimum.
+    Three neighbouring points have a slope if their line has it within 0.15; the lowest such line
+    counts. N is sought before the minimum and any rise, K after it. No end is a minimum.
     """
     if tau.size < _POINTS_PER_SLOPE:
         raise ValueError(f"The curve has {tau.size} points; at least {_POINTS_PER_SLOPE} needed.")
@@ -244,8 +244,8 @@ def allan_figures(tau, deviation):
         side = "rises from its shortest" if lowest == 0 else "still falls at its longest"
         minimum = np.nan
         no_minimum = f"no minimum: the curve {side} averaging time, {tau[lowest]:g} s"
-    # White noise falls from the shortest averaging time on: a curve that has risen falls again
-    # behind a hump, such as steps of the error at every new rate leave.
+    # White noise falls from the shortest averaging time on. A curve that falls after a rise has a
+    # hump, as steps of the error at every new rate leave it, and no white noise there.
     rises = np.flatnonzero(np.diff(deviation[: lowest + 1]) > 0)
     white = slice(rises[0] + 1 if rises.size else lowest + 1)
     walk, no_walk = _level(tau[white], deviation[white], -0.5)
@@ -278,7 +278,7 @@ def _reduction(rate, before, after):
 
 
 def _nonlinearity(rate, output, full_scale, size):
-    """Of the means over bins of the rate's range: that of single rows would be their noise."""
+    """Nonlinearity of means over bins of the rate: that of single rows would be their noise."""
     low, width = rate.min(), np.ptp(rate) / _RATE_BINS
     if width > 0:
         place = np.minimum(((rate - low) / width).astype(int), _RATE_BINS - 1)
@@ -298,7 +298,7 @@ def _asymmetry(rate, output):
 
 
 def _sensitivity(rate, output, temperature):
-    """S_T / S of output = (S + S_T dT) rate + c + c_T dT."""
+    """S_T / S of the model output = (S + S_T dT) rate + c + c_T dT, dT from the mean."""
     dt = _centred(temperature)
     without = "rate and temperature do not change independently of each other"
     slope, by_temperature, *_ = _least_squares([rate, rate * dt, dt], output, without)
@@ -306,9 +306,9 @@ def _sensitivity(rate, output, temperature):
 
 
 def _bias_sensitivity(error, of_bias, column, name, **other):
-    """Slope of the bias in a column, fitted together with that in another.
+    """Slope of the bias by one column, fitted jointly with the slope by another.
 
-    Of the rows at rest, as the bias is, where these reach half as far as all rows do.
+    It uses the rows at rest, as the bias does, if they span half the range of all rows; else all.
     """
     columns = [column, *other.values()]
     if any(np.ptp(each[of_bias]) < 0.5 * np.ptp(each) for each in columns):
@@ -321,12 +321,12 @@ def _bias_sensitivity(error, of_bias, column, name, **other):
 
 
 def _centred(values):
-    # Not values - mean where they are all equal: that leaves rounding errors, not zero.
+    # Equal values minus their mean would leave rounding errors, not zero.
     return values - (values[0] if np.ptp(values) == 0 else values.mean())
 
 
 def _least_squares(design, target, without):
-    """Coefficients of the columns in ``design``, beside a constant."""
+    """Coefficients of the columns in ``design``, fitted jointly with a constant."""
     columns = np.column_stack([*design, np.ones_like(target)])
     size = np.sqrt(np.mean(columns**2, axis=0))
     rank = 0
@@ -338,7 +338,7 @@ def _least_squares(design, target, without):
 
 
 def _squares_of_means(error, time, over):
-    """Sum of squares of one run's means over whole averaging times, and degrees of freedom."""
+    """Sum of squares of one run's means over averaging times, and its degrees of freedom."""
     steps = np.diff(time)
     if (steps <= 0).any():
         raise ValueError("time must increase within each run.")
@@ -354,7 +354,7 @@ def _squares_of_means(error, time, over):
 
 
 def _pooled_deviation(squares):
-    """Standard deviation within the runs [deg/h] (GJB 2426), of the sums of squares of each."""
+    """Standard deviation within runs [deg/h] (GJB 2426), from each run's sum of squares."""
     sum_of_squares, degrees_of_freedom = np.sum(squares, axis=0)
     if degrees_of_freedom == 0:
         raise ValueError("No bias stability: no run is as long as two means.")
@@ -362,7 +362,7 @@ def _pooled_deviation(squares):
 
 
 def _level(tau, deviation, slope):
-    """Level of the lowest line of this slope along the curve; NaN and why where it has none."""
+    """Level of the lowest line with this slope along the curve, and ""; or NaN and the reason."""
     x, y = np.log(tau), np.log(deviation)
     levels = []
     for start in range(x.size - _POINTS_PER_SLOPE + 1):

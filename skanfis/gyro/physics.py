@@ -1,7 +1,7 @@
 """The law of the open-loop interferometer, fitted to a calibration log and inverted.
 
-The squared error of the *output* is minimised: there the noise is white and of one size, and the
-law is defined for every rate. docs/gyro_physics.rst has the formulas.
+The squared error of the *output* is minimised, because its noise is white and of constant size, and
+the law gives an output for every rate. docs/gyro_physics.rst has the formulas.
 """
 
 import warnings
@@ -29,7 +29,7 @@ ROLES = ("output", "temperature", "temperature_rate")
 _SMALLEST_PHASE, _LARGEST_PHASE = 0.01, np.pi / 2.0
 # A tenth of a radian apart: the fit goes the rest of the way.
 _STARTING_PHASES = np.linspace(0.1, 1.5, 15)
-# A dozen coefficients at most: the start needs few rows, and the fit to all begins with some.
+# For at most 19 coefficients the start needs few rows, and the fit to all begins with some.
 _FEW_ROWS = 2_000
 _MAX_EVALUATIONS = 200
 
@@ -49,8 +49,8 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
     temperature : int, str or None, default=1
         Column of the temperature; None leaves temperature out.
     temperature_rate : int, str or None, default=None
-        Column of the rate of temperature change (:class:`ThermalRate`), where the thermometer lags
-        behind the coil: the law then takes the temperature plus a lag, fitted too, times this rate.
+        Column of the rate of temperature change (:class:`ThermalRate`), if the thermometer lags
+        behind the coil. The law then takes the temperature plus this rate times a fitted lag.
     amplitude_degree, sagnac_degree, bias_degree : int, default=1
         Degrees of A(T), K(T) and b(T), 0 to 5.
     max_phase : float, default=1.2
@@ -121,7 +121,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
 
     def __sklearn_tags__(self):
         tags = super().__sklearn_tags__()
-        # It reads two columns and knows one law: data that follow another are not for it.
+        # It reads few columns and knows one law: it scores poorly on data of another law.
         tags.regressor_tags.poor_score = True
         return tags
 
@@ -203,7 +203,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         return columns
 
     def _degrees(self, used):
-        """Degrees in temperature, no higher than its number of different values can tell."""
+        """Degrees in temperature, at most as many as its different values can determine."""
         n_values = 1 if self.temperature is None else np.unique(used[:, 1]).size
         if self.temperature is not None and n_values == 1:
             warnings.warn(
@@ -214,7 +214,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         return tuple(min(getattr(self, degree), n_values - 1) for degree in DEGREES)
 
     def _keep(self, log, law):
-        """Coefficients in the units of X and y, in powers of T minus the reference."""
+        """Set coefficients in the units of X and y, in powers of T minus the reference."""
         self.reference_temperature_ = float(log.mean)
         output_unit, rate_unit, std, thermal_unit = log.units
         tau = Polynomial([0.0, 1.0 / std])
@@ -234,18 +234,18 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         return validate_data(self, X, reset=False, dtype=float)[:, self.columns_]
 
     def _difference(self, used):
-        """The coil's temperature from the reference."""
+        """The coil's temperature minus the reference."""
         if self.temperature is None:
             return np.zeros(len(used))
         lagging = self.thermometer_lag_ * used[:, 2] if used.shape[1] == len(ROLES) else 0.0
         return used[:, 1] + lagging - self.reference_temperature_
 
     def _sine(self, used):
-        """V / A(T): the sine of the phase, where it is one."""
+        """V / A(T): the sine of the phase, unless its size is above one."""
         amplitude = polyval(self._difference(used), self.amplitude_)
         with np.errstate(divide="ignore", invalid="ignore"):
             sine = used[:, 0] / amplitude
-        # 0 / 0: no amplitude, no rate.
+        # 0 / 0: without an amplitude the rate cannot be known.
         return np.where(np.isnan(sine), np.inf, sine)
 
     def _outside(self, used):
@@ -253,7 +253,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
 
 
 def check_parameters(law):
-    """Raise ValueError where a parameter of an OpenLoopArcsineRegressor is not what it must be."""
+    """Raise ValueError if a parameter of an OpenLoopArcsineRegressor is not allowed."""
     for name in DEGREES:
         check_scalar(getattr(law, name), name, (int, np.integer), min_val=0, max_val=HIGHEST_DEGREE)
     real, ends = (float, int, np.floating), {"min_val": 0.0, "max_val": np.pi / 2.0}
@@ -271,7 +271,7 @@ def phase_of(law, X):
 
 
 def past_phase(policy, what):
-    """What happens beyond the largest phase, as a clause; ``what`` there is none of in silence."""
+    """What happens beyond the largest phase, as a clause; ``what`` names the missing result."""
     if policy in SILENT:
         return f"there is no {what}"
     return "the phase is held there" if policy == "clip" else "the law goes on along its tangent"
@@ -293,7 +293,7 @@ def _standardised(used, rate):
 def _law_of(parameters, log):
     """The law from the vector that the solver works on: s = A k_0, K, b, then the lag.
 
-    Where the sine is nearly straight, A and K cannot be told apart, but s can.
+    Where the sine is nearly straight, data determine the product s, but not A and K.
     """
     ends = np.cumsum([degree + 1 for degree in log.degrees])
     s, k, b, rest = np.split(parameters, ends)
@@ -316,9 +316,9 @@ def _fit_law(log):
     lower, upper = np.full((2, start.size), [[-np.inf], [np.inf]])
     first_of_sagnac = log.degrees[0] + 1
     lower[first_of_sagnac], upper[first_of_sagnac] = _SMALLEST_PHASE, _LARGEST_PHASE
-    # On a large log the noise is far above the eighth digit, and every pass has its price.
+    # On a long log the noise is far above the eighth digit, and passes are expensive.
     is_long = n_rows > _FEW_ROWS
-    # Of a long log some rows show the way; few steps on all are left then.
+    # A long log is first fitted on some of its rows; few steps on all rows are left then.
     for step in sorted({max(1, n_rows // _FEW_ROWS), 1}, reverse=True):
         fitted = least_squares(
             _misfit,
@@ -326,7 +326,7 @@ def _fit_law(log):
             jac="cs",  # by complex steps: exact to rounding
             bounds=(lower, upper),
             x_scale="jac",
-            # Tight, and not by the cost: where the law fits badly, that is flat before the end.
+            # No test of the cost: where the law fits badly, it is flat before the minimum.
             ftol=None,
             xtol=1e-7 if is_long else 1e-12,
             gtol=1e-13,
@@ -338,7 +338,7 @@ def _fit_law(log):
 
 
 def _start(columns, log):
-    """The best of several phases, the rest of the law by linear least squares; no lag.
+    """Starting values: the best of several phases, the rest by linear least squares; no lag.
 
     For given K the law is linear in A cos(K b) and A sin(K b).
     """

@@ -1,4 +1,4 @@
-"""One table of all figures of merit, before and after, with bootstrap intervals."""
+"""The table of all figures of merit, before and after compensation, with bootstrap intervals."""
 
 import numpy as np
 import pandas as pd
@@ -11,9 +11,9 @@ from ._columns import RATE_UNITS, in_rate_unit
 # With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
 _FEWEST_RUNS = 5
 _N_BLOCKS = 30
-# Resamples hold so many rows, thinned by chance: their spread is that of the runs or blocks.
+# Rows of a resample, thinned at random: the spread between runs or blocks decides, not the rows.
 _MOST_ROWS = 2_000
-_FEWEST_DEFINED = 0.9  # part of the resamples that must have the figure
+_FEWEST_DEFINED = 0.9  # least share of the resamples that must have the figure
 _PERCENTILES = 2.5, 97.5
 
 
@@ -34,7 +34,7 @@ def gyro_report(
 ) -> pd.DataFrame:
     """Tabulate the figures of merit of a gyro, before and after its compensation.
 
-    Give held-out predictions. Intervals, of 95 %, are of a bootstrap over runs where there are five
+    Give held-out predictions. The 95 % intervals come from a bootstrap over runs, if there are five
     or more, and otherwise over some thirty blocks of rows.
 
     Parameters
@@ -54,7 +54,7 @@ def gyro_report(
     n_resamples : int, default=200
         Resamples for the intervals; zero makes no intervals.
     rate_unit : {"deg/s", "deg/h"}, default=None
-        Unit of every figure that is a rate, or a rate per something; None leaves each its usual.
+        Unit of every figure that is a rate, or a rate per something; None: each in its usual unit.
     random_state : int, RandomState instance or None, default=None
         Seed of the bootstrap.
 
@@ -98,7 +98,7 @@ def gyro_report(
     answered = {name: table[name].to_numpy()[is_answered] for name in table}
     answered["of_bias"] = metrics.rows_of_bias(answered["rate"])
     units, kind = _units(answered)
-    # A generator of its own, so that one given moves on by one number alone.
+    # A new generator, so that a given one advances by one number only.
     generator = np.random.RandomState(check_random_state(random_state).randint(2**31 - 1))
     draws = [generator.randint(0, len(units), size=len(units)) for _ in range(n_resamples)]
     names = [(figure.name, figure.unit) for figure in figures]
@@ -109,7 +109,7 @@ def gyro_report(
         cells += _allan_cells(table, side, is_answered) if allan else []
         *values, notes[side] = zip(*cells, strict=True)
         report[[side, f"{side}_low", f"{side}_high"]] = np.transpose(values)
-    # Before compensation nothing is reduced.
+    # The reduction factor has no value before compensation.
     report.loc[report["figure"] == "reduction_factor", report.columns[2:5]] = np.nan
     if rate_unit is not None:
         own, factors = zip(*(in_rate_unit(u, rate_unit) for u in report["unit"]), strict=True)
@@ -120,14 +120,14 @@ def gyro_report(
 
 
 def _joined(notes):
-    """One note of both sides, where they are alike, or each with its side."""
+    """One note if both sides have the same, or else each with its side."""
     if len({*notes.values()}) == 1:
         return notes["before"]
     return "; ".join(f"{side}: {note}" for side, note in notes.items() if note)
 
 
 def _units(rows):
-    """The rows of each run, or of blocks of rows within the runs; and which of both."""
+    """Rows to resample together: of each run, or of each block within the runs; and which."""
     n_rows = rows["rate"].size
     runs = metrics.rows_by_run(rows.get("run"), n_rows)
     if len(runs) >= _FEWEST_RUNS:
@@ -140,7 +140,7 @@ def _units(rows):
 def _cells(answered, side, figures, units, kind, draws):
     """Value, ends of the interval, and a note, of each figure."""
     step = max(1, -(-answered["rate"].size // _MOST_ROWS))
-    # By chance: every second row may have the rates of one sign alone.
+    # At random: every second row might have rates of one sign only.
     choice = np.random.RandomState(0).choice
     places = [
         np.concatenate([choice(unit, -(-unit.size // step), replace=step > 1) for unit in drawn])
@@ -158,7 +158,7 @@ def _cells(answered, side, figures, units, kind, draws):
 
 
 def _interval(figure, value, rows, samples, draws, kind):
-    """Ends of the interval, and why it has none."""
+    """Ends of the interval, and a note if there is none."""
     nothing = (np.nan, np.nan)
     if figure.name in metrics.LARGEST_VALUES:
         return nothing, "largest value: no interval"
@@ -172,20 +172,20 @@ def _interval(figure, value, rows, samples, draws, kind):
     spread = np.array(found)[np.isfinite(found)]
     if spread.size < _FEWEST_DEFINED * len(draws):
         return nothing, "no interval: too many resamples do not have this figure"
-    # A resample has fewer different rows, and so more noise: of such it tells the spread alone.
+    # A resample has fewer different rows, and so more noise: only its relative spread is used.
     own = value / (np.median(spread) or 1.0) if figure.name in metrics.SIZES_WITH_NOISE else 1.0
     return own * np.percentile(spread, _PERCENTILES), ""
 
 
 def _of_side(rows, side):
-    """The columns with the output of one side, its residual, and its error at the input."""
+    """The columns, plus the output of one side, its residual, and its error at the input."""
     rate, output = rows["rate"], rows[side]
     error = metrics.input_error(rate, output)
     return rows | {"output": output, "residual": output - rate, "error": error}
 
 
 def _allan_cells(part, side, is_answered):
-    """Coefficients read off the Allan deviation, where rows follow one another."""
+    """Coefficients of the Allan deviation, over rows that follow one another."""
     error = (part[side] - part["rate"]).where(is_answered).to_numpy()
     try:
         curve = metrics.allan_deviation(error, part["time"].to_numpy(), part.get("run"))
@@ -197,7 +197,7 @@ def _allan_cells(part, side, is_answered):
 
 
 def _or_nan(function, *arguments):
-    """What the function gives and "", or NaN and what its ValueError says."""
+    """The function's value and "", or NaN and the text of its ValueError."""
     try:
         return function(*arguments), ""
     except ValueError as error:

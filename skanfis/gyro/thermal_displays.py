@@ -1,4 +1,4 @@
-"""Pictures over temperature: scale factor, hysteresis, where error is left, what is covered."""
+"""Plots over temperature: scale factor error, hysteresis, mean residual, coverage by the data."""
 
 from typing import Any, Self
 
@@ -9,15 +9,15 @@ from ._columns import ask, check_column, evenly_chosen
 from .displays import SIDES, GyroDisplay, bins_of, dress, mark_decades, signs, three_digits
 from .metrics import HYSTERESIS_BINS, biases_of_branches
 
-# Bands of temperature; bins of the rate, an odd number, so that rest is in the middle of one; and
-# the part of the largest rate below which a bias, divided by the rate, would hide all else.
+# Bands of temperature; bins of the rate, an odd number, so that zero is in the middle of one; part
+# of the largest rate, below which the bias divided by the rate would hide everything else.
 _N_BANDS, _N_RATES, _SMALLEST_SHARE = 3, 41, 0.05
 _BRANCHES = {"warming": ("^-", "#c8443c"), "cooling": ("v-", "#3a6ea5")}
-# Of maps: cells and points on each axis, and dots for rows, which beyond so many cover one another.
+# Cells and points on each axis of a map; dots for rows, of which more would hide one another.
 _N_CELLS, _N_POINTS, _MOST_DOTS = 24, 96, 2_000
 # How far a map of the coverage goes beyond the data, as a part of their range.
 _MARGIN = 0.15
-# Part of the cells that a colour scale covers, so that one outlier does not flatten it.
+# Share of the cells within the colour scale, so that one outlier does not flatten it.
 _NEARLY_ALL = 0.995
 _NO_DATA = "#e9e9e6"
 _COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some, full
@@ -26,7 +26,7 @@ _COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some,
 class ScaleFactorErrorDisplay(GyroDisplay):
     """Scale-factor error against rate in three bands of temperature, before and after.
 
-    It is what the bias, read off the band's least-squares line, leaves of the error, over the rate.
+    It is the error minus the bias (from the least-squares line of each band), divided by the rate.
     Rates below 5 % of the largest are left out.
 
     ``from_predictions`` takes ``temperature`` [degC].
@@ -54,7 +54,7 @@ class ScaleFactorErrorDisplay(GyroDisplay):
         means = {"true rate [deg/s]": rows["rate"][far].groupby(keys).mean()}
         for side in SIDES:
             known = rows[["rate", side]].dropna()
-            # What the least-squares line of each band leaves at rest.
+            # The intercept of the least-squares line of each band.
             biases = {
                 band: np.polyfit(part["rate"], part[side], 1)[1] if np.ptp(part["rate"]) else 0.0
                 for band, part in known.groupby(bands)
@@ -89,10 +89,10 @@ class ScaleFactorErrorDisplay(GyroDisplay):
 class HysteresisDisplay(GyroDisplay):
     """Bias against temperature while it rises and while it falls, before and after compensation.
 
-    What the error owes to the rate (an odd polynomial, linear in temperature) is taken off.
+    The error's dependence on the rate (an odd polynomial, linear in temperature) is subtracted.
 
-    ``from_predictions`` takes ``temperature`` [degC] and ``temperature_rate`` [degC/min]; rows of
-    less than 0.05 degC/min belong to neither branch.
+    ``from_predictions`` takes ``temperature`` [degC] and ``temperature_rate`` [degC/min]; rows
+    slower than 0.05 degC/min belong to neither branch.
 
     Examples
     --------
@@ -165,7 +165,7 @@ class ResidualSurfaceDisplay(GyroDisplay):
         limit = residual.abs().quantile(_NEARLY_ALL) or 1.0
         mesh = _draw_cells(axes[0], cells, residual, cmap="RdBu_r", vmin=-limit, vmax=limit)
         self.figure_.colorbar(mesh, ax=axes[0], extend="both")
-        # A scale needs two ends, even where all cells have as many rows.
+        # A scale needs two ends, even if all cells have equally many rows.
         norm = LogNorm(vmin=1, vmax=max(counts.max(), 2))
         mesh = _draw_cells(axes[1], cells, counts.where(counts > 0), cmap="viridis", norm=norm)
         bar = self.figure_.colorbar(mesh, ax=axes[1], label="rows in the cell")
@@ -177,10 +177,10 @@ class ResidualSurfaceDisplay(GyroDisplay):
 
 
 class CoverageDisplay(GyroDisplay):
-    """Where the calibration data cover what a compensator may be asked, by temperature and output.
+    """Coverage by the calibration data, over temperature and output.
 
-    Cells without a row are hatched; in the others the colour is the coverage, from 0 to 1. Outside
-    the dashed line rows are flagged, and within it where the coverage is below ``min_coverage``,
+    Cells without a row are hatched; in the others the colour is the coverage, from 0 to 1. Rows are
+    flagged outside the dashed line, and inside it where the coverage is below ``min_coverage``,
     beyond the dotted line. Colour and lines hold all other inputs at one value.
 
     Examples
@@ -218,7 +218,7 @@ class CoverageDisplay(GyroDisplay):
         output_unit : str, default="deg/s"
             Unit of the column output.
         min_coverage : float, default=0.1
-            Rows that are covered less are flagged.
+            Rows with less coverage are flagged.
         ax : matplotlib Figure or axes, default=None
             Where to draw, as for :meth:`plot`.
         """
@@ -236,7 +236,7 @@ class CoverageDisplay(GyroDisplay):
         points = grid[list(labels)].rename(columns=labels)
         points["coverage"] = ask(estimator, "coverage", grid)
         points["in range"] = ask(estimator, "in_bounds", grid).astype(int)
-        # With a margin of empty cells about them.
+        # With a margin of empty cells around them.
         has_rows = np.pad(cells["rows"].to_numpy().reshape(_N_CELLS, _N_CELLS) > 0, 1)
         at = np.ceil(_N_CELLS * steps).clip(0, _N_CELLS + 1).astype(int)
         points["in a cell with data"] = has_rows[np.ix_(at, at)].ravel().astype(int)
@@ -273,7 +273,7 @@ class CoverageDisplay(GyroDisplay):
 
 
 def _cells(columns):
-    """Ends of all cells over two columns, a line for each, and the number of that of every row."""
+    """Table of all cells over two columns, with their ends; and the cell number of every row."""
     ends: dict[str, np.ndarray] = {}
     numbers = np.zeros(len(columns), dtype=int)
     lines, places = np.divmod(np.arange(_N_CELLS**2), _N_CELLS)

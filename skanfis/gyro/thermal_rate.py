@@ -18,7 +18,7 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
     r"""Rate of change of the temperature, causally low-passed; see :doc:`/gyro_data`.
 
     The temperature of a body that follows with a lag :math:`\tau` is :math:`T - \tau r`, with the
-    rate r. All columns but ``time`` and ``run`` are filtered: choose them by a
+    rate r. All columns but ``time`` and ``run`` are filtered: select columns by a
     :class:`~sklearn.compose.ColumnTransformer`.
 
     Parameters
@@ -61,7 +61,7 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         self.run = run
 
     def fit(self, X: ArrayLike, y: Any = None) -> Self:
-        """Take note of the columns of a log, and check them; nothing is learnt, y is not used."""
+        """Record and check the columns of a log; nothing is learnt, and y is not used."""
         constant = self.time_constant
         if not (isinstance(constant, int | float | np.number) and 0.0 < constant < np.inf):
             raise ValueError(f"time_constant={constant!r} must be a positive number.")
@@ -75,24 +75,24 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         self._filtered = [i for i in range(len(names)) if i not in (self._time, self._run)]
         if not self._filtered:
             raise ValueError(f"X has {len(names)} feature(s), time or run: nothing to filter.")
-        self._rates(names, columns)  # what transform refuses, fit refuses
+        self._rates(names, columns)  # so that fit refuses what transform refuses
         return self
 
     def transform(self, X: ArrayLike) -> np.ndarray:
-        """Compute the rates of the columns filtered, those columns alone.
+        """Compute the rates of the filtered columns, and return these columns alone.
 
-        The rows of a run must be in time's order, and runs whole; they may be mixed.
+        Runs must be complete, and their rows in order of time; rows of several runs may be mixed.
         """
         check_is_fitted(self)
         return self._rates(*self._columns_of(X, reset=False))
 
     def get_feature_names_out(self, input_features: ArrayLike | None = None) -> np.ndarray:
-        """Names of the columns filtered, each with "_rate" behind it."""
+        """Names of the filtered columns, each with "_rate" appended."""
         names = super().get_feature_names_out(input_features)
         return np.array([f"{names[i]}_rate" for i in self._filtered], dtype=object)
 
     def _columns_of(self, X, reset):
-        """Names, positions where there are none, and values of the columns of X."""
+        """Names of the columns of X, or positions if there are none, and their values."""
         if hasattr(X, "columns"):
             validate_data(self, X, reset=reset, skip_check_array=True)
             return list(X.columns), [np.asarray(X[name]) for name in X.columns]

@@ -1,4 +1,4 @@
-"""Prediction intervals that cover: split, cross and leave-one-out conformal, by row or by group."""
+"""Conformal prediction intervals (split, cross, leave-one-out) with coverage by row or group."""
 
 from .conformal import ConformalRegressor
 

@@ -1,8 +1,8 @@
-r"""How far rows that a model has not seen lie from its predictions, and quantiles of that.
+r"""Conformal scores, the scaled errors on rows that a model has not seen, and their quantiles.
 
 Each of K units (rows, or groups of rows), and a new one, has the mass 1 / (K + 1). The rows of a
-group share its mass; the new unit's score counts as infinite. Intervals of a score cover with
-probability c if the rows of this score or less have the mass c.
+group share its mass; the new unit's score counts as infinite. Intervals of the width of a score
+cover with probability c if the rows with this score or less have the mass c.
 """
 
 import inspect
@@ -26,9 +26,9 @@ from ..exceptions import OutOfBoundsWarning
 from ..export.folding import final_step
 from ..naming import default_output_names
 
-# Least deviation, as a part of the target's range: an exact fit has none to divide by.
+# Least deviation, relative to the target's range: that of an exact fit is zero.
 _LEAST_DEVIATION = 1e-12
-# Least 1 - leverage: a row that the model fits exactly has none to divide by.
+# Least 1 - leverage: for a row that the model fits exactly it is zero.
 _SMALLEST_FREEDOM = 1e-6
 # Rounding error of a sum of masses.
 ROUNDING = 1e-9
@@ -36,7 +36,7 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class TrainingSet:
-    """What a regressor is trained on, in the user's own tables."""
+    """The training data, in the user's own tables."""
 
     X: Any
     y: Any
@@ -44,7 +44,7 @@ class TrainingSet:
     params: dict
 
     def fitted(self, regressor, rows=None):
-        """A clone of the regressor, trained on some rows, or on all of None."""
+        """A clone of the regressor, trained on some rows; None: on all."""
         if rows is None:
             return clone(regressor).fit(self.X, self.y, **self.params)
         params = {name: safe_indexing(value, rows) for name, value in self.params.items()}
@@ -174,7 +174,7 @@ def held_out_scores(estimator, data, rows, least):
             "out_of_bounds='raise' refuses rows held out beyond the range of the others. Use "
             "'clip' or 'linear', or a fitted FrozenEstimator(model) with method='split'."
         )
-    # That a row held out lies beyond the others is what is to be measured.
+    # Errors on held-out rows out of range are to be measured, not warned of.
     with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
         centers, deviations = predicted(estimator, safe_indexing(data.X, rows), least)
     return np.abs(data.targets[rows].reshape(centers.shape) - centers) / deviations
@@ -195,7 +195,7 @@ def leave_one_out_scores(estimator, data, weight, least):
     leverage = (deviations / noise) ** 2 - 1.0
     own = np.ones((1, 1))
     if weight is not None:
-        # As how many rows a row of this weight counts in the fit.
+        # How many rows a row of this weight counts as in the fit.
         own = weight[:, None] * max(1.0, weight.sum() / np.sum(weight**2))
     freedom = np.clip(1.0 - own * leverage, _SMALLEST_FREEDOM, 1.0)
     residual = np.abs(data.targets.reshape(centers.shape) - centers) / freedom
@@ -206,7 +206,7 @@ def leave_one_out_scores(estimator, data, weight, least):
 def row_masses(n_rows, sample_weight=None, groups=None):
     """The mass of every row, (n_rows,), and the number of units.
 
-    Of weighted rows that of an unweighted sample as precise, (sum s)^2 / sum s^2 (Kish 1965).
+    Weighted rows have the effective sample size (sum s)^2 / sum s^2, s the weights (Kish 1965).
     """
     weight = np.ones(n_rows) if sample_weight is None else sample_weight / np.max(sample_weight)
     if groups is None:
@@ -220,7 +220,7 @@ def row_masses(n_rows, sample_weight=None, groups=None):
 
 
 def score_quantile(scores, masses, coverage):
-    """The smallest score at or below which lies the mass ``coverage``; NaN counts as infinite."""
+    """The smallest score with the mass ``coverage`` at or below it; NaN counts as infinite."""
     scores = np.where(np.isnan(scores), np.inf, scores)
     order = np.argsort(scores)
     place = np.searchsorted(np.cumsum(masses[order]), coverage - ROUNDING)
@@ -228,7 +228,7 @@ def score_quantile(scores, masses, coverage):
 
 
 def group_scores(scores, masses, groups, coverage):
-    """Of every group the score that ``coverage`` of its rows do not exceed, and its mass."""
+    """For every group, the score that ``coverage`` of its rows do not exceed, and its mass."""
     found = []
     for number in np.unique(groups[masses > 0.0]):
         part = groups == number
@@ -238,10 +238,10 @@ def group_scores(scores, masses, groups, coverage):
 
 
 def one_row_per_group(scores, masses, groups, coverage):
-    """The median of the quantiles that one row drawn from every group would give.
+    """The median, over draws of one row from every group, of the quantile of the drawn rows.
 
-    The smallest score q with P(N(q) >= ceil((K + 1) c)) >= 1 / 2, N the number of rows drawn of a
-    score of q or less: a sum of indicators of the groups (Dunn, Wasserman and Ramdas 2023).
+    It is the smallest score q with P(N(q) >= ceil((K + 1) c)) >= 1 / 2, for N(q) drawn rows with
+    scores up to q, a sum of independent indicators (Dunn, Wasserman and Ramdas 2023).
     """
     scores = np.where(np.isnan(scores), np.inf, scores)
     numbers, place = np.unique(groups, return_inverse=True)
@@ -260,7 +260,7 @@ def one_row_per_group(scores, masses, groups, coverage):
 
 
 def _at_least(probabilities, needed):
-    """The probability that so many of independent events happen, or more."""
+    """The probability that ``needed`` or more of independent events happen."""
     counts = np.zeros(probabilities.size + 1)
     counts[0] = 1.0
     for p in np.clip(probabilities, 0.0, 1.0):

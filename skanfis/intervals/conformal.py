@@ -1,4 +1,4 @@
-"""ConformalRegressor: intervals that cover as often as was asked, around any regressor."""
+"""ConformalRegressor: prediction intervals with a given coverage, around any regressor."""
 
 from collections.abc import Iterable
 from numbers import Integral, Real
@@ -18,42 +18,43 @@ from . import _scores
 
 
 class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
-    r"""Prediction intervals that cover, around any regressor.
+    r"""Prediction intervals with a given coverage, around any regressor.
 
-    Conformal prediction [1]_: rows that a model has not seen tell how many of its standard
-    deviations a new row will be off, whatever the model. :doc:`/how_sure` has the formulas.
+    Conformal prediction [1]_: errors on rows that a model has not seen, in its own standard
+    deviations, show how far off a new row may be, for any model. See :doc:`/how_sure`.
 
     Parameters
     ----------
     estimator : regressor, default=None
         A Pipeline or a search, for example. None is ``ANFISRegressor()``.
     method : {"folds", "split", "loo"}, default="folds"
-        Which rows give the scores. "folds": every row, by a model of the folds without it. "split":
-        rows held out; covers at least as often as asked. "loo": every row, by leave-one-out to
-        first order, of an :class:`~skanfis.ANFISRegressor` or a Pipeline that ends in one.
+        Which rows give the scores. "folds": every row, by the fold's model that has not seen it.
+        "split": held-out rows; the coverage is at least the one asked for. "loo": every row, by
+        first-order leave-one-out, for an :class:`~skanfis.ANFISRegressor`, alone or in a Pipeline.
     scaled : bool, default=True
-        Whether intervals are as wide as ``predict(X, return_std=True)`` says, or all of one width.
+        Whether widths are proportional to the deviation of ``predict(X, return_std=True)``, or
+        all equal.
     cv : int, splitter or iterable of splits, default=10
-        Of "folds": how many at most, or splits that hold out every row once.
+        For "folds": their largest number, or splits that hold out every row once.
     calibration_fraction : float, default=0.25
-        Of "split": part of the rows, or groups, held out. 1, all rows, is for a fitted model, as
-        ``FrozenEstimator(model)``.
+        For "split": fraction of the rows, or groups, held out. 1, all rows, is for a fitted model,
+        given as ``FrozenEstimator(model)``.
     random_state : int, RandomState instance or None, default=None
-        Seed of the folds and of the rows held out. None stands for one fixed seed.
+        Seed of the folds and of the held-out rows. None is a fixed seed.
     n_jobs : int, default=None
         Processes for the fits of the folds.
 
     Attributes
     ----------
     estimator_ : regressor
-        What ``predict`` asks: trained on all rows, but for "split", which holds some out.
+        The regressor of ``predict``: trained on all rows, or, for "split", on those not held out.
     estimators_ : list of regressor
-        The models of the folds, each without its own; else empty.
+        For "folds": the models, each trained without its fold; else empty.
     scores_ : ndarray of shape (n_calibration,) or (n_calibration, n_outputs)
-        Sorted. NaN where the model gave NaN, which counts as infinite.
+        Sorted scores. NaN where the model gave NaN, which counts as infinite.
     n_units_ : float
-        How many rows, or groups, the scores come from; of weighted rows, how many of one weight
-        would say as much.
+        How many rows, or groups, the scores come from; for weighted rows, the effective sample
+        size.
     n_features_in_ : int
     feature_names_in_ : ndarray of shape (n_features,)
         Both if the regressor knows them.
@@ -135,7 +136,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         y : array-like of shape (n_samples,) or (n_samples, n_outputs)
             Targets.
         sample_weight : array-like of shape (n_samples,), default=None
-            Zero or positive: those of the regressor's ``fit``, and of the scores.
+            Weights, zero or positive, for the regressor's ``fit`` and for the scores.
         groups : array-like of shape (n_samples,), default=None
             Run, device or day of each row: whole groups are held out, and intervals are for rows of
             a new group. Passed, as numbers, to the regressor's ``fit`` if that takes groups.
@@ -158,7 +159,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         own_groups = None if numbers is None else numbers[held_out]
         own_weight = None if weight is None else weight[held_out]
         masses, n_units = _scores.row_masses(held_out.size, own_weight, own_groups)
-        # All at once: a fit that is interrupted leaves what was there.
+        # All attributes are set together: an interrupted fit leaves the earlier ones.
         for name in ("n_features_in_", "feature_names_in_"):
             self.__dict__.pop(name, None)
             if hasattr(estimator, name):
@@ -171,7 +172,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         return self
 
     def _calibrated(self, data, weight, groups, least):
-        """The regressor, those of the folds, the rows held out, and the score of each of these."""
+        """The regressor, those of the folds, the held-out rows, and their scores."""
         regressor, every = self._regressor(), np.arange(len(data.targets))
         seed = 0 if self.random_state is None else self.random_state
         if self.method == "loo":
@@ -204,23 +205,23 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
     def predict_interval(
         self, X: ArrayLike, coverage: float = 0.9, confidence: float | str | None = "auto"
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Predict intervals that cover the target as often as asked.
+        """Predict intervals that contain the target with the given coverage.
 
         Parameters
         ----------
         X : array-like of shape (n_samples, n_features)
         coverage : float, default=0.9
-            How often a new row's target is to lie in its interval; of several outputs, each by
-            itself.
+            Probability that a new row's target lies in its interval; for several outputs, that of
+            each alone.
         confidence : float, "auto" or None, default="auto"
-            With groups: the probability with which ``coverage`` or more of a new group's rows lie
-            in their intervals. "auto" takes the number of ``coverage``; None promises the coverage
-            on average over new groups.
+            With groups: the probability that ``coverage`` or more of a new group's rows lie in
+            their intervals. "auto" takes the value of ``coverage``; None promises the coverage on
+            average over new groups.
 
         Returns
         -------
         lower, upper : ndarray of shape (n_samples,) or (n_samples, n_outputs)
-            NaN where the prediction is. Infinite where too many rows held out were predicted as
+            NaN where the prediction is NaN. Infinite if too many held-out rows were predicted as
             NaN.
 
         Raises

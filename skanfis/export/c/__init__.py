@@ -1,9 +1,9 @@
-"""A trained model as one C function over constant tables.
+"""Write a trained model as one C function over constant tables.
 
-``fold`` takes scalers in, ``_numbers`` rounds and shifts what is written. ``source`` chooses lines
-of ``templates`` by facts of the model; ``dialect`` fills in names, types and numbers. What these
-functions name is written before them: helpers, memberships and tables. ``self_test`` and ``header``
-complete the files.
+``fold`` folds scalers in; ``_numbers`` rounds and shifts the numbers. ``source`` selects lines of
+``templates`` by facts of the model; ``dialect`` fills in names, types and numbers. Helpers,
+memberships and tables are written before the functions that use them, if any does. ``self_test``
+and ``header`` complete the files.
 """
 
 from collections.abc import Mapping, Sequence
@@ -22,12 +22,12 @@ __all__ = ["CCode", "CCost", "export_c"]
 
 @dataclass(frozen=True)
 class CCode:
-    """A header and a source file, and what the function in them costs.
+    """A header and a source file, and the cost of the function in them.
 
     Parameters
     ----------
     name : str
-        What all identifiers start with.
+        Prefix of all identifiers.
     header, source : str
         The text of the two files, in ASCII.
     cost : CCost
@@ -64,7 +64,7 @@ def export_c(
 
     ``int NAME_predict(const double x[], double y[])`` evaluates the model at one row of raw inputs
     and returns a status. It reads constant tables: no heap, no state, no recursion, bounded loops.
-    :doc:`/c_export` tells of the status, the self-test and rows outside the training data.
+    :doc:`/c_export` explains the status, the self-test and rows outside the training data.
 
     Parameters
     ----------
@@ -74,15 +74,15 @@ def export_c(
         Where to write, without a suffix: "out/gyro" makes out/gyro.h and out/gyro.c. None writes
         nothing.
     name : str, default=None
-        What all identifiers start with, at most 16 letters, digits and underscores. None takes the
-        last part of ``path``.
+        Prefix of all identifiers, at most 16 letters, digits and underscores. None takes the last
+        part of ``path``.
     dtype : {"double", "float"}, default="double"
         Type of inputs, outputs, tables and arithmetic.
     std : {"c99", "c89"}, default="c99"
         The oldest standard that a compiler must know.
     min_coverage : float or None, default=0.1
-        Rows are uncovered where ``estimator.coverage`` is below this, above 0 and at most 1. None
-        leaves that out, as do rules that have never seen data.
+        Rows are flagged as uncovered if ``estimator.coverage`` is below this, above 0 and at most
+        1. None leaves this flag out, as do rules that have never seen data.
     saturate : Bounds or array-like of shape (n_outputs, 2), default=None
         Limits between which every output is held, such as :func:`skanfis.bounds.bounds` proves.
     units : mapping of str to str, default=None
@@ -93,7 +93,7 @@ def export_c(
     Returns
     -------
     code : CCode
-        The text of both files, and the most that an evaluation takes.
+        The text of both files, and the largest cost of an evaluation.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The dialect of C that a file is written in: arguments, numbers and status word."""
+"""C syntax for a standard and a number type: constants, tables, names and the status word."""
 
 import re
 import textwrap
@@ -14,13 +14,13 @@ from .._numbers import rounded_within
 _DTYPES = {"double": np.dtype(np.float64), "float": np.dtype(np.float32)}
 _INTEGERS = {"int_least16_t": np.dtype(np.int16), "int_least32_t": np.dtype(np.int32)}
 _STANDARDS = ("c99", "c89")
-# C99 tells identifiers apart by 31 characters; the longest suffix of ours takes the rest.
+# C99 tells identifiers apart by 31 characters, of which our longest suffix takes some.
 LONGEST_NAME = 31 - len("_SELF_TEST_MAIN")
 _FUNCTIONS = ("exp", "log", "sqrt", "asin")
 _NUMBER_IN_TEMPLATE = re.compile(r"(\d+\.\d+)R\b")
 # Decimal digits that give back the very same float or double.
 _DIGITS = {np.dtype(np.float32): 9, np.dtype(np.float64): 17}
-# Unsigned types of positions, and the bytes that they take nearly everywhere.
+# Unsigned types for positions, and their sizes in bytes on nearly all machines.
 _INDEX_BYTES = {"unsigned char": 1, "unsigned short": 2, "unsigned long": 8}
 _BITS = {
     "IN_RANGE": (0, ""),
@@ -29,12 +29,12 @@ _BITS = {
     "UNCOVERED": (4, " /* hardly any training data lie near the inputs */"),
     "NO_OUTPUT": (8, " /* y holds no answer */"),
 }
-# The status word, also of Python that flags rows as generated C does.
+# Bits of the status word, also for Python code that flags rows as generated C does.
 STATUS = {name: bit for name, (bit, _) in _BITS.items()}
 
 
 def status_word(is_out, is_silent, is_uncovered):
-    """The status of rows that are finite; of one without an answer no coverage is told."""
+    """The status of finite rows; a row without an answer is not flagged as uncovered."""
     return (
         STATUS["OUT_OF_RANGE"] * is_out
         | STATUS["UNCOVERED"] * (~is_silent & is_uncovered)
@@ -44,7 +44,7 @@ def status_word(is_out, is_silent, is_uncovered):
 
 @dataclass(frozen=True)
 class Dialect:
-    """Turns templates into C.
+    """Fills templates with names, types and constants of C.
 
     A number that ends in R becomes a constant of the type. ``$name`` is the prefix of identifiers,
     ``$NAME`` of macros; ``$real`` the type, ``$EXP`` a function, ``$MAX`` the largest number of it.
@@ -56,7 +56,7 @@ class Dialect:
 
     @property
     def dtype(self):
-        """NumPy's name of the type."""
+        """The NumPy dtype of the type."""
         return (_DTYPES | _INTEGERS)[self.real]
 
     def number(self, value):
@@ -80,7 +80,7 @@ class Dialect:
         return re.sub(rf"\$({longest_first})", lambda found: str(words[found[1]]), text)
 
     def functions(self):
-        """Macros for the functions of <math.h>, one a line; C89 has them for double alone."""
+        """Macros for the functions of <math.h>, one a line; C89 has them only for double."""
         calls = {"double": "{}(u)", "float": "{}f(u)" if self.std == "c99" else "((float){}(u))"}
         return "\n".join(
             f"#define {self.name.upper()}_{name.upper()}(u) {calls[self.real].format(name)}"
@@ -88,7 +88,7 @@ class Dialect:
         )
 
     def table(self, name, values, kind=None):
-        """A constant array: of the kind that is given, of the type, or of positions."""
+        """A constant array of type ``kind``, by default the dialect's or one for positions."""
         kind = kind or (self.real if values.dtype == self.dtype else index_type(values))
         shape = "".join(f"[{n}]" for n in values.shape)
         head = self.write(f"static const {kind} $name_{name}{shape} =\n")
@@ -107,13 +107,13 @@ def kept_lines(template, facts):
 
 
 def index_type(values):
-    """The smallest unsigned type that holds these positions whatever the width of a char is."""
+    """The smallest unsigned type that holds these positions on every machine."""
     largest = max(map(int, np.ravel(values)), default=0)
     return next(kind for kind, n_bytes in _INDEX_BYTES.items() if largest < 256**n_bytes)
 
 
 def table_bytes(values):
-    """What a table takes in memory."""
+    """Memory of a table, in bytes."""
     of_each = values.itemsize if values.dtype.kind == "f" else _INDEX_BYTES[index_type(values)]
     return values.size * of_each
 
@@ -149,7 +149,7 @@ def remark(text):
 
 
 def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_NAME):
-    """The name of the files, without a suffix, and what identifiers start with."""
+    """Check the arguments; return the files' name without suffix, and the identifiers' prefix."""
     check_choice("dtype", dtype, _DTYPES)
     check_choice("std", std, _STANDARDS)
     if min_coverage is not None and not (
@@ -166,7 +166,7 @@ def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_N
             f"path ends in {stem!r}; C can include files of letters, digits, '_', '.' and '-'."
         )
     name = stem if name is None else name
-    # Two underscores in a row are C++'s own.
+    # C++ reserves names with two underscores in a row.
     is_identifier = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
     if not is_identifier or len(name) > longest_name:
         raise ValueError(
@@ -178,7 +178,7 @@ def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_N
 
 
 def read_limits(saturate, numbers):
-    """Limits (n_outputs, 2) in the type of the code, none beyond what is given; or None."""
+    """Limits (n_outputs, 2) in the type of the code, rounded inwards; or None."""
     if saturate is None:
         return None
     if hasattr(saturate, "lower"):
@@ -196,7 +196,7 @@ def read_limits(saturate, numbers):
 
 
 def write_files(code, path):
-    """Write a CCode beside each other as .h and .c, or nothing where ``path`` is None."""
+    """Write a CCode as .h and .c files; nothing if ``path`` is None."""
     if path is None:
         return
     folder, stem = Path(path).parent, Path(path).name

@@ -1,4 +1,4 @@
-"""The .h file: what goes in and comes out, what it costs, and the declarations."""
+"""Write the .h file: a comment on inputs, outputs and cost, then the declarations."""
 
 import textwrap
 
@@ -8,7 +8,7 @@ from ...digits import range_in_digits
 from ...policies import policy_in_words
 from .dialect import remark, status_lines
 
-# Of the width of a range: to about a hundred-thousandth.
+# Digits of a range's ends, relative to its width: about a hundred-thousandth.
 _DIGITS = 6
 _SILENT = {
     "raise": "there is no output: y stays as it is",
@@ -80,7 +80,7 @@ def header(source, units, notes):
 
 
 def cost_lines(cost, besides=""):
-    """What an evaluation takes at most, and the memory; ``besides`` comes first."""
+    """Lines on the largest cost of an evaluation, and on memory; ``besides`` comes first."""
     yield (
         f"Per evaluation, whatever the row, at most: {besides}{cost.exponentials} exponentials, "
         f"{cost.logarithms} logarithms, {cost.square_roots} square roots, "
@@ -102,13 +102,13 @@ def _ranges(names, low, high, units):
 
 
 def policy_line(model, where):
-    """What is answered out of bounds."""
+    """A sentence on the output out of bounds."""
     words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     return f"{where} {_SILENT.get(model.out_of_bounds, words)}."
 
 
 def _precision_lines(numbers):
-    """What single precision makes of inputs that lie far from zero for their spread."""
+    """Lines on how single precision rounds inputs that are far from zero for their spread."""
     if numbers.dtype != np.float32:
         return []
     steps = np.spacing(np.maximum(np.abs(numbers.low), np.abs(numbers.high)))

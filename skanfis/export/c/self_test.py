@@ -1,4 +1,4 @@
-"""Rows with known answers, and the function that compares them; compiled on request."""
+"""The self-test in C: rows with known answers, and a function that checks them, on request."""
 
 import numpy as np
 from scipy.stats import qmc
@@ -6,9 +6,9 @@ from scipy.stats import qmc
 from ...policies import SILENT
 from .dialect import literals, status_word
 
-# Of a test: in the box, out of it and on its edges, in a table of a few kB.
+# Rows of a test, in the box, out of it and on its edges: a table of a few kB.
 ROWS = 32
-# As part of the size of what is summed: what the algorithm loses, and no more.
+# Relative to the size of the summands: the rounding errors of the algorithm, and no more.
 TOLERANCE = {np.dtype(np.float64): 1e-12, np.dtype(np.float32): 1e-5}
 
 _CODE = """
@@ -63,7 +63,7 @@ int main(void)
 
 
 def self_test(answers, dialect):
-    """The code, with answers as :func:`known_answers` gives them."""
+    """The C code, with answers as from :func:`known_answers`."""
     X, y, status, tolerance = answers
     tables = {"x": X, "y": y, "status": status, "tolerance": tolerance}
     texts = {name: literals(values) for name, values in tables.items()}
@@ -71,10 +71,10 @@ def self_test(answers, dialect):
 
 
 def known_answers(source):
-    """Rows, outputs, status and the tolerance of every output, of the model of a source.
+    """Rows, outputs and status of the model of a source, and the tolerance of every output.
 
-    Half of the rows lie in the box, the others up to half its width beyond. Rows are left out where
-    rounding decides: on the coverage, or, in a gap between all terms, on the strongest rule.
+    Half of the rows lie in the box, the others up to half its width beyond. Rows are left out if
+    rounding decides their coverage, or, in a gap between all terms, their strongest rule.
     """
     numbers, model = source.numbers, source.model
     policy = "linear" if model.out_of_bounds == "linear" else "clip"
@@ -91,7 +91,7 @@ def known_answers(source):
     Z = X.astype(float)
     outside = ~model.in_bounds(Z)
     silent = outside & (model.out_of_bounds in SILENT)
-    # Where no coverage is asked for, every row has enough.
+    # Without a least coverage, every row is covered.
     asked = -1.0 if source.min_coverage is None else source.min_coverage
     coverage = model.coverage(Z)
     status = status_word(outside, silent, coverage < asked)
@@ -107,7 +107,7 @@ def known_answers(source):
 
 
 def size_of_sum(model, X, y):
-    """The size of what is summed for each output: sum_r w_r (|a_r| + sum_j |b_rj (x_j - x0_j)|)."""
+    """Size of each output's summands: sum_r w_r (|a_r| + sum_j |b_rj (x_j - x0_j)|)."""
     inside = np.clip(X, model.minimum, model.maximum)
     parts = [model.strengths(X), np.abs(model.basis(inside.T)), np.abs(model.coefficients)]
     sizes = np.einsum("nr,bn,rbo->no", *parts)

@@ -1,9 +1,9 @@
-"""The .c file: constant tables, and the functions that read them.
+"""Write the .c file: constant tables, and the functions that read them.
 
-The functions are in ``templates``; those of memberships are made of formulas in ``_families``. Here
-is which lines there are, how many of each thing, and what it costs. The order of work is that of
-``skanfis.model``; "linear" is worked out outside the box alone, by the derivative along the way
-from its nearest point.
+The functions are in ``templates``; those of memberships come from the formulas in ``_families``.
+This module decides which lines are written, and counts sizes and costs. The order of computation is
+that of ``skanfis.model``; "linear" is computed only outside the box, by the derivative along the
+way from its nearest point.
 """
 
 import re
@@ -23,10 +23,10 @@ from .dialect import STATUS, Dialect, kept_lines, read_limits, table_bytes
 
 @dataclass(frozen=True)
 class CCost:
-    """What one evaluation takes at most, whatever the row, and the memory of the function.
+    """The largest cost of one evaluation, for any row, and the memory of the function.
 
-    The row that takes most lies outside the range, where the policy answers there, and is covered
-    by no rule. A row in range that its strongest rule covers takes much less.
+    The most expensive row lies outside the range, if the policy answers there, and is covered by no
+    rule. A row in range that its strongest rule covers costs much less.
 
     Parameters
     ----------
@@ -64,10 +64,10 @@ class Source:
         self.dialect, self.is_part, self.policy = dialect, is_part, model.out_of_bounds
         numbers: Any = Numbers(model, dialect.dtype)
         self.numbers, self.model = numbers, numbers.model
-        # Rules that come from elsewhere have no data to be near to or far from.
+        # Rules without training data have no coverage.
         self.min_coverage = None if model.support is None else min_coverage
         self.limits = read_limits(saturate, numbers)
-        # What outputs are held within in the end, (2, n_outputs) or None.
+        # Final limits of the outputs, (2, n_outputs) or None.
         self.held = numbers.output_limits
         if self.limits is not None:
             self.held = self.limits.T if self.held is None else np.clip(self.held, *self.limits.T)
@@ -75,13 +75,13 @@ class Source:
         self.sizes = self._sizes()
 
     def _facts(self):
-        """What decides which lines of ``templates`` there are."""
+        """Facts of the model, which select the lines of ``templates``."""
         numbers, n_terms = self.numbers, self.model.antecedent.n_terms
-        # Of a grid, one rule has no terms.
+        # A grid without terms has one rule.
         is_grid, is_one = bool(numbers.counts), numbers.counts == ()
         is_tree, has_slopes = numbers.nodes is not None, numbers.slope_input.size > 0
         covers, answers = self.min_coverage is not None, self.policy not in SILENT
-        # The tangent of a constant is the constant; one of no length is its start.
+        # A constant needs no tangent, nor does a reach of zero.
         varies = n_terms > 0 or has_slopes
         linear = self.policy == "linear" and varies and bool(numbers.reach.any())
         moves = linear and numbers.tangent_group is not None
@@ -91,28 +91,28 @@ class Source:
             "grid": is_grid,
             "sums": not (is_one or is_grid or is_tree),
             "tree": is_tree,
-            # Some of the table look at fewer terms than others.
+            # Some rules of the table have fewer terms than others.
             "none": not (is_one or is_tree) and (numbers.rule_terms == n_terms).any(),
             "terms": n_terms > 0,
             "slopes": has_slopes,
             "covers": covers,
-            # Rows outside the box get no answer; are less covered; are followed along the tangent.
+            # Rows outside the box: no answer; less coverage; tangent.
             "silent": not answers,
             "fades": covers and answers,
             "linear": linear,
-            # Tangents are found where the row is, or where some inputs are held elsewhere.
+            # Tangents are found at the row's own place, or with some inputs held elsewhere.
             "plain": linear and not moves,
             "moves": moves,
             "beyond": linear or (covers and answers),
             "held": self.held is not None,
-            # Limits that were asked for hold what is no number, too; others leave a fault visible.
+            # Limits asked for also replace NaN; the model's own leave such a fault visible.
             "asked": self.limits is not None,
             "told": self.held is not None and self.limits is None,
         }
         return {fact for fact, holds in facts.items() if holds}
 
     def _sizes(self):
-        """How many there are, as ``templates`` has them."""
+        """Sizes of tables and arrays, by their names in ``templates``."""
         facts, n_rules, n_terms = self.facts, self.model.n_rules, self.model.antecedent.n_terms
         n_nodes = n_terms // 2 if "tree" in facts else 0
         return {
@@ -129,7 +129,7 @@ class Source:
         }
 
     def body(self):
-        """What follows the lines that include other files."""
+        """The C code after the #include lines."""
         macros = f"{self.dialect.functions()}\n"
         tables = [self.dialect.table(name, values) for name, values in self.tables.items()]
         return "\n".join([macros, *tables, *self._memberships(), self._functions])
@@ -147,7 +147,7 @@ class Source:
         text = text.replace("$finite_input", templates.FINITE_INPUT.strip("\n"))
         text = text.replace("$strengths", self._strengths("share"))
         text = text.replace("$slopes", self._strengths("slope"))
-        # What the place of a row is told by: z, the shares of a grid's terms, and the strengths.
+        # Arrays that describe a row's place: z, the shares of a grid's terms, and the strengths.
         taken = ["z", "l", "w"] if "grid" in self.facts else ["z", "w"]
         is_on_some = 0 < sizes["n_slopes"] < self.model.n_inputs
         words = sizes | {
@@ -188,12 +188,12 @@ class Source:
 
     @cached_property
     def _named(self):
-        """The tables and functions that the functions name."""
+        """Names of the tables and helpers that the functions use."""
         return set(re.findall(rf"\b{self.dialect.name}_(\w+)", self._functions))
 
     @cached_property
     def tables(self):
-        """Of the numbers, by their names, those that the functions read as constant tables."""
+        """The numbers that the functions read as constant tables, by name."""
         found = vars(self.numbers).copy()
         for k, terms in enumerate(self.numbers.terms):
             found[f"terms{k}"] = terms.constants
@@ -216,24 +216,24 @@ class Source:
 
     @cached_property
     def cost(self):
-        """CCost of the row that takes most."""
+        """CCost of the most expensive row."""
         numbers, facts, sizes = self.numbers, self.facts, self.sizes
         n_inputs, n_outputs = self.model.n_inputs, self.model.n_outputs
         of_value, strengths = numbers.consequents.size, self._cost_of_strengths()
         operations = strengths + np.array([0, 0, of_value, 0])
         if "linear" in facts:
-            # Twice per coefficient: where the tangent starts, and along it.
+            # Two products per coefficient: at the start of the tangent, and along it.
             tangent = self._cost_of_strengths(is_slope=True) + strengths * ("moves" in facts)
             tangent += [0, 0, 2 * of_value, 0]
             operations += sizes["n_groups"] * tangent
-            # The scale: per input what it adds and what it divides, and it is taken back.
+            # The scale of the way out: a product and a division per input, a product per output.
             operations += [0, 0, n_inputs + n_outputs, n_inputs]
         if "fades" in facts:
-            # Per input its deviation and the square, then the exponential of half their sum.
+            # Per input the deviation and its square, then the exponential of half their sum.
             operations += [1, 0, 2 * n_inputs + 2, 0]
-        # The strongest rule is asked, then all that have data.
+        # Coverage is computed for the strongest rule, then for all that have data.
         asked = int("covers" in facts and 1 + np.count_nonzero(numbers.support[:, 0]))
-        # The factor's triangle, its square, share and strength.
+        # Products with the factor's triangle, squares, share and strength.
         operations += [asked, 0, asked * (n_inputs * (n_inputs + 1) // 2 + n_inputs + 5), 0]
         exponentials, logarithms, multiply_adds, divisions = map(int, operations)
         # Arrays of inputs, z and e; l and w, and of slopes t and s; sum and change.
@@ -254,7 +254,7 @@ class Source:
         """Exponentials, logarithms, multiplications and divisions of strengths, or of slopes."""
         numbers, facts, sizes = self.numbers, self.facts, self.sizes
         if "tree" in facts:
-            # The place on the sigmoid, its other side, and what goes above and below.
+            # The sigmoid's argument, its two sides, and the strengths above and below.
             return sizes["n_nodes"] * np.array([1, 0, 4 + is_slope, 1])
         operations = np.zeros(4, dtype=int)
         for terms in numbers.terms:
@@ -262,9 +262,9 @@ class Source:
             operations += len(terms.constants) * np.array(of_term)
         n_shares = sizes["n_rules" if "sums" in facts else "n_terms"]
         if is_slope:
-            # Along e, and less their mean.
+            # Derivatives along e, minus their mean.
             return operations + np.array([0, 0, sizes["n_terms"] + n_shares, 0])
-        # Of a grid, products of shares; one division for each sum.
+        # For a grid, products of shares; one division for each sum.
         n_products = numbers.rule_terms.size if "grid" in facts else 0
         n_sums = 1 if "sums" in facts else len(numbers.counts)
         return operations + np.array([n_shares, 0, n_shares + n_products, n_sums])
@@ -283,7 +283,7 @@ class RulesPart(Source):
         self.low, self.high, self._outer = self.numbers.low, self.numbers.high, dialect.name.upper()
 
     def text(self):
-        """The C code, for after the lines that include other files."""
+        """The C code, to be placed after the #include lines."""
         prefix = self.dialect.name.upper()
         sizes = {"N_INPUTS": self.model.n_inputs, "N_OUTPUTS": self.model.n_outputs}
         macros = [f"#define {prefix}_{key} {value}\n" for key, value in sizes.items()]
@@ -301,7 +301,7 @@ class _Number:
         return self.body.add(template, (self, *others))
 
     def _comparison(self, other, sign):
-        # Is no number: stands where it is used.
+        # A comparison gets no variable: its text is put where it is used.
         return _Number(f"{self.text} {sign} {self.body.text_of(other)}", self.body)
 
     __add__ = partialmethod(_line, template="{0} + {1}")
@@ -338,12 +338,12 @@ class _Body:
         self.cost = [self._operations[one] for one in operations]
 
     def add(self, template, operands):
-        """The number that a new line makes of others."""
+        """Add a line that computes a new number from others, and return it."""
         self._operations[template] += 1
         name, text = f"t{len(self._lines)}", template.format(*map(self.text_of, operands))
         self._lines.append(self.dialect.write(f"    const $real {name} = {text};\n"))
         return _Number(name, self)
 
     def text_of(self, number):
-        """A number as it stands in a line."""
+        """A number as text for a line."""
         return number.text if isinstance(number, _Number) else self.dialect.number(number)

@@ -1,7 +1,7 @@
-"""The C of a model, as templates.
+"""Templates of the C code of a model.
 
-The words before a "|" are facts, see ``Source.facts``: a line is written where all of them hold.
-``$`` words are filled in by ``Dialect.write``. A function or table is written where it is named.
+The words before a "|" are facts, see ``Source.facts``: a line is written if all of them hold.
+``Dialect.write`` fills in ``$`` words. A helper or table is written only if it is used.
 """
 
 _REJECT_UNTOUCHED = """
@@ -48,14 +48,14 @@ slope |        t[$at] = e[$name_term_input[$at]]
 slope |            * $name_d_$family(z[$name_term_input[$at]], $name_terms$table[i]);
       |    }
 """
-# Of every input of a grid: shares in the place of logarithms, or their derivatives.
+# For every input of a grid: shares in place of logarithms, or the derivatives.
 SHARES = """
 share |    $name_normalise(&l[$start], $count);
 slope |    $name_centre(&t[$start], &l[$start], $count);
 """
-# Strengths w of rules, or the derivatives s of their logarithms: of one rule without terms; of a
-# grid, products of shares, so that there is one exponential per term and not per rule and input; of
-# a table, normalised sums of logarithms.
+# Strengths w of rules, or the derivatives s of their logarithms. ONE is for a single rule without
+# terms. A grid takes products of shares, so that there is one exponential per term, not per rule
+# and input; a table takes normalised sums of logarithms.
 ONE = """
 share |    w[0] = 1.0R;
 slope |    s[0] = 0.0R;
@@ -78,9 +78,9 @@ slope      |            s[r] += t[$name_rule_terms[r][k]];
 share sums |    $name_normalise(w, $n_rules);
 slope sums |    $name_centre(s, w, $n_rules);
 """
-# Of a tree what comes to node i, w[$n_rules + i], is parted between its two ends, from the root on:
-# one exponential per node. What a sigmoid has 80 widths off its cut, 2e-35, no sum of strengths can
-# tell from nothing: odds are held there, and no branch depends on the side on which a row lies.
+# From the root on, the strength of node i of a tree, w[$n_rules + i], is split between its two
+# sides, with one exponential per node. Odds are limited to those 80 widths off the cut: 2e-35 does
+# not change any sum of strengths. So no branch depends on the row's side of the cut.
 TREE = """
 share |    w[$n_rules] = 1.0R;
 slope |    s[$n_rules] = 0.0R;
@@ -99,7 +99,7 @@ slope |        s[$name_node_ends[i][1]] = s[$n_rules + i] - above * ahead;
       |    }
 """
 
-# What may be called in the functions below, or in a helper below.
+# Helpers that the functions below, or helpers below, may call.
 _NORMALISE = """
 /* Turns n logarithms into shares that add up to one. */
 static void $name_normalise($real *l, $int n)
@@ -121,8 +121,8 @@ static void $name_normalise($real *l, $int n)
     }
 }
 """
-# Near the foot of the only term that speaks its derivative is huge, and all but the mean: what is
-# left of it would have no digits; so the strongest term's is subtracted first.
+# Near the foot of the only active term, its derivative is huge and almost equal to the mean, so
+# that their difference would lose all digits. So the strongest term's is subtracted first.
 _CENTRE = """
 /* Subtracts from n derivatives their mean by the n shares. */
 static void $name_centre($real *s, const $real *share, $int n)
@@ -319,5 +319,5 @@ held  |        }
 
 
 def rejection(policy, std):
-    """Template of the macro REJECT."""
+    """Template of the macro REJECT for a policy."""
     return _REJECT_NAN if policy == "nan" and std == "c99" else _REJECT_UNTOUCHED

@@ -1,4 +1,4 @@
-"""Sugeno systems in the .fis format of MATLAB and Octave, both ways; writing them here."""
+"""Write and read Sugeno systems in the .fis format of MATLAB and Octave; this module writes."""
 
 import re
 import unicodedata
@@ -19,7 +19,7 @@ __all__ = ["export_fis", "read_fis"]
 
 _NOT_IN_A_NAME = re.compile(r"[^A-Za-z0-9_]+")
 _MINUS = re.compile(r"(?<!\S)-(?=[0-9.])")
-# What fuzzylite takes for words of a rule.
+# Words that fuzzylite reserves for rules.
 _WORDS = {"if", "is", "then", "with", "and", "or", "not"}
 _WORDS |= {"any", "very", "seldom", "somewhat", "extremely"}
 _HEAD = """[System]
@@ -34,7 +34,7 @@ OrMethod='probor'
 ImpMethod='prod'
 AggMethod='sum'
 DefuzzMethod='wtaver'"""
-# Points of the box at which the rules of the file are tried.
+# Points of the box at which the rules of the file are compared with the model.
 _N_POINTS = 1000
 _GAP = (
     "no rule of the .fis file fires: other programs give NaN, zero or the middle of the output's "
@@ -51,8 +51,8 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
     """Write a trained model as a .fis file, for MATLAB, Octave or fuzzylite.
 
     The system is Sugeno's, with product as AND and weighted average; numbers have all their digits.
-    Clamp the inputs to their Range, that of the training data: beyond it programs differ. Clamp the
-    outputs to the limits that a comment at the head of the file gives.
+    Clamp the inputs to their Range, which is that of the training data, because programs differ
+    beyond it. Clamp the outputs to the limits in the comment at the head of the file.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
 
 
 def _premises(model):
-    """Per term its input, name, and function with parameters; the rules (n_rules, n_inputs).
+    """For each term its input, name, and function with parameters; the rules (n_rules, n_inputs).
 
     A rule's entry is the number of its term on that input, from 1 on, or 0 for none.
     """
@@ -132,7 +132,7 @@ def _premises(model):
         rules[r, inputs[term]] = number[term]
     names, always = list(model.term_names), ~rules.any(axis=1)
     if always.any():
-        # Readers want every rule to have a condition: a term that is 1 on the whole Range.
+        # Readers require a condition in every rule: add a term that is 1 on the whole Range.
         rules[always, 0] = 1 + np.count_nonzero(inputs == 0)
         inputs, names = np.append(inputs, 0), [*names, "any value"]
         low, high = model.minimum[0], model.maximum[0]
@@ -155,7 +155,7 @@ def _consequents(model, k):
 
 
 def _wide(low, high, least):
-    """The interval, wider than nothing: MATLAB wants low < high."""
+    """The interval, widened if it is empty, because MATLAB requires low < high."""
     return [low, high if high > low else max(low + least, np.nextafter(low, np.inf))]
 
 
@@ -169,7 +169,7 @@ def _variable(section, name, interval, names, functions):
 
 
 def _numbers(values):
-    """As few digits as give the same double back, 17 at most."""
+    """Numbers as text, in as few digits as give the same double back."""
     return f"[{' '.join(repr(float(value)) for value in values)}]"
 
 
@@ -213,16 +213,16 @@ def _identifiers(names, fallback):
 
 
 def _warn_of_differences(model):
-    """Warn where, within the Range, the file does not say what skanfis does.
+    """Warn if the file differs from skanfis within the Range.
 
-    Where the textbook's strengths are zero for all rules the nearest one speaks in skanfis, whose
-    memberships have a floor. And the format knows no limits of outputs.
+    Where all textbook strengths are zero, the nearest rule answers in skanfis, whose memberships
+    have a floor; the file has no answer. Also, the format has no limits of outputs.
     """
     X = np.random.default_rng(0).uniform(model.minimum, model.maximum, (_N_POINTS, model.n_inputs))
     groups = model.antecedent.groups
     with np.errstate(over="ignore"):
         by_group = [group.family.value(X.T[group.inputs], group.theta) for group in groups]
-    # One more, for the inputs that a rule does not look at (-1).
+    # One row more, for inputs without a term in a rule (-1).
     mu = np.concatenate([*by_group, np.ones((1, _N_POINTS))])
     fires = np.zeros(_N_POINTS, dtype=bool)
     for rule in model.antecedent.rule_terms:

@@ -1,8 +1,8 @@
-"""Membership functions of the .fis format and the families of skanfis that they are.
+"""Convert membership functions between the .fis format and the families of skanfis.
 
-Every function is the family's textbook mu, with other parameters. The functions that turn them take
-and give lists of floats; on the side of skanfis these are natural parameters (widths, not their
-logarithms). What a family cannot be raises ValueError.
+Every function equals a family's textbook mu, with other parameters. The conversions take and give
+lists of floats, for skanfis the natural parameters (widths, not their logarithms). A function that
+no family can represent raises ValueError.
 """
 
 from collections.abc import Callable
@@ -14,12 +14,12 @@ from ...membership import FAMILIES, PRODUCTS, SIDES
 from .._families import check_own
 from ..limits import LARGEST_NUMBER, SMALLEST_NUMBER, shown
 
-# A plateau that is a point, of a family that always has one, as part of the shorter flank.
+# Width for a plateau that is a point, if the family must have one; relative to the shorter flank.
 _POINT = 1e-12
 
 
 def function_of(family, natural):
-    """Name and parameters in the file of a term with these natural parameters."""
+    """Name and parameters in the file for a term with these natural parameters."""
     check_own(family)
     name, to_file = _TO_FILE[family.name]
     return name, to_file(*map(float, natural))
@@ -59,10 +59,10 @@ def theta_of(name, parameters, low, high):
 
 
 def _open_flanks(name, corners, low, high):
-    """Corners in which no flank is vertical; those out of sight may be.
+    """Corners without vertical flanks; those at or outside the ends of the Range are replaced.
 
-    A term at the edge is often given as trimf [0 0 5] on Range [0 10]. Within the Range any flank
-    to the left is as good as this one.
+    A term at the edge is often given as trimf [0 0 5] on Range [0 10]. Any other left flank gives
+    the same values within the Range.
     """
     if sorted(corners) != corners:
         raise ValueError(f"the corners of {name} {corners} must be in ascending order.")
@@ -101,12 +101,12 @@ def _difference_from_file(slope, place, other_slope, other_place):
             "same and not zero. With two slopes the difference is below zero in one tail; use "
             "psigmf."
         )
-    # It counts by its size: neither the sign of the slope nor the order makes a difference.
+    # Only the size of the difference counts: neither sign of the slope nor order matters.
     return _sides_from_file(slope, place, other_slope, other_place)[:3]
 
 
 def _sides_from_file(*numbers):
-    """Slopes and places by turns, of one sigmoid or two: natural parameters."""
+    """Natural parameters of one or two sigmoids, given by slope and place in turn."""
     slopes, places = _from_the_left(numbers)
     if 0.0 in slopes:
         raise ValueError("a sigmoid of slope 0 is one half everywhere: leave it out.")
@@ -145,8 +145,8 @@ _TO_FILE: dict[str, tuple[str, Callable]] = {
     "sigmoid_falling": ("sigmf", lambda cut, width: [-1.0 / width, cut]),
     **{one.name: ("psigmf", _product_to_file(*signs)) for signs, one in PRODUCTS.items()},
 }
-# By function: its family, the number of its parameters, and what turns them into the family's. The
-# signs of the slopes tell which family of sigmoids it is.
+# By function: its family, the number of its parameters, and their conversion to the family's. For
+# sigmoids the signs of the slopes decide the family.
 _FROM_FILE: dict[str, tuple[str, int, Callable]] = {
     "gaussmf": ("gaussian", 2, lambda width, c: [c, abs(width)]),
     "gbellmf": ("bell", 3, lambda width, slope, c: [c, abs(width), slope]),

@@ -1,6 +1,6 @@
-"""From a .fis file to a frozen model: strictly, and nothing but data.
+"""Read a .fis file into a frozen model: parsed strictly, as data only.
 
-Every pattern is anchored and passes over its line once, whatever the line holds.
+Every pattern is anchored, and takes linear time on any line.
 """
 
 import re
@@ -18,20 +18,20 @@ from ..json_reader import rule_base
 from ..limits import LARGEST_NUMBER, check_size, read_bytes, shown
 from .functions import theta_of
 
-# What is larger is refused before it is read.
+# Larger files are refused before they are read.
 _MOST_BYTES = 2**22
 
 _HEAD = re.compile(r"\[(System|Rules|(?:Input|Output)[1-9][0-9]{0,5})\]")
 _QUOTED = re.compile(r"'([^']*)'")
 _BRACKETS = re.compile(r"\[(.*)\]")
 _WHOLE = re.compile(r"[0-9]{1,9}")
-# fuzzylite writes them as 1.000.
+# Whole numbers in a rule, which fuzzylite writes as 1.000.
 _WHOLE_OF_RULE = re.compile(r"([0-9]{1,9})(?:\.0*)?")
 # No number takes more than 100 characters, and a longer text takes long to parse.
 _NUMBER = re.compile(r"(?=.{1,100}$)[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _MEMBERSHIP = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*\[([^\]]*)\]")
 _RULE = re.compile(r"([^,]*),([^,(]*)\(([^()]*)\)\s*:\s*([12])")
-# Between numbers.
+# Separator of numbers.
 _BLANK = re.compile(r"\s*,\s*|\s+")
 _SYSTEM = {
     "Type": ("sugeno", "only Sugeno systems are supported"),
@@ -54,12 +54,12 @@ def read_fis(path: str | PathLike[str]) -> TSKModel:
     -------
     model : skanfis.model.TSKModel
         Its box is the Range of the inputs; outside it the edge is held (``out_of_bounds="clip"``).
-        Of the training data the file knows nothing: ``coverage`` is zero everywhere.
+        The file has no training data: ``coverage`` is zero everywhere.
 
     Raises
     ------
     ValueError
-        With the line, if the file is malformed or holds what is not supported.
+        With the line, if the file is malformed or has parts that are not supported.
 
     Examples
     --------
@@ -111,13 +111,13 @@ def parse_fis(text):
 
 
 class _Entry(NamedTuple):
-    """What stands to the right of a key, or a rule; ``line`` is its number in the file."""
+    """The value of a key, or a rule; ``line`` is its number in the file."""
 
     line: int
     text: str
 
     def error(self, reason):
-        """A ValueError that says where."""
+        """A ValueError with the line."""
         return ValueError(f"line {self.line}: {reason}")
 
     def match(self, pattern, wanted):
@@ -147,9 +147,9 @@ class _Entry(NamedTuple):
 
 
 def _sections(text):
-    """Entries by section and key, its head under "".
+    """Entries by section and key; the section's head has the key "".
 
-    Comments, which begin with % or #, and empty lines are passed over.
+    Comments, which begin with % or #, and empty lines are skipped.
     """
     sections: dict[str, dict[str, _Entry]] = {}
     name = ""
@@ -179,14 +179,14 @@ def _sections(text):
 
 
 def _take(section, key):
-    """Remove and return the entry of a key; ValueError where there is none."""
+    """Remove and return the entry of a key; ValueError if there is none."""
     if key not in section:
         raise section[""].error(f"{section[''].text} has no {key}.")
     return section.pop(key)
 
 
 def _check_empty(section):
-    """Raise ValueError where a key is left that nothing has asked for."""
+    """Raise ValueError if a key is left, which is then unknown."""
     head, *others = section
     for key in others:
         raise section[key].error(f"{section[head].text} has the unknown key {shown(key)}.")
@@ -204,7 +204,7 @@ class _Variable(NamedTuple):
 
 def _read_system(section):
     """Numbers of inputs, outputs and rules."""
-    # The last three have no part in a Sugeno system of rules joined by AND.
+    # The last three have no effect in a Sugeno system whose rules use AND.
     for key in ("Name", *_SYSTEM, "OrMethod", "ImpMethod", "AggMethod"):
         entry = _take(section, key)
         wanted, reason = _SYSTEM.get(key, (entry.name(), ""))
@@ -290,7 +290,7 @@ def _model(inputs, outputs, antecedents, consequents):
     if order is not None:
         antecedents, consequents = antecedents[order], consequents[order]
     premises = np.flatnonzero(antecedents.any(axis=0))
-    # Input and number of each term that a rule looks at, input by input.
+    # Input and number of each term used in a rule, input by input.
     places: list = [(j, k) for j, own in enumerate(antecedents.T) for k in np.unique(own) if k > 0]
     groups = groups_of((j, *inputs[j].terms[k - 1]) for j, k in places)
     table = np.full(antecedents.shape, -1)
@@ -299,7 +299,7 @@ def _model(inputs, outputs, antecedents, consequents):
     kind = "table" if order is None else "grid"
     antecedent = rule_base(kind, groups, table[:, premises])
     names = [distinct(variable.names) for variable in inputs]
-    # Constants beside linear consequents have no slopes.
+    # Constant consequents among linear ones get zero slopes.
     n_basis = max(len(term) for output in outputs for term in output.terms)
     coefficients = np.zeros((len(consequents), n_basis, len(outputs)))
     for (r, k), number in np.ndenumerate(consequents):
@@ -311,9 +311,9 @@ def _model(inputs, outputs, antecedents, consequents):
         antecedent=antecedent,
         initial_antecedent=antecedent,
         coefficients=coefficients,
-        # About another point the file's own p0 would be rounded.
+        # Another reference would round the file's p0.
         reference=np.zeros(len(inputs)),
-        # That of rows spread evenly over the Range.
+        # Standard deviation of rows spread evenly over the Range.
         spread=(high - low) / np.sqrt(12.0),
         minimum=low,
         maximum=high,
@@ -327,9 +327,9 @@ def _model(inputs, outputs, antecedents, consequents):
 
 
 def _places_of_grid(inputs, antecedents):
-    """Where the rules of a grid, in C order, stand in the file; None where they are none.
+    """Positions of a grid's rules in the file, in C order; None if the rules are no grid.
 
-    These are all combinations of two or more terms of one family on every input that they look at.
+    A grid has all combinations of two or more terms, of one family, on every input with terms.
     """
     used = [(one, own) for one, own in zip(inputs, antecedents.T, strict=True) if own.any()]
     terms = [[one.terms[k - 1] for k in np.unique(own) if k > 0] for one, own in used]

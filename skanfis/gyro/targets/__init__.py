@@ -1,1 +1,1 @@
-"""Simple functions in the place of a compensator, each with its certain largest difference."""
+"""Simple functions that replace a compensator, each with a proven bound of its difference."""

@@ -1,4 +1,4 @@
-"""Parameters of autopilots: one cubic over the temperature, of one axis of one gyro.
+"""Parameters for autopilots: a cubic over temperature for one axis of one gyro.
 
 PX4, in TemperatureCompensation::calc_thermal_offsets_3D: X0 + X1 d + X2 d^2 + X3 d^3, d = T - TREF.
 ArduPilot, in AP_InertialSensor_TCal: (GYR1 d + GYR2 d^2 + GYR3 d^3) 1e-6, d = T - 35. Both are in
@@ -22,21 +22,21 @@ NOTES = {
     "a cubic P about 35 degC. The temperature is that of the IMU's own sensor; both are held "
     "between TMIN and TMAX. The offset and T_cal (INS_GYRn_CALTEMP) are measured at boot.",
 }
-_N_POINTS = 400  # dense next to the ends
-# Roundings of an evaluation in single precision, in units of the last place of all terms.
+_N_POINTS = 400  # Chebyshev points, denser at the ends
+# Rounding errors of an evaluation in single precision, relative to the sum of all terms' sizes.
 _SLACK = 16.0 * np.finfo(np.float32).eps
 
 
 class Cubic:
-    """The cubic that is nearest to an error in the largest difference, as an autopilot holds it.
+    """The minimax cubic approximation of an error, as an autopilot holds it.
 
-    ``coefficients`` are its parameters, in single precision; ``piecewise`` is what it computes
-    [deg/s], for ArduPilot but for a constant.
+    ``coefficients`` are its parameters, in single precision. ``piecewise`` is what the autopilot
+    computes [deg/s]; ArduPilot's has another constant.
     """
 
     def __init__(self, error, autopilot):
         self.autopilot = autopilot
-        # Within the range, in two digits; no wider for being rounded.
+        # Range ends with two decimals, rounded inwards so that they stay in the range.
         [(low, high)] = 100.0 * error.ends
         low, high = np.ceil(low) / 100.0, np.floor(high) / 100.0
         self.low, self.high = np.float32(low), np.float32(high)
@@ -78,7 +78,7 @@ class Cubic:
         found = {f"{gyro}TREF": self.reference, f"{gyro}TMIN": self.low, f"{gyro}TMAX": self.high}
         for k, each in enumerate(self.coefficients):
             found[f"{gyro}X{k}_{'xyz'.index(axis)}"] = each
-        # Vehicle, component, name, value, and the type: 6 is a whole number, 9 a float.
+        # Vehicle, component, name, value, and type: 6 is an integer, 9 a float.
         lines += [f"1\t1\t{name}\t{value}\t6" for name, value in whole.items()]
         lines += [f"1\t1\t{name}\t{_text(value)}\t9" for name, value in found.items()]
         return "\n".join([*lines, ""])
@@ -90,7 +90,7 @@ def _text(value):
 
 
 def _nearest_cubic(s, values):
-    """Coefficients of the cubic in s with the least largest difference, by a linear programme."""
+    """Coefficients of the minimax cubic in s, by linear programming."""
     offset, scale = values.mean(), np.ptp(values) or 1.0
     design, one = np.vander(s, 4, increasing=True), np.ones((s.size, 1))
     above = np.block([[design, -one], [-design, -one]])

@@ -1,8 +1,8 @@
-"""The error that a compensator takes off, and how far what stands in its place can be from it.
+"""The error that a compensator subtracts, and a proven bound of a target's difference from it.
 
-Ranges of both, and of their slopes, over boxes are certain, and so is the difference by the mean
-value theorem. The error is a sum of rules, with ranges from ``skanfis.bounds``, of polynomials and
-the arcsine law, by interval arithmetic. An interval is a pair of arrays, a number for every box.
+Ranges of both, and of their slopes, are proven over boxes, and so is their difference, by the mean
+value theorem. The error is a sum of rules, with ranges from ``skanfis.bounds``, and of polynomials
+and the arcsine law, by interval arithmetic. An interval is a pair of arrays over the boxes.
 """
 
 import warnings
@@ -19,7 +19,8 @@ from ...export.folding import found_by_search
 from ..compose import FrozenRules, Polynomial, ResidualRegressor
 from ..physics import OpenLoopArcsineRegressor
 
-# Boxes to look at, and how small; how near to the largest difference is near enough, and nothing.
+# Most boxes, and how often each is halved; accuracy of the bound, relative to the difference, and
+# relative to the error itself.
 _MOST_BOXES, _MOST_CUTS, _TOLERANCE, _NOTHING = 100_000, 30, 0.02, 1e-7
 _N_POINTS = 4096
 
@@ -39,7 +40,7 @@ class ErrorModel:
         self._is_rate = compensator.predicts == "rate"
 
     def __call__(self, points):
-        """The error at points (n_points, n_inputs); outside the range that at its edge."""
+        """The error at points (n_points, n_inputs); outside the range, its value at the edge."""
         X = np.clip(points, *self.ends.T)
         with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
             predicted = self._estimator.predict(pd.DataFrame(X, columns=self.names))
@@ -57,7 +58,7 @@ class ErrorModel:
             indicated = np.sort(self._own * np.stack([low, high])[:, self._output], axis=0)
             value, slopes = indicated - value[::-1], -slopes[::-1]
             slopes[:, self._output] += self._own
-        # Rounding, of what has no account of its own.
+        # Slack for rounding errors that the ranges do not include.
         steep, far = np.abs(slopes).max(axis=0), np.maximum(np.abs(low), np.abs(high))
         slack = ROUNDINGS * EPS * (np.abs(value).max(axis=0) + (steep * far).sum(axis=0))
         return np.add(value, [-slack, slack]), slopes
@@ -88,7 +89,7 @@ def _polynomial_range(powers, coefficients, low, high):
 
 
 def _parts_of(estimator):
-    """Columns, and what gives ranges over boxes of them, of all that a prediction is the sum of."""
+    """The summands of a prediction: for each, its columns and the function for its ranges."""
     found = found_by_search(estimator)
     if isinstance(found, ResidualRegressor):
         return [*_parts_of(found.base_), *_parts_of(found.residual_)]
@@ -113,7 +114,7 @@ def _of_rules(sides, low, high):
 
 
 def _of_law(law, low, high):
-    """asin(V / A(T)) / K(T) - b(T), within the largest phase; nothing is known beyond."""
+    """Ranges of asin(V / A(T)) / K(T) - b(T); NaN where the phase may exceed the largest."""
     (a, a_slope), (k, k_slope), (b, b_slope) = (
         polynomial_ranges(
             np.arange(each.size)[:, None], each, low[1:2], high[1:2], law.reference_temperature_
@@ -133,7 +134,7 @@ def _of_law(law, low, high):
 
 
 def _inverse(ends):
-    """Range of 1 / x; unknown where x may be zero."""
+    """Range of 1 / x; NaN where x may be zero."""
     return [np.where(ends[0] * ends[1] > 0.0, 1.0 / end, np.nan) for end in ends[::-1]]
 
 
@@ -142,8 +143,8 @@ class Piecewise:
     """sum_k c_k prod_j s_j^p_kj with s_j = (x_j - origin_j) / width_j; held beyond the edges.
 
     ``edges`` (n_cells + 1), ``origins`` (n_cells) and ``widths`` are by axis; ``powers`` are of
-    shape (n_terms, n_axes), ``coefficients`` (n_terms, *n_cells) [deg/s]. ``slack`` is what the
-    arithmetic of the target adds at most.
+    shape (n_terms, n_axes), ``coefficients`` (n_terms, *n_cells) [deg/s]. ``slack`` bounds the
+    rounding errors of the target's arithmetic.
     """
 
     edges: list[np.ndarray]
@@ -164,7 +165,7 @@ class Piecewise:
         return self.ranges(held, held)[0][0]
 
     def ranges(self, low, high):
-        """Range over boxes (n_axes, n_boxes) within a cell each, and of the slopes by axis."""
+        """Range over boxes (n_axes, n_boxes), each within a cell, and of the slopes by axis."""
         cells = tuple(
             np.clip(np.searchsorted(edges, x, side="right") - 1, 0, edges.size - 2)
             for edges, x in zip(self.edges, 0.5 * (low + high), strict=True)
@@ -183,9 +184,9 @@ def spread(ends):
 
 
 def difference(error: ErrorModel, target: Piecewise):
-    """What the error minus the target lies between where the target is not held: certainly.
+    """Proven limits of the error minus the target, within the edges of the target.
 
-    Boxes in which it may be larger than anything met are cut in halves, as long as that helps.
+    Boxes where the difference may exceed all values found so far are halved, while that helps.
     """
     points = spread(target.ends)
     errors = error(points)
@@ -214,7 +215,7 @@ def difference(error: ErrorModel, target: Piecewise):
 
 
 def _limits(error, target, low, high):
-    """What the difference lies between in every box, by its middle and its slopes."""
+    """Limits of the difference in every box, from the value at its middle and the slopes."""
     middle = 0.5 * (low + high)
     value = error.ranges(middle, middle)[0] - target.ranges(middle, middle)[0][::-1]
     (_, own), (_, its) = error.ranges(low, high), target.ranges(low, high)

@@ -1,4 +1,4 @@
-"""Tables in C, in floating or fixed point, in the place of an error."""
+"""Lookup tables in C, in floating or fixed point, that replace the compensator's error model."""
 
 from itertools import product
 from types import SimpleNamespace
@@ -11,16 +11,16 @@ from ...export.c.self_test import ROWS, self_test
 from ...export.c.templates import FINITE_INPUT, rejection
 from .error_model import Piecewise, spread
 
-# Of every type what C calls it, what it computes in, and the bits of a number behind its sign.
+# For every type: its name in C, the type of intermediate results, and the bits behind the sign.
 TYPES = {
     "float": ("float", "float", 0),
     "double": ("double", "double", 0),
     "q31": ("int_least32_t", "int_least64_t", 31),
     "q15": ("int_least16_t", "int_least32_t", 15),
 }
-# By the number of inputs: what it is called, and cells of each input.
+# By the number of inputs: name of the table, and cells of each input.
 NAMES, _N_CELLS = {1: "gyro_table", 2: "gyro_rate_table"}, {1: 64, 2: 24}
-_MARGIN = 1.001  # of a fixed-point scale, for what is rounded
+_MARGIN = 1.001  # of a fixed-point scale, for rounding
 
 _CODE = """
       |/* The value between two. */
@@ -69,8 +69,9 @@ plane |    }
 class Table:
     """A table of an ErrorModel, with the numbers as C holds them.
 
-    ``piecewise`` is what it computes. By axis, ``low``, ``high`` and ``step`` are numbers of C that
-    stand for so many ``scale``, and ``counts`` the cells; a value stands for so many ``unit``.
+    ``piecewise`` is what it computes. For each axis, ``low``, ``high`` and ``step`` are numbers in
+    C, in units of ``scale``, and ``counts`` is the number of cells; values are in multiples of
+    ``unit``.
     """
 
     def __init__(self, error, type_name, n_cells=None):
@@ -97,7 +98,7 @@ class Table:
         self.piecewise = self._piecewise(self.values * self.unit, [each[:-1] for each in at])
 
     def _scale_of(self, largest):
-        """What 1 stands for where a number may be so large: in fixed point a power of two."""
+        """The unit for numbers up to ``largest``: in fixed point a power of two, else 1."""
         if not self.bits:
             return np.ones_like(largest)
         return 2.0 ** (np.ceil(np.log2(np.where(largest > 0.0, largest, 1.0))) - self.bits)
@@ -126,7 +127,7 @@ class Table:
         sizes = np.abs(coefficients)
         steepest, most = np.tensordot(powers.sum(axis=1), sizes, 1).max(), sizes.sum(axis=0).max()
         if self.bits:
-            # The input is rounded; its place in a cell has a bit less; three products are cut off.
+            # Errors: of the rounded input, of its place in a cell, and of three truncated products.
             slack = (0.5 / self.step.min() + 2.0 ** (1 - self.bits)) * steepest + 3.0 * self.unit
         else:
             eps = np.finfo(self.dialect.dtype).eps
@@ -198,5 +199,5 @@ class Table:
 
 
 def _shown(power):
-    """A power of two."""
+    """A power of two as text."""
     return f"2^{int(np.log2(power))} ({power:.6g})"

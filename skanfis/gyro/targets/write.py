@@ -1,4 +1,4 @@
-"""Files of simple targets, each with what it is worth; or why there is none."""
+"""Write simple targets to files, each with its proven and measured error, or refuse them."""
 
 from functools import partial
 from typing import Any
@@ -18,19 +18,19 @@ FILES = {
     "px4": ("px4.params",),
     "ardupilot": ("ardupilot.parm",),
 }
-# A target is let through whose error on rows held out is at most so many times the model's.
+# A target is written if its error on held-out rows is at most this many times the model's.
 _MOST_TIMES = 1.5
 _N_CALIBRATION_TEMPERATURES = 200
 
 
 def write_targets(calibration, texts, folder):
-    """Write targets such as "px4:x:0"; yields these, a sentence, and whether it was done."""
+    """Write targets such as "px4:x:0"; yield each, a sentence, and whether it was written."""
     for text in texts:
         yield text, *_write(calibration, text, folder)
 
 
 def _write(calibration, text, folder):
-    """What a target that was written is worth, or why it was not; and which of both."""
+    """A sentence on a target's accuracy, or on why it was refused; and whether it is written."""
     name, *details = text.split(":")
     compensator, X = calibration.compensator, calibration.X
     axes = ("temperature", "output") if name == "rate-table" else ("temperature",)
@@ -47,7 +47,7 @@ def _write(calibration, text, folder):
     error = ErrorModel(compensator, compensator.estimator, X)
     made = make(error)
     low, high = difference(error, made.piecewise)
-    # ArduPilot: of the difference at T less that at T_cal.
+    # ArduPilot applies the difference at T minus that at T_cal.
     is_relative = name == "ardupilot"
     largest = high - low if is_relative else max(-low, high)
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
@@ -81,9 +81,9 @@ def _write(calibration, text, folder):
 
 
 def _held_out_rms(calibration, make, is_relative):
-    """RMS error of rows in range by targets of models that are new to them [deg/s].
+    """RMS error of rows in range, by targets of models that had not seen them [deg/s].
 
-    ``is_relative``: for the worst T_cal, where the offset at boot is what the model says there.
+    ``is_relative``: for the worst T_cal, if the offset at boot is the model's value there.
     """
     X, errors = calibration.X, calibration.before - calibration.rate
     low, high = X["temperature"].min(), X["temperature"].max()
