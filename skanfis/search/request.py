@@ -151,11 +151,12 @@ class StructureRequest(Plan):
         n_columns = n_rules * n_basis
         n_distinct = np.unique(rows.numbers(lambda Z, _: fingerprint(Z))).size
         if n_distinct < n_columns:
+            each = f"with {n_basis} coefficients"
+            rules = f"{n_rules} rules {each} each have" if n_rules > 1 else f"1 rule {each} has"
             warn_user(
-                f"{n_rules} rule{'s' if n_rules > 1 else ''} with {n_basis} coefficients each have "
-                f"{n_columns} consequent parameters for {n_distinct} distinct training rows. "
-                "Between these rows, predictions follow the prior more than the data. Test the "
-                f"model on held-out rows, or use fewer {'rules' if n_rules > 1 else 'inputs'}.",
+                f"{rules} {n_columns} consequent parameters for {n_distinct} distinct training "
+                "rows. Between these rows, predictions follow the prior more than the data. Test "
+                f"the model on held-out rows, or use fewer {'rules' if n_rules > 1 else 'inputs'}.",
                 UnderdeterminedWarning,
             )
 

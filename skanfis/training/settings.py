@@ -78,15 +78,17 @@ def _partition(estimator, names, sample_weight):
     if not isinstance(model, TSKModel):
         raise ValueError(
             f"partition={given!r} has no rules: it has not been fitted, or it was cloned, which "
-            "discards the fit (scikit-learn's searches clone). Give the model_ of the fitted "
-            "estimator instead."
+            "discards the fit (scikit-learn's searches clone estimators). Give the model_ of the "
+            "fitted estimator instead."
         )
     check_inputs(model, names, "partition")
     refused = {"premise_features": "has no effect on imported rules, which have their own inputs:"}
     if model.n_rules > (estimator.max_rules or model.n_rules):
-        refused["max_rules"] = f"is too low: partition has {model.n_rules:,} rules. Give fewer, or"
+        what = f"partition has {model.n_rules:,} rules"
+        refused["max_rules"] = f"is too low: {what}. Give a smaller model, or"
     if estimator.max_iter == 0:
-        why = "has no effect with max_iter=0, which keeps imported rules: use solver='lse', or"
+        kept = "which keeps the imported rules as they are"
+        why = f"has no effect with max_iter=0, {kept}: use solver='lse', or"
         refused |= dict.fromkeys(("monotonic_cst", "constraints", "consequent_features"), why)
         if estimator.order < model.order:
             raise ValueError(f"order={estimator.order} {why} leave it at 1.")
