@@ -316,12 +316,14 @@ class TSKModel:
         n_parameters = self.n_rules * n_basis + self.antecedent.parameters.size
         if n_parameters > MOST_PARAMETERS:
             return (
-                f"The model has {n_parameters} parameters; beyond {MOST_PARAMETERS} there is no "
-                "standard deviation. Use fewer rules, or ConformalRegressor(..., scaled=False)."
+                f"The model has {n_parameters} parameters, and models with more than "
+                f"{MOST_PARAMETERS} have no standard deviations. Use fewer rules, or "
+                "ConformalRegressor(..., scaled=False)."
             )
         return (
-            "The model has no posterior, as one read from a .fis file or JSON without it, that "
-            "lost rules or has seen a single row. Fit it to data (solver='lse' keeps its premises)."
+            "The model has no posterior, and so no standard deviations: it was read from a .fis "
+            "file or from JSON without a posterior, it lost rules, or it has seen a single row. "
+            "Fit it to data (solver='lse' keeps its premises)."
         )
 
     def way_out(self, X) -> np.ndarray:

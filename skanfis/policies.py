@@ -83,8 +83,8 @@ def check_policy(policy, max_extrapolation):
     is_distance = isinstance(max_extrapolation, Real) and float(max_extrapolation) >= 0.0
     if not is_distance and max_extrapolation != "auto":
         raise ValueError(
-            f"max_extrapolation={max_extrapolation!r} must be a number, zero or positive, or "
-            "infinite, or 'auto'."
+            f"max_extrapolation={max_extrapolation!r} must be a number of 0 or more (inf for no "
+            "limit) or 'auto'."
         )
 
 

@@ -291,7 +291,7 @@ def test_constant_columns_cost_nothing_however_many_they_are(settings, rng):
     wobble = np.where(rng.random(60) < 0.5, 4.25, np.nextafter(4.25, 5.0))
     still = {f"still {k}": wobble for k in range(40)}
     rows = pd.DataFrame({"time": inputs[:, 0]} | still | {"rate": inputs[:, 1]})
-    with pytest.warns(ConstantInputWarning, match=r"'still 0' \(always 4\.25\).*Drop it"):
+    with pytest.warns(ConstantInputWarning, match=r"'still 0' \(always 4\.25\).*Drop them"):
         model = ANFISRegressor(**settings).fit(rows, target)
     assert model.n_rules_ == without.n_rules_
     assert {term["input"] for term in model.memberships_} <= {"time", "rate"}
@@ -304,7 +304,7 @@ def test_constant_columns_cost_nothing_however_many_they_are(settings, rng):
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")  # beside the error
 def test_terms_asked_for_a_constant_column():
-    with refused(ValueError, "n_mfs=[2, 3, 2]", "3 terms on column 'x1'", "constant", "give it 1"):
+    with refused(ValueError, "n_mfs=[2, 3, 2]", "3 terms on column 'x1'", "constant", "1 there"):
         ANFISRegressor(n_mfs=[2, 3, 2]).fit(flat(1), Y)
 
 

@@ -91,7 +91,7 @@ class TestFits:
         if kind == "tree":
             assert_is(searched(kind, mf=Gaussian).fit(X, Y), kind)
             for mf in ("bell", ["gaussian", "bell", "gaussian"]):
-                with pytest.raises(ValueError, match=r"mf=.* means nothing to partition='tree'"):
+                with pytest.raises(ValueError, match=r"mf=.* has no effect with partition='tree'"):
                     searched(kind, mf=mf).fit(X, Y)
         else:
             assert_is(searched(kind, mf="bell").fit(X, Y), kind)

@@ -79,8 +79,8 @@ class RuleTableAntecedent(Antecedent):
                 if found is None:
                     places = ", ".join(f"{own[t][2][0]:g}" for t in terms)
                     raise ValueError(
-                        f"Rule {r} has {len(terms)} terms of {input_names[j]!r} (at {places}); one "
-                        "term stands for two sides of different cuts, and for no more."
+                        f"Rule {r} has {len(terms)} terms of {input_names[j]!r} (at {places}), but "
+                        "only two sides of different cuts can be written as one term."
                     )
                 made[j, terms] = found
         order = sorted(made, key=lambda key: (made[key][0].name, *key))

@@ -266,7 +266,8 @@ def _checked(model, box, tol, max_boxes):
     for group in model.antecedent.groups:
         if group.family not in FAMILIES.values():
             raise ValueError(
-                f"The ranges of {group.family.name!r} memberships are not known: give another mf."
+                f"The ranges of {group.family.name!r} memberships are not known, so there are no "
+                "bounds: train with another mf."
             )
     if not (isinstance(tol, Real) and float(tol) >= 0.0):
         raise ValueError(f"tol={tol!r} must be a number, zero or positive.")
@@ -289,12 +290,14 @@ def read_box(box, model: TSKModel):
     if found.shape != (model.n_inputs, 2):
         raise ValueError(
             f"box must have one (low, high) for each of the {model.n_inputs} inputs ("
-            f"{', '.join(map(repr, model.input_names))}), or be a dict by their names; got {box!r}"
+            f"{', '.join(map(repr, model.input_names))}), or be a dict from their names to (low, "
+            f"high); got {box!r}."
         )
     for name, (low, high) in zip(model.input_names, found, strict=True):
         if not low <= high:
             raise ValueError(
-                f"box has ({low:g}, {high:g}) for {name!r}: low must not be above high, or NaN."
+                f"box has ({low:g}, {high:g}) for {name!r}: low must not be above high, and "
+                "neither may be NaN."
             )
     return found
 
@@ -313,13 +316,13 @@ def varying_part(box, model: TSKModel, of_slopes):
             raise ValueError(
                 f"box has ({start:g}, {stop:g}) for {name!r}, outside the range of the training "
                 f"data: with out_of_bounds={model.out_of_bounds!r} the model predicts nothing "
-                "there. Give a box that meets the range, or another policy."
+                "there. Give a box that overlaps the range, or use another out_of_bounds."
             )
         if is_endless and not np.isfinite([start, stop]).all():
             raise ValueError(
-                f"box has ({start:g}, {stop:g}) for {name!r}, and the model goes on along its "
-                "tangent without end (max_extrapolation=inf): nothing bounds it. Give finite ends, "
-                "or a finite max_extrapolation."
+                f"box has ({start:g}, {stop:g}) for {name!r}, but the model extrapolates without "
+                "limit (max_extrapolation=inf), so its predictions there have no bounds. Give "
+                "finite ends, or a finite max_extrapolation."
             )
     return np.clip(box.T, *edges)
 

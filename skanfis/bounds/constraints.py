@@ -111,8 +111,8 @@ class Constraints:
                 values.append(_per_output(one.y, np.nan, "y", n_outputs))
             else:
                 raise ValueError(
-                    f"constraints holds {one!r}: it must be OutputLimits and FixedPoints of "
-                    "skanfis.bounds, in a list."
+                    f"constraints holds {one!r}: it must be a list of OutputLimits and FixedPoint "
+                    "objects of skanfis.bounds."
                 )
         at, fixed = np.reshape(points, (-1, n_inputs)), np.reshape(values, (-1, n_outputs))
         distinct = np.unique(np.hstack([at, fixed]), axis=0)
@@ -145,11 +145,11 @@ class Constraints:
                 )
         for point, value in zip(self.points, self.values, strict=True):
             if not np.isfinite(point).all() or not np.isfinite(value).all():
-                raise ValueError(f"FixedPoint({point}, {value}) must be of finite numbers.")
+                raise ValueError(f"FixedPoint({point}, {value}) must hold finite numbers only.")
             if (value <= self.lower).any() or (value >= self.upper).any():
                 raise ValueError(
-                    f"FixedPoint({point}, {value}) is not within the OutputLimits "
-                    f"{self.lower} to {self.upper}: leave some room between."
+                    f"FixedPoint({point}, {value}) is not strictly within the OutputLimits "
+                    f"{self.lower} to {self.upper}: move the point, or widen the limits."
                 )
             for k, signs in enumerate(self.signs):
                 way, free = self.points - point, signs == 0
@@ -158,8 +158,8 @@ class Constraints:
                 for other in np.flatnonzero(is_above):
                     raise ValueError(
                         f"constraints contradicts itself or monotonic_cst: output {k} is "
-                        f"fixed to {value[k]:g} at {point}, and to {self.values[other, k]:g} at "
-                        f"{self.points[other]}, where it must not be less."
+                        f"fixed to {value[k]:g} at {point}, so it must be at least that at "
+                        f"{self.points[other]}, where it is fixed to {self.values[other, k]:g}."
                     )
 
 
@@ -177,10 +177,10 @@ def _signs(given, input_names, n_outputs):
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):
         raise ValueError(
             f"monotonic_cst has shape {signs.shape}, but X has {n_inputs} columns and y "
-            f"{n_outputs}: give one number per column of X, or a row of these per output."
+            f"{n_outputs}: give one number per column of X, or one row of such numbers per output."
         )
     if not np.isin(signs, (-1, 0, 1)).all():
-        raise ValueError(f"{told} must hold -1 (falling), 0 (free) and 1 (rising) alone.")
+        raise ValueError(f"{told} must hold only -1 (falling), 0 (free) and 1 (rising).")
     return np.broadcast_to(signs, (n_outputs, n_inputs)).astype(int)
 
 
@@ -188,7 +188,7 @@ def _numbers(given, what):
     try:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError):
-        raise ValueError(f"{what} must hold numbers alone.") from None
+        raise ValueError(f"{what} must hold numbers only.") from None
 
 
 def _per_output(given, nothing, what, n_outputs):
@@ -206,7 +206,7 @@ def _point(given, input_names):
         if set(given) != set(input_names):
             raise ValueError(
                 f"FixedPoint.x names {', '.join(map(repr, given))}: it must name every column of "
-                f"X, {names}, and no other."
+                f"X ({names}) and no other."
             )
         given = [given[name] for name in input_names]
     point = _numbers(given, f"FixedPoint.x={given!r}")

@@ -47,8 +47,8 @@ def contradicted(free, held, inequalities, fixed, rows, raised):
         yield (
             f"The data contradict {' and '.join(guilty)}: keeping this raises the training error "
             f"of {output!r} from {np.sqrt(before.mean()):.3g} to {np.sqrt(after.mean()):.3g}, far "
-            f"more than noise would; rows {', '.join(map(str, worst))} speak most against it. "
-            "Leave the constraint out, or look at these rows."
+            f"more than noise explains. Rows {', '.join(map(str, worst))} contradict it most. "
+            "Check these rows, or drop the constraint."
         )
 
 

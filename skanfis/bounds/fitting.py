@@ -56,11 +56,11 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         names = ", ".join(one.name for one in found.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
-        end = "one line" if is_line else "rules in order"
+        end = "a single line that keeps" if is_line else "rules that provably keep"
         warn_user(
-            f"To be certain of {names}, the rules were drawn {drawn:.0%} of the way to {end}: that "
-            f"raises the training error by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or leave a "
-            "constraint out.",
+            f"To guarantee {names}, the rules were moved {drawn:.0%} of the way to {end} this. "
+            f"That raises the training error by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or drop "
+            "a constraint.",
             ConstraintWarning,
         )
     points = constraints.points
@@ -76,8 +76,8 @@ def _check_points(model, constraints):
     beyond = constraints.points[~model.in_bounds(constraints.points)]
     if len(beyond) and model.out_of_bounds in SILENT:
         raise ValueError(
-            f"constraints has a FixedPoint at {beyond[0]}, where a model with "
-            f"out_of_bounds={model.out_of_bounds!r} predicts nothing: "
+            f"constraints has a FixedPoint at {beyond[0]}, but out_of_bounds="
+            f"{model.out_of_bounds!r} predicts nothing there. "
             f"{model.describe_out_of_bounds(beyond)} Use out_of_bounds='linear' or 'clip'."
         )
 

@@ -171,8 +171,8 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
     def _find_centers(self, rows, weight):
         if rows.shape[0] < self.n_clusters:
             raise ValueError(
-                f"n_clusters={self.n_clusters} needs as many distinct rows of positive weight; "
-                f"there are {rows.shape[0]} (n_samples={rows.shape[0]}). Give fewer clusters."
+                f"n_clusters={self.n_clusters} needs as many distinct rows with positive weight, "
+                f"but there are {rows.shape[0]} (n_samples={rows.shape[0]}). Use fewer clusters."
             )
         mean = np.average(rows, axis=0, weights=weight)
         points = rows - mean
@@ -186,16 +186,17 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
         n_distinct = count_distinct(centers, spread)
         if shift > self.tol:
             warnings.warn(
-                f"FuzzyCMeans did not converge: in iteration max_iter={self.max_iter} a centre "
-                f"moved by {shift:.2g} of the data's spread, tol={self.tol:g}. Raise one of them.",
+                f"FuzzyCMeans did not converge within max_iter={self.max_iter}: in the last "
+                f"iteration, a centre moved by {shift:.2g} times the spread of the data, more than "
+                f"tol={self.tol:g}. Increase max_iter or tol.",
                 ConvergenceWarning,
                 stacklevel=4,
             )
         if n_distinct < self.n_clusters:
             warnings.warn(
-                f"Only {n_distinct} of n_clusters={self.n_clusters} centres are distinct. Give "
-                f"fewer clusters or a smaller m than {self.m_:g} (on these data centres near the "
-                f"mean fall together from m={largest:.3g} on).",
+                f"Only {n_distinct} of n_clusters={self.n_clusters} centres are distinct. Use "
+                f"fewer clusters, or a smaller m than {self.m_:g} (on these data, centres near the "
+                f"mean coincide from m={largest:.3g} on).",
                 ConvergenceWarning,
                 stacklevel=4,
             )
@@ -229,7 +230,8 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
             if centers.shape != (self.n_clusters, points.shape[1]):
                 raise ValueError(
                     f"init has shape {centers.shape}, but n_clusters={self.n_clusters} and X has "
-                    f"{points.shape[1]} columns."
+                    f"{points.shape[1]} columns: give one row per cluster, with one number per "
+                    "column of X."
                 )
             return [(centers - mean) / scale]
         random_state = check_random_state(self.random_state)

@@ -122,14 +122,15 @@ class SubtractiveClustering(Clusterer):
 
     def _checked_radius(self):
         if self.reject > self.accept:
-            raise ValueError(f"reject={self.reject!r} exceeds accept={self.accept!r}.")
+            raise ValueError(f"reject={self.reject!r} must not exceed accept={self.accept!r}.")
         radius = np.asarray(self.radius, dtype=np.float64)
         if radius.ndim and radius.shape != (self.n_features_in_,):
             raise ValueError(
-                f"radius has shape {radius.shape}, but X has {self.n_features_in_} columns."
+                f"radius has shape {radius.shape}, but X has {self.n_features_in_} columns: give "
+                "one number, or one per column."
             )
         if not (np.isfinite(radius) & (radius > 0)).all():
-            raise ValueError(f"radius={self.radius!r} must be positive and finite everywhere.")
+            raise ValueError(f"radius={self.radius!r} must be positive and finite.")
         return radius
 
     def _in_radii(self, X, origin):

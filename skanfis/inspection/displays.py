@@ -88,7 +88,7 @@ class MembershipDisplay:
         model, rows = fold_with_rows(estimator, X)
         with_terms = np.unique(model.antecedent.term_inputs).tolist()
         if not with_terms:
-            raise ValueError("The model has no terms: nothing to draw.")
+            raise ValueError("The model has no fuzzy terms, so there is nothing to draw.")
         return cls(inputs=[_terms_on(model, j, rows) for j in with_terms]).plot(ax=ax)
 
     def plot(self, *, ax: Any = None) -> Self:
@@ -204,19 +204,19 @@ class ResponseSurfaceDisplay:
         check_count("grid_resolution", grid_resolution, 2)
         model, points = fold_with_rows(estimator, X)
         if np.size(features) != 2:
-            raise ValueError(f"features={features!r} must be two inputs.")
+            raise ValueError(f"features={features!r} must name two inputs.")
         if model.n_inputs == 1:
             raise ValueError(
-                "The model has one input, and a surface takes two: plot what it predicts along it."
+                "The model has one input, but a surface needs two: plot its predictions as a curve."
             )
         both = [checked_position(feature, model.input_names) for feature in features]
         if both[0] == both[1]:
-            raise ValueError(f"features={features!r} is the same input twice.")
+            raise ValueError(f"features={features!r} names the same input twice.")
         for j in both:
             if never_changes(model.minimum[j], model.maximum[j]):
                 raise ValueError(
-                    f"features={features!r}: {model.input_names[j]!r} has one value, "
-                    f"{model.minimum[j]:g}. Name two inputs that vary."
+                    f"features={features!r}: {model.input_names[j]!r} is constant in the training "
+                    f"data (always {model.minimum[j]:g}). Name two inputs that vary."
                 )
         k = checked_position(output, model.output_names, "output")
         (xx0, xx1), rows, others = section_over(model, both, grid_resolution, held)
@@ -284,8 +284,8 @@ def pyplot():
         import matplotlib.pyplot as plt
     except ImportError as error:
         raise ImportError(
-            "Displays are drawn with matplotlib: pip install matplotlib (the extra 'plot'; in a "
-            "clone pip install '.[plot]')."
+            "Displays are drawn with matplotlib: pip install matplotlib (or the extra 'plot'; in a "
+            "clone, pip install '.[plot]')."
         ) from error
     return plt
 
@@ -302,7 +302,7 @@ def section_over(model, both, n_points, held):
     row = np.where(model.two_valued, np.round(row), row)
     held = {} if held is None else held
     if not isinstance(held, Mapping):
-        raise TypeError(f"held must be a dict from inputs to values, got {held!r}.")
+        raise TypeError(f"held must be a dict from inputs to values; got {held!r}.")
     names, columns = model.input_names, categories(model)
     taken = {*both, *(checked_position(feature, names) for feature in held)}
     for one in columns.values():
@@ -314,12 +314,12 @@ def section_over(model, both, n_points, held):
     for feature, value in held.items():
         j = checked_position(feature, model.input_names)
         if j in both:
-            raise ValueError(f"held[{feature!r}]: that input is drawn.")
+            raise ValueError(f"held[{feature!r}] fixes an input that is drawn: leave it out.")
         low, high = model.minimum[j], model.maximum[j]
         if not isinstance(value, Real) or not low <= value <= high:
             raise ValueError(
-                f"held[{feature!r}]={value!r} must be a number in the range of training, from "
-                f"{low:.6g} to {high:.6g}."
+                f"held[{feature!r}]={value!r} must be a number within the range of the training "
+                f"data, from {low:.6g} to {high:.6g}."
             )
         row[j] = value
     grid = np.meshgrid(*np.linspace(model.minimum[both], model.maximum[both], n_points).T)

@@ -185,7 +185,7 @@ def _known(model, blocks, rows):
     if model.support is None or not model.support.marginals:
         raise ValueError(
             "The model does not know how its inputs are distributed: it was not trained by fit, or "
-            "has been read from a file. Give rows of them as X, to skanfis.inspection.effects."
+            "it was read from a file. Give rows of its inputs as X to skanfis.inspection.effects."
         )
     found, two_valued = [], model.two_valued
     for inputs in blocks:
@@ -225,23 +225,29 @@ class Study:
         k = checked_position(output, model.output_names, "output")
         rows = None if rows is None else np.clip(rows, model.minimum, model.maximum)
         if groups and rows is None:
-            raise ValueError("groups takes X: fit keeps nothing of how inputs go together.")
+            raise ValueError("groups needs X: fit does not store how the inputs vary together.")
         if not isinstance(groups, Mapping | None):
-            raise ValueError(f"groups={groups!r} must be a dict: of each name a list of columns.")
+            raise ValueError(f"groups={groups!r} must be a dict from names to lists of columns.")
         found, levels = {}, {}
         for name, one in categories(model).items():
             found[name] = tuple(one.inputs)
             levels[name] = one.levels + ([" or ".join(one.others)] if one.others else [])
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):
-                raise ValueError(f"groups[{label!r}] is {columns!r}: a list of columns is needed.")
+                raise ValueError(f"groups[{label!r}]={columns!r} must list one or more columns.")
             own = {checked_position(column, model.input_names) for column in columns}
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
                 if not own >= set(found.pop(other)):
-                    raise ValueError(f"groups[{label!r}] has some columns of {other!r}, not all.")
+                    raise ValueError(
+                        f"groups[{label!r}] has some columns of {other!r}, but not all: give it "
+                        "all of them, or none."
+                    )
             outside = [name for j, name in enumerate(model.input_names) if j not in own]
             if label in (*found, *outside):
-                raise ValueError(f"groups[{label!r}] has the name of a column outside of it.")
+                raise ValueError(
+                    f"groups[{label!r}] has the same name as a column that is not in it: give it "
+                    "another name."
+                )
             found[label] = tuple(sorted(own))
         taken = {j for inputs in found.values() for j in inputs}
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}

@@ -81,7 +81,9 @@ class EffectsDisplay:
         study = Study.of(estimator, X, groups, output)
         ones = [(g,) for g in np.flatnonzero(study.is_shown).tolist()]
         if not ones:
-            raise ValueError("groups has every column, and groups have no curve: nothing to draw.")
+            raise ValueError(
+                "groups holds every column, and groups have no curves, so there is nothing to draw."
+            )
         pairs = [(g, h) for g, h in study.pairs() if study.is_shown[g] and study.is_shown[h]]
         share = dict(zip([*ones, *pairs], study.sobol([*ones, *pairs]), strict=True))
         totals = study.anova.totals()

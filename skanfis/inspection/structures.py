@@ -70,8 +70,8 @@ class StructureDisplay:
         structures = [one for one in every if np.isfinite(one["expected_error"])]
         if not structures:
             raise ValueError(
-                "The estimator knows no structure with an error to be expected: nothing to draw. "
-                "Fit one with n_mfs='auto' and partition='auto'."
+                "The estimator has no structure with an expected error, so there is nothing to "
+                "draw. Fit one with n_mfs='auto' and partition='auto'."
             )
         least = min(one["expected_error"] for one in structures) ** 2
         taken = next(one["expected_error"] for one in structures if one["chosen"]) ** 2

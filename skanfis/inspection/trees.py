@@ -83,13 +83,16 @@ class TreeDisplay:
         model = fold(estimator)
         if not isinstance(model.antecedent, TreeAntecedent):
             raise ValueError(
-                f"The model has {counted(model.n_rules, 'rule')} and is no tree: there are no cuts "
-                "to draw. partition='tree' makes one where it finds two rules or more."
+                f"The model has {counted(model.n_rules, 'rule')} and is not a tree, so there are "
+                "no cuts to draw. partition='tree' makes a tree if it finds two rules or more."
             )
         inputs = np.unique(model.antecedent.term_inputs)
         if kind == "plane" and inputs.size != 2:
             names = ", ".join(repr(model.input_names[j]) for j in inputs)
-            raise ValueError(f"kind='plane' is of two inputs; this tree cuts {names}.")
+            raise ValueError(
+                f"kind='plane' needs a tree that cuts two inputs, but this tree cuts {names}: use "
+                "kind='tree'."
+            )
         place = checked_position(output, model.output_names, "output")
         return cls(model=model, output=place, kind=kind).plot(ax=ax)
 

@@ -127,14 +127,14 @@ def check_scales(inputs, targets, input_names, output_names):
         ):
             if size > LARGEST_NUMBER:
                 raise ValueError(
-                    f"Column {name!r} of {what} holds numbers up to {size:.3g}; beyond "
-                    f"{LARGEST_NUMBER:.0e} sums overflow. Give it in a larger unit."
+                    f"Column {name!r} of {what} holds numbers up to {size:.3g}, but sums overflow "
+                    f"beyond {LARGEST_NUMBER:.0e}. Express this column in a larger unit."
                 )
             if not constant and spread < 1.0 / LARGEST_NUMBER:
                 raise ValueError(
-                    f"Column {name!r} of {what} varies by {spread:.3g} only; below "
-                    f"{1.0 / LARGEST_NUMBER:.0e} floats lose their digits. Give it in a smaller "
-                    "unit."
+                    f"Column {name!r} of {what} has a standard deviation of only {spread:.3g}; "
+                    f"below {1.0 / LARGEST_NUMBER:.0e}, floating-point numbers lose their digits. "
+                    "Express this column in a smaller unit."
                 )
 
 

@@ -16,13 +16,13 @@ from .premise import Premise
 
 MESSAGES = {
     "gradient": "The projected gradient is below tol: the premises are stationary.",
-    "cost": "The relative decrease of the cost, expected and found, is below tol.",
+    "cost": "The relative decrease of the cost, both predicted and actual, is below tol.",
     "step": "No step decreases the cost any further at this precision.",
-    "max_iter": "max_iter was reached before the cost settled or the error met its goal.",
-    "stopped": "Early stopping or a callback asked for the end.",
+    "max_iter": "max_iter was reached before the cost converged or the error reached error_goal.",
+    "stopped": "Early stopping or a callback ended the training.",
     "as_given": "Nothing was learnt: the rules are as they were given.",
     "error_goal": "The root mean square error is as small as error_goal.",
-    "epochs": "All max_iter epochs were run: this rule stops of itself at an error_goal only.",
+    "epochs": "All max_iter epochs were run: this solver stops earlier only at its error_goal.",
     "no_premise": "There is nothing to iterate on: the consequents are found in one solve.",
 }
 

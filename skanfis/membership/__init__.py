@@ -92,7 +92,7 @@ def membership_families(mf, input_names) -> list[type[Membership]]:
             families.append(MEMBERSHIPS[entry])
         elif isinstance(entry, str) and entry in NAMES_IN_MATLAB:
             raise ValueError(
-                f"mf={entry!r} is MATLAB's name for it: give mf={NAMES_IN_MATLAB[entry]!r}."
+                f"mf={entry!r} is MATLAB's name of the family: use mf={NAMES_IN_MATLAB[entry]!r}."
             )
         else:
             raise ValueError(

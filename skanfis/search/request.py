@@ -96,8 +96,8 @@ class StructureRequest(Plan):
             return
         what = "the imported rules" if isinstance(self.partition, TSKModel) else "other rules"
         raise ValueError(
-            f"n_mfs={self.n_mfs!r} asks for a grid, partition={self.partition!r} for {what}: "
-            "leave n_mfs at 'auto', or use partition='grid'."
+            f"n_mfs={self.n_mfs!r} asks for a grid, but partition={self.partition!r} asks for "
+            f"{what}: leave n_mfs at 'auto', or use partition='grid'."
         )
 
     def _check_number(self, n_rules):
@@ -106,8 +106,8 @@ class StructureRequest(Plan):
             is_word = isinstance(self.n_mfs, str)
             given = f"partition={self.partition!r}" if is_word else f"n_mfs={self.n_mfs!r}"
             raise ValueError(
-                f"{given} makes {n_rules:,} rules, more than max_rules={self.max_rules}: give "
-                "fewer, or leave max_rules at None."
+                f"{given} makes {n_rules:,} rules, more than max_rules={self.max_rules}: ask "
+                "for fewer, or leave max_rules at None."
             )
 
     def _label(self, n_outputs, table, weight):
@@ -121,7 +121,7 @@ class StructureRequest(Plan):
             n_rules * self.premise_inputs.size,
             1 + self.consequent_inputs.size,
             n_outputs,
-            "Use fewer clusters, or constants as consequents (order=0).",
+            "Use fewer clusters, or constant consequents (order=0).",
         )
         return labels
 
@@ -136,9 +136,9 @@ class StructureRequest(Plan):
             if has_terms[j] or count == 1:
                 continue
             why = (
-                "is constant in the training data: give it 1, or drop the column"
+                "is constant in the training data: ask for 1 there, or drop the column"
                 if rows.inputs.is_constant[j]
-                else "is not among premise_features: give it 1, or name it there"
+                else "is not in premise_features: ask for 1 there, or add it to premise_features"
             )
             raise ValueError(
                 f"n_mfs={self.n_mfs!r} asks for {count} terms on column {name!r}, which {why}."
@@ -151,11 +151,12 @@ class StructureRequest(Plan):
         n_columns = n_rules * n_basis
         n_distinct = np.unique(rows.numbers(lambda Z, _: fingerprint(Z))).size
         if n_distinct < n_columns:
+            each = f"with {n_basis} coefficients"
+            rules = f"{n_rules} rules {each} each have" if n_rules > 1 else f"1 rule {each} has"
             warn_user(
-                f"{n_rules} rule{'s' if n_rules > 1 else ''} with {n_basis} coefficients each are "
-                f"{n_columns} consequent parameters for {n_distinct} distinct training rows: most "
-                "of what the model says between them is its prior. Judge it on rows held out, or "
-                f"use fewer {'rules' if n_rules > 1 else 'inputs'}.",
+                f"{rules} {n_columns} consequent parameters for {n_distinct} distinct training "
+                "rows. Between these rows, predictions follow the prior more than the data. Test "
+                f"the model on held-out rows, or use fewer {'rules' if n_rules > 1 else 'inputs'}.",
                 UnderdeterminedWarning,
             )
 
@@ -182,9 +183,13 @@ def report_constant(rows, names):
     ]
     if flat:
         more = f", and {len(flat) - _MOST_NAMED:,} more" if len(flat) > _MOST_NAMED else ""
+        names_them = f"{', '.join(flat[:_MOST_NAMED])}{more}"
         warn_user(
-            f"Constant in the training data: column {', '.join(flat[:_MOST_NAMED])}{more}. Nothing "
-            "can be learnt from it: it gets no fuzzy terms and no slope. Drop it, or train on data "
-            "where it varies.",
+            f"Column {names_them} is constant in the training data. Nothing can be learnt from it, "
+            "so it gets no fuzzy terms and no slope. Drop it, or train on data where it varies."
+            if len(flat) == 1
+            else f"Columns {names_them} are constant in the training data. Nothing can be learnt "
+            "from them, so they get no fuzzy terms and no slopes. Drop them, or train on data "
+            "where they vary.",
             ConstantInputWarning,
         )

@@ -32,9 +32,9 @@ def _check(needed, what, advice):
     """Raise ValueError where ``what`` needs more bytes than the limit allows."""
     if not _fits(needed):
         raise ValueError(
-            f"{what} would take {_count(1 + needed // 2**20)} MiB, and the limit is "
-            f"{get_config()['working_memory']:,} MiB (sklearn.set_config(working_memory=...)). "
-            f"{advice}"
+            f"{what} would take {_count(1 + needed // 2**20)} MiB of memory, but the limit is "
+            f"{get_config()['working_memory']:,} MiB (sklearn.set_config(working_memory=...) sets "
+            f"it). {advice}"
         )
 
 
@@ -42,8 +42,8 @@ def check_columns_fit(n_inputs):
     """Raise ValueError where products of all pairs of columns need too much memory."""
     _check(
         8 * _ROWS_OF_PAIRS * (1 + n_inputs) ** 2 // 2,
-        f"X has {n_inputs:,} columns: products of all their pairs",
-        "Choose some of them first, as by make_pipeline(SelectKBest(f_regression, k=50), "
+        f"X has {n_inputs:,} columns: the products of all pairs of them",
+        "Select some of them first, for example by make_pipeline(SelectKBest(f_regression, k=50), "
         "ANFISRegressor()).",
     )
 
@@ -59,15 +59,15 @@ def check_grid_fits(n_mfs, counts, n_basis, n_outputs):
     """The same check for a grid of ``counts``, which ``n_mfs`` has asked for."""
     n_inputs = len(counts)
     of_two = n_bytes(2**n_inputs, 2 * n_inputs, 1 + n_inputs, 1)
-    hint = f"n_mfs=2 makes {2**n_inputs:,} rules; " if _fits(of_two) else ""
+    hint = f" (n_mfs=2 makes {2**n_inputs:,} rules)" if _fits(of_two) else ""
     check_rules_fit(
         f"n_mfs={n_mfs!r} on {n_inputs} inputs makes a grid of",
         prod(counts),
         sum(count for count in counts if count > 1),
         n_basis,
         n_outputs,
-        f"Use fewer terms: {hint}give one number per input, 1 for an input that needs no fuzzy "
-        "terms; or use scattered rules, whose number does not grow with the inputs: "
+        f"Use fewer terms{hint}, or give one number per input, with 1 for inputs that need no "
+        "fuzzy terms. Or use scattered rules, whose number does not grow with the inputs: "
         "partition=KMeans(n_clusters=...).",
     )
 
@@ -94,7 +94,7 @@ def term_counts(n_mfs, names):
         raise TypeError(f"n_mfs={n_mfs!r} must hold whole numbers only.")
     if min(given) < 1:
         raise ValueError(
-            f"n_mfs={n_mfs!r} must be 1 or more everywhere; 1 means that an input has no fuzzy "
-            "terms and takes part in the consequents alone."
+            f"n_mfs={n_mfs!r} must be 1 or more for every input; 1 means that the input gets no "
+            "fuzzy terms and is used only in the consequents."
         )
     return [int(count) for count in given]

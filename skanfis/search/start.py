@@ -134,13 +134,14 @@ def check_inputs(model: TSKModel, names, what):
     if model.n_inputs != len(names):
         raise ValueError(
             f"{what} has rules on {model.n_inputs} inputs ({', '.join(model.input_names)}), but X "
-            f"has {len(names)} columns ({', '.join(names)})."
+            f"has {len(names)} columns ({', '.join(names)}): give X the inputs of the rules."
         )
     own, given = tuple(model.input_names), tuple(names)
     if own != given and tuple(f"x{j}" for j in range(len(names))) not in (own, given):
         raise ValueError(
             f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
-            f"are {', '.join(names)}: give them in this order and by these names."
+            f"are {', '.join(names)}: give X the inputs of the rules, with the same names and in "
+            "the same order."
         )
 
 

@@ -22,24 +22,24 @@ def check_forgetting(forgetting):
     is_number = isinstance(forgetting, Real) and not isinstance(forgetting, bool)
     if not is_number or not 0.0 < float(forgetting) <= 1.0:
         raise ValueError(
-            f"forgetting={forgetting!r} must be a number above 0 and at most 1: the weights of all "
-            "rows before are multiplied by it with every row; 1 forgets nothing."
+            f"forgetting={forgetting!r} must be a number above 0 and at most 1: every new row "
+            "multiplies the weights of all earlier rows by it; 1 forgets nothing."
         )
 
 
 def can_learn_from_chunks(estimator: Any) -> bool:
     """Return True, or raise AttributeError where a parameter needs all rows again."""
     wrong = [
-        ("loss", estimator.loss != "squared_error", "weighs rows anew that are no longer there"),
-        ("early_stopping", estimator.early_stopping, "holds out rows for a training that iterates"),
-        ("monotonic_cst", estimator.monotonic_cst is not None, "is proven of the rows of one fit"),
-        ("constraints", estimator.constraints is not None, "are proven of the rows of one fit"),
+        ("loss", estimator.loss != "squared_error", "reweights earlier rows"),
+        ("early_stopping", estimator.early_stopping, "checks held-out rows in every iteration"),
+        ("monotonic_cst", estimator.monotonic_cst is not None, "needs all rows together"),
+        ("constraints", estimator.constraints is not None, "need all rows together"),
     ]
     for name, is_wrong, why in wrong:
         if is_wrong:
             raise AttributeError(
-                f"{name}={getattr(estimator, name)!r} {why}, and partial_fit sees rows but once: "
-                "leave it at its default, or use fit."
+                f"{name}={getattr(estimator, name)!r} {why}, but partial_fit sees every row only "
+                f"once: leave {name} at its default, or use fit."
             )
     return True
 
@@ -55,7 +55,8 @@ def check_settings(estimator, before):
         if value != before[name]:
             raise ValueError(
                 f"{name} was {before[name]} at the first partial_fit, which fixed the premises, "
-                f"and is {value} now: set it back, or start anew with fit or a clone."
+                f"but is {value} now: set it back to {before[name]}, or start again with fit or a "
+                "clone."
             )
 
 
@@ -63,19 +64,20 @@ def check_begin(estimator, n_rows, finds_structure):
     """Raise ValueError where a first chunk does not suffice to begin with."""
     if n_rows == 0:
         raise ValueError(
-            "The first chunk has no row with a positive weight: there is nothing to begin with."
+            "The first chunk has no row with a positive weight, so there is nothing to learn from: "
+            "give rows whose sample_weight is positive."
         )
     imported = getattr(estimator.partition, "model_", estimator.partition)
     if estimator.max_iter == 0 and isinstance(imported, TSKModel):
         raise ValueError(
-            "max_iter=0 takes the imported model as it is, and partial_fit learns its "
+            "max_iter=0 keeps the imported model as it is, but partial_fit learns its "
             "consequents: leave max_iter at its default, with solver='lse'."
         )
     if finds_structure and n_rows < 2:
         raise ValueError(
-            f"The first chunk has {n_rows} row; structure and premises are found on it, which "
-            "takes 2 rows at least and a few hundred to be of use. Gather more, or give a trained "
-            "model as partition with solver='lse'."
+            f"The first chunk has {n_rows} row, but structure and premises are learnt from it: "
+            "that takes at least 2 rows, and a few hundred for a useful model. Give a larger first "
+            "chunk, or a trained model as partition with solver='lse'."
         )
 
 
@@ -84,13 +86,13 @@ def check_outputs(base: TSKModel, names):
     before = base.output_names
     if len(names) != len(before):
         raise ValueError(
-            f"y has {len(names)} outputs, but the chunks before had {len(before)} "
-            f"({', '.join(before)})."
+            f"y has {len(names)} outputs, but earlier chunks had {len(before)} "
+            f"({', '.join(before)}): give every chunk the same outputs."
         )
     if any(name != old and name in before for name, old in zip(names, before, strict=True)):
         raise ValueError(
-            f"The columns of y are {', '.join(names)}, but those of the chunks before were "
-            f"{', '.join(before)}: give them in this order."
+            f"The columns of y are {', '.join(names)}, but in earlier chunks they were "
+            f"{', '.join(before)}: give every chunk the same columns in the same order."
         )
 
 
@@ -103,8 +105,9 @@ def check_distance(base: TSKModel, scale):
             if not away <= LARGEST_NUMBER:
                 raise ValueError(
                     f"Column {name!r} of X holds {end:.3g}, more than {LARGEST_NUMBER:.0e} "
-                    f"standard deviations from the rows of the premises (mean "
-                    f"{base.reference[j]:.6g}, deviation {base.spread[j]:.3g}): drop such rows."
+                    f"standard deviations from the data that the premises were learnt from (mean "
+                    f"{base.reference[j]:.6g}, standard deviation {base.spread[j]:.3g}): drop such "
+                    "rows."
                 )
 
 
@@ -117,9 +120,9 @@ def faded_weights(sample_weight, n_rows, forgetting):
         outside = (sample_weight < _SMALLEST_WEIGHT) | (sample_weight > LARGEST_NUMBER)
         if outside.any():
             raise ValueError(
-                f"sample_weight holds {sample_weight[np.argmax(outside)]:.3g}; weights that count "
-                f"against those of other chunks must be zero, or lie from {_SMALLEST_WEIGHT:.0e} "
-                f"to {LARGEST_NUMBER:.0e}."
+                f"sample_weight holds {sample_weight[np.argmax(outside)]:.3g}, but weights in "
+                f"partial_fit must be zero or between {_SMALLEST_WEIGHT:.0e} and "
+                f"{LARGEST_NUMBER:.0e}."
             )
     if forgetting == 1.0:
         return sample_weight
@@ -146,8 +149,8 @@ def check_same_premises(one, other, place):
     difference = _difference(one, other)
     if difference:
         raise ValueError(
-            f"Models 0 and {place} of merge cannot be added: {difference}. Sums over rows add at "
-            "the same premises alone: train each with solver='lse' and the same model as partition."
+            f"Models 0 and {place} of merge do not match: {difference}. Only models with the same "
+            "premises can be merged: train each with solver='lse' and the same model as partition."
         )
 
 
@@ -164,7 +167,7 @@ def _difference(one, other):
         names = [", ".join(mine.input_names[j] for j in own) or "none" for own in inputs]
         return f"their consequents are linear in {names[0]} and in {names[1]}"
     is_same = np.array_equal(mine.antecedent.rule_terms, theirs.antecedent.rule_terms)
-    otherwise = "" if is_same else "their rules combine the terms otherwise"
+    otherwise = "" if is_same else "their rules combine the terms differently"
     return _difference_of_terms(mine.memberships(), theirs.memberships()) or otherwise
 
 

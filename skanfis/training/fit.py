@@ -183,8 +183,9 @@ class _Fit:
             if change < _SETTLED:
                 return run, weights
         warn_user(
-            f"loss='huber': the weights of the rows still change by {change:.2g} on average after "
-            f"{_MOST_TURNS} turns. Use fewer rules, or loss=Huber(epsilon=...) with a larger one.",
+            f"loss='huber' did not converge: after {_MOST_TURNS} rounds, the weights of the rows "
+            f"still change by {change:.2g} on average. Use fewer rules, or loss=Huber(epsilon=...) "
+            "with a larger epsilon.",
             ConvergenceWarning,
         )
         return run, weights
@@ -195,9 +196,9 @@ class _Fit:
         if result.converged or estimator.max_iter == 0:
             return
         warn_user(
-            f"solver={estimator.solver!r} with {run.start.antecedent.n_rules} rules on "
-            f"{self.rows.n_rows} rows, max_iter={estimator.max_iter}: {result.message} The model "
-            "is the best one found; increase max_iter or the solver's tol.",
+            f"solver={estimator.solver!r} did not converge with {run.start.antecedent.n_rules} "
+            f"rules on {self.rows.n_rows} rows and max_iter={estimator.max_iter}: {result.message} "
+            "The model is the best one found; increase max_iter or the solver's tol.",
             ConvergenceWarning,
         )
 

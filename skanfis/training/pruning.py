@@ -48,18 +48,18 @@ def model_without_rules(model: TSKModel, rules: ArrayLike) -> TSKModel:
     """
     numbers = np.asarray(rules)
     if numbers.size and numbers.dtype.kind not in "iu":
-        raise TypeError(f"rules={rules!r} must be whole numbers, those of rules.")
+        raise TypeError(f"rules={rules!r} must be whole numbers: the numbers of rules.")
     numbers = np.unique(numbers)
     unknown = numbers[(numbers < 0) | (numbers >= model.n_rules)]
     if unknown.size:
         raise ValueError(
-            f"rules has {unknown[0]}, but the model has {model.n_rules} rules, of the numbers 0 to "
+            f"rules has {unknown[0]}, but the model has {model.n_rules} rules, numbered 0 to "
             f"{model.n_rules - 1}."
         )
     if numbers.size == 0:
         return model
     if numbers.size == model.n_rules:
-        raise ValueError(f"rules names all {model.n_rules} rules: one at least must be left.")
+        raise ValueError(f"rules names all {model.n_rules} rules, but at least one must be left.")
     kept = np.setdiff1d(np.arange(model.n_rules), numbers)
     antecedent, terms = model.antecedent.without_rules(numbers)
     weights, support = model.rule_weights[kept], model.support

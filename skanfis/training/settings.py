@@ -31,13 +31,13 @@ def structure_request(estimator, names, sample_weight=None):
     families = membership_families(estimator.mf, names)
     if isinstance(partition, str) and partition == "tree" and set(families) != {Gaussian}:
         raise ValueError(
-            f"mf={estimator.mf!r} means nothing to partition='tree', whose rules are sides of "
-            "cuts: leave mf at 'gaussian', its default, or use another partition."
+            f"mf={estimator.mf!r} has no effect with partition='tree', whose terms are the sides "
+            "of cuts: leave mf at 'gaussian', its default, or use another partition."
         )
     if estimator.order == 0 and estimator.consequent_features is not None:
         raise ValueError(
-            f"consequent_features={estimator.consequent_features!r} means nothing with order=0, "
-            "whose consequents are constants: leave it at None."
+            f"consequent_features={estimator.consequent_features!r} has no effect with order=0, "
+            "whose consequents are constants: leave it at None, or use order=1."
         )
     consequent = feature_indices(estimator.consequent_features, names, "consequent_features")
     # random_state=None stands for one fixed seed: the same data give the same model.
@@ -63,7 +63,7 @@ def _partition(estimator, names, sample_weight):
     given = estimator.partition
     if isinstance(given, type):
         raise ValueError(
-            f"partition={given!r} is a class: give an object of it, {given.__name__}(...)."
+            f"partition={given!r} is a class: give an instance of it, {given.__name__}(...)."
         )
     if isinstance(given, str):
         return given
@@ -77,20 +77,23 @@ def _partition(estimator, names, sample_weight):
     model = getattr(given, "model_", given)
     if not isinstance(model, TSKModel):
         raise ValueError(
-            f"partition={given!r} has no rules: it has not been fitted, or was cloned, which "
-            "takes the fit away, as scikit-learn's searches do. Give its model_ instead."
+            f"partition={given!r} has no rules: it has not been fitted, or it was cloned, which "
+            "discards the fit (scikit-learn's searches clone estimators). Give the model_ of the "
+            "fitted estimator instead."
         )
     check_inputs(model, names, "partition")
-    refused = {"premise_features": "to imported rules, which have their inputs:"}
+    refused = {"premise_features": "has no effect on imported rules, which have their own inputs:"}
     if model.n_rules > (estimator.max_rules or model.n_rules):
-        refused["max_rules"] = f"where partition has {model.n_rules:,} rules: give fewer, or"
+        what = f"partition has {model.n_rules:,} rules"
+        refused["max_rules"] = f"is too low: {what}. Give a smaller model, or"
     if estimator.max_iter == 0:
-        why = "where imported rules are taken as they are (max_iter=0): use solver='lse', or"
+        kept = "which keeps the imported rules as they are"
+        why = f"has no effect with max_iter=0, {kept}: use solver='lse', or"
         refused |= dict.fromkeys(("monotonic_cst", "constraints", "consequent_features"), why)
         if estimator.order < model.order:
-            raise ValueError(f"order={estimator.order} means nothing {why} leave it at 1.")
+            raise ValueError(f"order={estimator.order} {why} leave it at 1.")
     for name, why in refused.items():
         if getattr(estimator, name) is not None:
             given = f"{name}={getattr(estimator, name)!r}"
-            raise ValueError(f"{given} means nothing {why} leave it at None.")
+            raise ValueError(f"{given} {why} leave it at None.")
     return model

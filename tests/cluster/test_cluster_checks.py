@@ -48,11 +48,11 @@ def test_errors_name_the_row_and_the_column(clusterer, rng):
         (FuzzyCMeans(m=1.0), "'m' parameter"),
         (FuzzyCMeans(init=np.zeros((2, 2))), r"init has shape \(2, 2\), but n_clusters=3"),
         (FuzzyCMeans(init=np.full((3, 2), np.nan)), "init contains NaN"),
-        (FuzzyCMeans(11), "n_clusters=11 needs as many distinct rows .* there are 10"),
+        (FuzzyCMeans(11), "n_clusters=11 needs as many distinct rows .* but there are 10"),
         (SubtractiveClustering(0.0), "'radius' parameter"),
         (SubtractiveClustering([0.5]), r"radius has shape \(1,\), but X has 2 columns"),
         (SubtractiveClustering([0.5, -1.0]), "must be positive and finite"),
-        (SubtractiveClustering(accept=0.1), "reject=0.15 exceeds accept=0.1"),
+        (SubtractiveClustering(accept=0.1), "reject=0.15 must not exceed accept=0.1"),
     ],
 )
 def test_bad_parameters_are_refused(rng, clusterer, message):

@@ -35,7 +35,7 @@ class TestMemberships:
     @EACH
     def test_they_are_those_of_the_terms(self, model):
         if not model.antecedent.n_terms:
-            with pytest.raises(ValueError, match="no terms: nothing to draw"):
+            with pytest.raises(ValueError, match="no fuzzy terms, so there is nothing to draw"):
                 MembershipDisplay.from_estimator(model)
             return
         table = pd.DataFrame(model.memberships())
@@ -91,18 +91,18 @@ class TestSurface:
     @pytest.mark.parametrize(
         ("settings", "error", "message"),
         [
-            ({"features": (0, 0)}, ValueError, "the same input twice"),
-            ({"features": (0,)}, ValueError, "must be two inputs"),
+            ({"features": (0, 0)}, ValueError, "names the same input twice"),
+            ({"features": (0,)}, ValueError, "must name two inputs"),
             ({"features": (0, "pressure")}, ValueError, "'pressure' is no input: give a position"),
-            ({"features": "rate"}, ValueError, "must be two inputs"),
-            ({"features": 1}, ValueError, "features=1 must be two inputs"),
+            ({"features": "rate"}, ValueError, "must name two inputs"),
+            ({"features": 1}, ValueError, "features=1 must name two inputs"),
             ({"output": 1}, ValueError, "1 is no output: give a position from 0 to 0, or one of"),
             ({"held": [1.0]}, TypeError, "held must be a dict"),
-            ({"held": {"rate": np.nan}}, ValueError, "must be a number in the range of training"),
+            ({"held": {"rate": np.nan}}, ValueError, "must be a number within the range"),
             ({"held": {"rate": 5.0}}, ValueError, r"held\['rate'\]=5.0"),
             ({"held": {"rate": "high"}}, ValueError, r"held\['rate'\]='high'"),
-            ({"held": {"time": 1e6}}, ValueError, r"held\['time'\]: that input is drawn"),
-            ({"held": {1: 30.0}}, ValueError, r"held\[1\]: that input is drawn"),
+            ({"held": {"time": 1e6}}, ValueError, r"held\['time'\] fixes an input that"),
+            ({"held": {1: 30.0}}, ValueError, r"held\[1\] fixes an input that is drawn"),
             ({"grid_resolution": 1}, ValueError, "grid_resolution=1"),
         ],
     )
@@ -114,9 +114,9 @@ class TestSurface:
     def test_a_model_of_one_input_that_changes_has_none(self):
         x = np.linspace(0.0, 1.0, 20)
         model = quick([2, 1]).fit(np.column_stack([x, 0.0 * x + 3.0]), x)
-        with pytest.raises(ValueError, match=r"'x1' has one value, 3\. Name two"):
+        with pytest.raises(ValueError, match=r"'x1' is constant .*always 3\)\. Name two"):
             ResponseSurfaceDisplay.from_estimator(model)
-        with pytest.raises(ValueError, match="one input, and a surface takes two: plot what"):
+        with pytest.raises(ValueError, match="one input, but a surface needs two: plot its"):
             ResponseSurfaceDisplay.from_estimator(quick(2).fit(x[:, None], x))
 
 

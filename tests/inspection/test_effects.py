@@ -126,7 +126,7 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
     for found in (effects(fitted, table).table, effects(fitted).table):
         assert_allclose(found.loc[[rate, fibre], "sobol"], expected, rtol=0, atol=1e-9)
         assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
-    with pytest.raises(ValueError, match="has the name of a column outside of it"):
+    with pytest.raises(ValueError, match="has the same name as a column that is not in it"):
         effects(fitted, table, groups={fibre: [rate]})
 
 
@@ -143,7 +143,7 @@ def test_groups_enter_as_one(of_indicators):
     found = effects(model, X, groups={"fibre": ["a", "b", "c"]}).table
     assert list(found.index[:2]) in (["rate", "fibre"], ["fibre", "rate"])
     assert_allclose(found.sum(), 1.0)
-    with pytest.raises(ValueError, match="groups takes X"):
+    with pytest.raises(ValueError, match="groups needs X"):
         effects(model, groups={"fibre": ["a", "b", "c"]})
 
 
@@ -151,10 +151,10 @@ def test_groups_enter_as_one(of_indicators):
     ("groups", "match"),
     [
         ({"fibre": ["a", "d"]}, "'d' is no input"),
-        ({"one": ["a", "b"], "two": ["b", "c"]}, "some columns of 'one', not all"),
-        ({"rate": ["a", "b"]}, "name of a column outside"),
-        ({"fibre": "a"}, r"groups\['fibre'\] is 'a': a list of columns is needed"),
-        ({"fibre": []}, "a list of columns is needed"),
+        ({"one": ["a", "b"], "two": ["b", "c"]}, "some columns of 'one', but not all"),
+        ({"rate": ["a", "b"]}, "same name as a column"),
+        ({"fibre": "a"}, r"groups\['fibre'\]='a' must list one or more"),
+        ({"fibre": []}, "must list one or more columns"),
         (["a", "b"], "must be a dict"),
     ],
 )
@@ -216,12 +216,12 @@ def test_models_that_know_of_no_rows_ask_for_them():
     X, y = np.random.default_rng(4).uniform(size=(40, 2)), np.arange(40.0)
     fitted = quick(n_mfs=2).fit(X, y)
     read = parse_json(export_json(fitted))
-    with pytest.raises(ValueError, match="Give rows of them as X"):
+    with pytest.raises(ValueError, match="Give rows of its inputs as X"):
         effects(read)
     assert_allclose(effects(read, X).table, effects(fitted, X).table, atol=1e-9)
     given = ANFISRegressor(partition=read, max_iter=0).fit(X, y)
     assert not hasattr(given, "feature_importances_")
-    with pytest.raises(ValueError, match="Give rows of them as X"):
+    with pytest.raises(ValueError, match="Give rows of its inputs as X"):
         effects(fitted.without_rules([0]))
 
 

@@ -79,7 +79,7 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
     assert [one["input"] for one in fewer.curves] == [display.curves[0]["input"]]
     with pytest.raises(ValueError, match="max_shown"):
         EffectsDisplay.from_estimator(model, X, max_shown=0)
-    with pytest.raises(ValueError, match="groups has every column, and groups have no curve"):
+    with pytest.raises(ValueError, match="groups holds every column, and groups have no curves"):
         EffectsDisplay.from_estimator(model, X, groups={"all": range(3)})
 
 

@@ -119,12 +119,12 @@ def test_plane_has_the_cuts_and_the_values(rng):
 
 def test_what_cannot_be_drawn_is_refused(rng):
     X, y = plane(rng)
-    with pytest.raises(ValueError, match="The model has 4 rules and is no tree: there are no"):
+    with pytest.raises(ValueError, match="The model has 4 rules and is not a tree, so there"):
         TreeDisplay.from_estimator(quick(n_mfs=[2, 1, 2]).fit(X, y))
-    with pytest.raises(ValueError, match=r"has 1 rule and is no tree: .* finds two rules or more"):
+    with pytest.raises(ValueError, match=r"has 1 rule and is not a tree, .* two rules or more"):
         TreeDisplay.from_estimator(quick(partition="tree").fit(X, X[:, 0]))
     names = "'time', 'chip temperature', 'rate'"
-    with pytest.raises(ValueError, match=f"is of two inputs; this tree cuts {names}"):
+    with pytest.raises(ValueError, match=f"two inputs, but this tree cuts {names}"):
         TreeDisplay.from_estimator(A_TREE, kind="plane")
     with pytest.raises(ValueError, match="kind"):
         TreeDisplay.from_estimator(A_TREE, kind="forest")

@@ -89,15 +89,15 @@ class TestImported:
         ("settings", "columns", "message"),
         [
             ({}, ["time", "rate"], r"rules on 3 inputs .* but X has 2 columns"),
-            ({}, ["time", "rate", "temperature"], "give them in this order and by these names"),
+            ({}, ["time", "rate", "temperature"], "the same names and in the same order"),
             ({"n_mfs": 3}, slice(None), r"n_mfs=3 .* for the imported rules"),
-            ({"premise_features": ["rate"]}, slice(None), "premise_features=.* means nothing"),
+            ({"premise_features": ["rate"]}, slice(None), "premise_features=.* has no effect on"),
             (
                 {"consequent_features": ["rate"], "max_iter": 0},
                 slice(None),
-                "consequent_features=.* means nothing",
+                "consequent_features=.* has no effect with max_iter=0",
             ),
-            ({"order": 0, "max_iter": 0}, slice(None), "order=.* means nothing"),
+            ({"order": 0, "max_iter": 0}, slice(None), "order=0 has no effect with max_iter=0"),
         ],
     )
     def test_what_imported_rules_cannot_heed_is_refused(
@@ -118,7 +118,7 @@ def test_an_imported_model_may_not_have_more_rules_than_the_most(data, known, se
     n_rules = known.n_rules_
     many = ANFISRegressor(partition=known, max_rules=n_rules - 1, **settings)
     for learn in (many.fit, many.partial_fit):
-        with pytest.raises(ValueError, match=f"max_rules=.* partition has {n_rules} rules: give"):
+        with pytest.raises(ValueError, match=f"max_rules=.* partition has {n_rules} rules. Give"):
             learn(*data)
     model = quick(partition=known, max_rules=n_rules).fit(*data)
     assert model.n_rules_ == n_rules
@@ -146,8 +146,8 @@ TOO_MANY = ", more than max_rules=5.*fewer, or leave max_rules at None"
         ({"premise_features": [0, 0]}, "names a column twice"),
         ({"premise_features": []}, "names no column"),
         ({"premise_features": [True, False]}, "a mask of 2 entries, but X has 3"),
-        ({"consequent_features": [0], "order": 0}, "means nothing with order=0"),
-        ({"n_mfs": [2, 1, 1], "premise_features": ["rate"]}, "'time', which is not among"),
+        ({"consequent_features": [0], "order": 0}, "has no effect with order=0"),
+        ({"n_mfs": [2, 1, 1], "premise_features": ["rate"]}, "'time', which is not in premise"),
     ],
     ids=str,
 )

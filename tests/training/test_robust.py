@@ -143,7 +143,7 @@ def test_rows_of_weight_are_rows_repeated_where_outliers_are_many(seed):
 def test_weights_that_do_not_settle_are_told(monkeypatch):
     monkeypatch.setattr(fit, "_MOST_TURNS", 1)
     X, y, *_ = with_outliers(200)
-    with pytest.warns(ConvergenceWarning, match="weights of the rows still change"):
+    with pytest.warns(ConvergenceWarning, match="weights of the rows still change by"):
         quick(loss="huber").fit(X, y)
 
 

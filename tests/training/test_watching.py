@@ -80,7 +80,7 @@ class TestCallbacks:
     def test_wish_to_stop_is_honoured(self):
         model = quick(n_mfs=3).set_callbacks(Recorder(most=1)).fit(X, Y)
         assert model.n_iter_ == 1
-        assert "callback asked for the end" in model.status_
+        assert "callback ended the training" in model.status_
 
     def test_they_are_torn_down_where_fit_fails(self):
         seen = Recorder()
