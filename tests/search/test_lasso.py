@@ -21,9 +21,11 @@ def rows_of(X, y, weight=None):
 
 
 @pytest.mark.theory
-def test_the_penalty_is_the_largest_within_one_standard_error(rng):
+@pytest.mark.parametrize("seed", [1, 3])
+def test_the_penalty_is_the_largest_within_one_standard_error(seed):
     """Fold by fold and penalty by penalty."""
-    X, weight = rng.standard_normal((60, 12)), rng.integers(1, 4, 60).astype(float)
+    rng = np.random.default_rng(seed)
+    X, weight = rng.standard_normal((60, 12)), rng.choice([1.0, 9.0], 60)
     rows = rows_of(X, X[:, 2] - 0.5 * X[:, 7] + rng.standard_normal(60), weight)
     X, y = rows.X, rows.y[:, 0]
     centred = X - np.average(X, axis=0, weights=weight)
