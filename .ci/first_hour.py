@@ -41,7 +41,7 @@ MISTAKES = {
         from skanfis.datasets import make_jang_sinc
         ANFISRegressor(n_mfs=2, mf="gbellmf").fit(*make_jang_sinc())
         """,
-        "give mf='bell'",
+        "use mf='bell'",
     ),
     "a missing value": (
         """
