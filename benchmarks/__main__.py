@@ -12,6 +12,7 @@ from .report import Results, machine, markdown
 ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "command")
 ON_REQUEST = (
     "structure",
+    "beyond",
     "trees",
     "real_sets",
     "battery",
