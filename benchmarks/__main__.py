@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from shlex import join
 
-from .fresh import alone, run_benchmark
+from .fresh import run_alone
 from .report import Results, machine, markdown
 
 ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "command")
@@ -40,7 +40,7 @@ def parse():
         metavar="PATH",
         help="a CSV of a rate-table campaign, columns gyro_counts, temp_c, rate_true_deg_s",
     )
-    parser.add_argument("--details", action="store_true", help="certain: also one by one")
+    parser.add_argument("--details", action="store_true", help="certain: also bounds, one by one")
     many = parser.add_argument_group("structure, trees, and what else has many cases")
     many.add_argument("--every", type=int, default=1, metavar="N", help="every N-th case only")
     many.add_argument("--only", default="", metavar="TEXT", help="cases with this in their names")
@@ -53,13 +53,15 @@ def parse():
         help="parameters of ANFISRegressor, such as '{\"alpha\": 0.1}'",
     )
     many.add_argument(
-        "--quick", action="store_true", help="fit no rivals: cases whose rivals are remembered only"
+        "--quick",
+        action="store_true",
+        help="fit no rivals: of those remembered, battery and real_sets need all, trees takes what "
+        "there is; structure uses none",
     )
     many.add_argument(
         "--keep",
         metavar="NAME",
-        help="keep the results of all cases in .cache/NAME, for benchmarks.compare; else in "
-        ".cache/last",
+        help="keep the results of all cases in .cache/NAME, for benchmarks.compare (default: last)",
     )
     parser.add_argument("--write", action="store_true", help=f"write {RESULTS.name}")
     options = parser.parse_args()
@@ -87,7 +89,7 @@ def main():
     results = Results()
     for name in options.names or ALWAYS:
         print(f"{name} ...", file=sys.stderr, flush=True)
-        results += alone(run_benchmark, name, options)
+        results += run_alone(name, options)
     text = markdown(results, [*machine(), f"command: `{command(options)}`"])
     print(text)
     if options.write:

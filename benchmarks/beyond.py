@@ -9,9 +9,10 @@ import numpy as np
 from skanfis import ANFISRegressor
 from skanfis.options import LinearExtrapolation
 
-from .cases import evaluate, geometric_mean, rms
+from .cases import evaluate
+from .every_table import part
 from .report import Measure, Results, Row
-from .structure import tables
+from .scores import geometric_mean, rms_error
 
 __all__ = ["run"]
 
@@ -20,19 +21,19 @@ _FEWEST_VALUES, _MOST_ROWS = 15, 600
 
 def measure(name, _):
     """The ratio of the errors, and the number of rules."""
-    X, y = tables()[name]
+    X, y = part(0)[name]
     column = max(X.T, key=_n_values)
     low, high = np.quantile(column, (0.12, 0.88))
     beyond = (column < low) | (column > high)
     model, errors = ANFISRegressor().fit(X[~beyond], y[~beyond]), []
     for policy in ("linear", LinearExtrapolation(0.5)):
-        found = model.set_params(out_of_bounds=policy).predict(X[beyond])
-        errors.append(max(rms(found - y[beyond]) / y.std(), 0.02))
+        error = rms_error(model.set_params(out_of_bounds=policy), X[beyond], y[beyond])
+        errors.append(max(error / y.std(), 0.02))
     return {"case": name, "rules": model.n_rules_, "ratio": errors[0] / errors[1]}
 
 
 def run(options):
-    small = [name for name, (X, y) in tables().items() if len(y) <= _MOST_ROWS and _is_spread(X)]
+    small = [name for name, (X, y) in part(0).items() if len(y) <= _MOST_ROWS and _is_spread(X)]
     found, failed = evaluate("beyond", measure, small, options)
     rows = [Row("beyond the data: all tables", [failed])]
     for what, is_line in (("a line", True), ("several rules", False)):

@@ -61,13 +61,13 @@ def measured(model, X, dtype, folder):
     (folder / "main.c").write_text(main, encoding="utf-8")
     told(["gcc", *_FLAGS, "-c", f"{name}.c"], folder)
     told(["gcc", *_FLAGS, "main.c", f"{name}.o", "-lm", "-o", "main"], folder)
-    sizes = re.findall(
-        r"^(\.rodata|\.text)\S*\s+(\d+)", told(["size", "-A", f"{name}.o"], folder), re.MULTILINE
-    )
-    total = {
-        place: sum(int(n) for found, n in sizes if found == place) for place in (".rodata", ".text")
-    }
-    return total[".rodata"], total[".text"], float(told(["./main"], folder).split()[0])
+    sizes = told(["size", "-A", f"{name}.o"], folder)
+
+    def total(section):
+        found = re.findall(rf"^\.{section}\S*\s+(\d+)", sizes, re.MULTILINE)
+        return sum(map(int, found))
+
+    return total("rodata"), total("text"), float(told(["./main"], folder).split()[0])
 
 
 def told(command, folder):

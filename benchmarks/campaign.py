@@ -13,7 +13,8 @@ from skanfis import ANFISRegressor
 from .compensation import polynomial
 from .gyro import gaussian_process
 from .report import Measure, Results, Row, Table
-from .timing import best_of
+from .scores import rms
+from .timing import best_of, timed
 
 __all__ = ["run"]
 
@@ -38,28 +39,28 @@ def held_out_rms(make_estimator, X, rate, level):
         model = make_estimator().fit(X[~held_out], rate[~held_out])
         scored = held_out & (level < level.max())
         errors.append(model.predict(X[scored]) - rate[scored])
-    return float(np.sqrt(np.mean(np.concatenate(errors) ** 2))), model
+    return rms(np.concatenate(errors)), model
 
 
 def run(options):
     if options.campaign is None:
         return Results([row(f"{_WORK}, --campaign PATH", None, None)])
     data = read(options.campaign)
-    seconds, (rms, model) = best_of(lambda: held_out_rms(ANFISRegressor, *data))
-    lines = [["ANFISRegressor()", model.n_rules_, rms, seconds / _N_GROUPS]]
-    rows = [row(f"{_WORK}, defaults", rms, model.n_rules_)]
+    (error, model), seconds = best_of(3, held_out_rms, ANFISRegressor, *data)
+    lines = [["ANFISRegressor()", model.n_rules_, error, seconds / _N_GROUPS]]
+    rows = [row(f"{_WORK}, defaults", error, model.n_rules_)]
     rivals = {
         "cubic polynomial": partial(polynomial, 3),
         "Gaussian process": partial(gaussian_process, n_inputs=2),
     }
     for name, make in rivals.items():
-        seconds, (rms, _) = best_of(lambda make=make: held_out_rms(make, *data), rounds=1)
-        lines.append([name, "", rms, seconds / _N_GROUPS])
+        (error, _), seconds = timed(held_out_rms, make, *data)
+        lines.append([name, "", error, seconds / _N_GROUPS])
     head = ["model", "rules", "RMS [deg/s]", "CPU per fit [s]"]
     return Results(rows, [Table("Rate-table campaign", head, lines)])
 
 
-def row(work, rms, n_rules):
+def row(work, error, n_rules):
     return Row(
-        work, [Measure("RMS", rms, "deg/s", 0.050, 0.047), Measure("rules", n_rules, "", 12)]
+        work, [Measure("RMS", error, "deg/s", 0.050, 0.047), Measure("rules", n_rules, "", 12)]
     )

@@ -9,11 +9,10 @@ import json
 import os
 import subprocess
 import sys
-import warnings
 from hashlib import sha1
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from time import perf_counter, process_time
+from time import perf_counter
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -23,21 +22,22 @@ import skanfis
 from skanfis import ANFISRegressor
 
 from .report import Measure
+from .timing import timed
 
 __all__ = [
     "evaluate",
     "fitted",
     "fitted_in_folds",
     "folds",
-    "geometric_mean",
     "kept",
     "remembered",
-    "rms",
 ]
 
 CACHE = Path(os.environ.get("SKANFIS_BENCHMARKS_CACHE", Path(__file__).with_name(".cache")))
 _VERSIONS = ("numpy", "scipy", "scikit-learn")
 _FAILED = "failed"
+# Seconds that this process has spent on fitting rivals.
+_spent = {"rivals": 0.0}
 
 
 def evaluate(name, function, cases, options):
@@ -88,18 +88,14 @@ def evaluate(name, function, cases, options):
 
 def _guarded(function, number, case, options):
     """A case's figures; what it raised, so that one case does not end the run."""
-    with warnings.catch_warnings():
-        # Rows outside the training data, iterations cut short: on purpose here.
-        warnings.simplefilter("ignore")
-        start = perf_counter()
-        try:
-            figures = function(case, options)
-        except Exception as error:
-            figures = {"case": str(case), _FAILED: f"{type(error).__name__}: {error}"}
-    # Of which rivals, remembered or not, are no part.
-    figures["wall"] = perf_counter() - start - figures.pop("rivals_wall", 0.0)
-    figures["number"] = number
-    return figures
+    start, before = perf_counter(), _spent["rivals"]
+    try:
+        figures = function(case, options)
+    except Exception as error:
+        figures = {"case": str(case), _FAILED: f"{type(error).__name__}: {error}"}
+    # The rivals are no part of it, so that it is the same whether they are remembered or not.
+    wall = perf_counter() - start - (_spent["rivals"] - before)
+    return figures | {"wall": wall, "number": number}
 
 
 def _tell(name, n_done, n_cases, figures):
@@ -161,7 +157,9 @@ def remembered(key, function, *data, packages=(), fit=True):
         return json.loads(path.read_text(encoding="utf-8"))
     if not fit:
         return None
+    start = perf_counter()
     found = function(*data)
+    _spent["rivals"] += perf_counter() - start
     path.parent.mkdir(parents=True, exist_ok=True)
     _replace(path, json.dumps(found, default=float))
     return found
@@ -176,9 +174,8 @@ def _replace(path, text):
 
 def fitted(X, y, options, groups=None, **params):
     """An ANFISRegressor with these parameters and the options', and seconds of its fit."""
-    start = process_time()
-    model = ANFISRegressor(**params | options.estimator_params).fit(X, y, groups=groups)
-    return model, process_time() - start
+    regressor = ANFISRegressor(**params | options.estimator_params)
+    return timed(regressor.fit, X, y, groups=groups)
 
 
 def folds(X, n_folds=5):
@@ -190,14 +187,6 @@ def fitted_in_folds(X, y, options, n_folds=5, **params):
     for train, test in folds(X, n_folds):
         model, seconds = fitted(X[train], y[train], options, **params)
         yield model, seconds, train, model.predict(X[test]) - y[test]
-
-
-def rms(values):
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
-def geometric_mean(values):
-    return float(np.exp(np.mean(np.log(values))))
 
 
 def kept(path):

@@ -6,11 +6,9 @@ folds; signs by what columns mean, chosen before anything was fitted) and five p
 is installed, pyGAM, all told the same.
 """
 
-import warnings
 from dataclasses import replace
 from functools import partial
 from itertools import product
-from time import process_time
 
 import numpy as np
 from scipy.optimize import minimize
@@ -27,6 +25,7 @@ from .gyro import make_surface
 from .real_sets import SETS, RealSet, load_frame
 from .report import Measure, Results, Row, Table
 from .structure import borehole, friedman
+from .timing import timed
 
 __all__ = ["run"]
 
@@ -96,70 +95,92 @@ _PLANTED = {
 
 
 def run(options):
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        rows, tight = _gyro_like()
-        checked = _checked(options)
-        known, table = _known_to_rise(options)
-        rows += [checked[0], _proofs(), known]
-    return Results(rows, [table, *([tight, *checked[1]] if options.details else [])])
+    rows, tight = _gyro_like()
+    checked, families = _checked(options)
+    known, table = _known_to_rise(options)
+    details = [tight, families] if options.details else []
+    return Results([*rows, checked, _proofs(), known], [table, *details])
 
 
 def _gyro_like():
-    """Time and boxes of bounds of 36 rules, by tightness."""
+    """Time and boxes of bounds of 36 rules, by tightness; the bounds of slopes against rows."""
     X, y, _, _ = make_surface(seed=0)
     rows, lines, beyond, rng = [], [], 0, np.random.default_rng(0)
     for n_mfs in ([1, 6, 6], [4, 3, 3]):
         model = ANFISRegressor(n_mfs=n_mfs).fit(X, y)
         name = " x ".join(str(n) for n in n_mfs if n > 1) + " terms"
+        found = {}
         for what, job in _jobs().items():
-            start = process_time()
-            found = job(model)
-            seconds = process_time() - start
-            tightness = f"{found.tightness[0]:.2g}"
-            lines.append([f"{name}, {what}", f"{seconds:.2f}", found.n_boxes, tightness])
-            if what == "outputs to 0.01":
-                time = Measure("time", seconds, "s", 1.0)
-                measures = [time, Measure("boxes", found.n_boxes, "")]
-                rows.append(Row(f"bounds of {name}, to 1 % of the range", measures))
-            elif what.startswith("slope"):
-                beyond += _slopes_beyond(model.model_, what, found, rng)
-                if "time" in what and n_mfs[0] > 1:
-                    time = Measure("time", seconds, "s", 2.0)
-                    tight = Measure("tightness", found.tightness[0], "", 0.01)
-                    rows.append(Row(f"{what} of the largest, {name}", [time, tight]))
+            one, seconds = found[what] = timed(job, model)
+            tightness = f"{one.tightness[0]:.2g}"
+            lines.append([f"{name}, {what}", f"{seconds:.2f}", one.n_boxes, tightness])
+        one, seconds = found["outputs to 0.01"]
+        measures = [Measure("time", seconds, "s", 1.0), Measure("boxes", one.n_boxes, "")]
+        rows.append(Row(f"bounds of {name}, to 1 % of the range", measures))
+        for j, what in enumerate(map(_slope, _INPUTS)):
+            beyond += _slopes_beyond(model.model_, j, found[what][0], rng)
+        if n_mfs[0] > 1:
+            what = _slope("time")
+            one, seconds = found[what]
+            measures = [Measure("time", seconds, "s", 2.0)]
+            measures.append(Measure("tightness", one.tightness[0], "", 0.01))
+            rows.append(Row(f"{what} of the largest, {name}", measures))
     measures = [Measure("rows and optima beyond", beyond, "", 0)]
     measures.append(Measure("rows", 6 * _SLOPES, ""))
     rows.append(Row("bounds of slopes against random rows and L-BFGS-B", measures))
     return rows, Table("Bounds of 36 rules", ["what", "s", "boxes", "tightness"], lines)
 
 
-def _slopes_beyond(model, what, found, rng):
-    """How many rows of many, and optima, have a slope beyond its bounds."""
-    j = [f"slope by {name} to 0.01" for name in _INPUTS].index(what)
-    low, high, beyond = found.box[:, 0], found.box[:, 1], 0
-    for _ in range(_SLOPES // _BLOCK):
-        slopes = model.gradient(rng.uniform(low, high, (_BLOCK, 3)))[:, j, 0]
-        beyond += int(np.sum((slopes < found.lower[0]) | (slopes > found.upper[0])))
-    scale = max(-found.lower[0], found.upper[0])
-    for sign, bound in ((1.0, found.upper[0]), (-1.0, -found.lower[0])):
-
-        def cost(u, sign=sign):
-            return -sign * model.gradient((low + u * (high - low))[None])[0, j, 0] / scale
-
-        for u in rng.uniform(size=(_STARTS, 3)):
-            best = minimize(cost, u, bounds=[(0.0, 1.0)] * 3, method="L-BFGS-B")
-            beyond += int(-best.fun * scale > bound)
-    return beyond
-
-
 def _jobs():
     """What is bounded of a model, by what it is called."""
     jobs = {f"outputs to {tol:g}": partial(bounds, tol=tol) for tol in (0.01, 1e-3)}
     jobs["outputs anywhere to 0.01"] = partial(bounds, box=[(-np.inf, np.inf)] * 3)
-    for j, name in enumerate(_INPUTS):
-        jobs[f"slope by {name} to 0.01"] = partial(gradient_bounds, feature=j)
-    return jobs
+    slopes = {_slope(name): partial(gradient_bounds, feature=j) for j, name in enumerate(_INPUTS)}
+    return jobs | slopes
+
+
+def _slope(name):
+    return f"slope by {name} to 0.01"
+
+
+def _slopes_beyond(model, j, found, rng):
+    """How many rows of many, and optima, have a slope by input j beyond its bounds."""
+    lower, upper = found.lower[0], found.upper[0]
+    scale = max(-lower, upper)
+
+    def scaled(X):
+        return model.gradient(X)[:, j, 0] / scale
+
+    beyond, *_ = _against(scaled, found.box, lower / scale, upper / scale, _SLOPES, rng)
+    return beyond
+
+
+def _against(function, box, lower, upper, n_rows, rng):
+    """How many random rows and optima in a box are beyond the bounds; the least and the largest.
+
+    An optimum is the best that L-BFGS-B finds from several starts.
+    """
+    low, width = box[:, 0], box[:, 1] - box[:, 0]
+    beyond = 0
+    for _ in range(n_rows // _BLOCK):
+        values = function(rng.uniform(low, box[:, 1], (_BLOCK, len(box))))
+        beyond += int(np.sum((values < lower) | (values > upper)))
+
+    def optimum(sign):
+        starts = rng.uniform(size=(_STARTS, len(box)))
+        found = [
+            minimize(
+                lambda u: sign * function((low + u * width)[None])[0],
+                start,
+                bounds=[(0.0, 1.0)] * len(box),
+                method="L-BFGS-B",
+            )
+            for start in starts
+        ]
+        return sign * min(each.fun for each in found)
+
+    largest, least = optimum(-1.0), optimum(1.0)
+    return beyond + int(largest > upper) + int(least < lower), least, largest
 
 
 def _models(options):
@@ -175,40 +196,27 @@ def _models(options):
 
 def _checked(options):
     """Bounds in and out of the range against random rows and an optimiser."""
-    rng, lines, beyond, missed, n_rows = np.random.default_rng(0), [], 0, [], 0
+    rng, lines, beyond, missed = np.random.default_rng(0), [], 0, []
     for label, model in _models(options):
         width = model.maximum - model.minimum
         box = np.stack([model.minimum - 0.4 * width, model.maximum + 0.4 * width], axis=1)
-        start = process_time()
-        found = bounds(model, box)
-        seconds = process_time() - start
-        for _ in range(_ROWS // _BLOCK):
-            y = model.predict(rng.uniform(box[:, 0], box[:, 1], (_BLOCK, 3)))[:, 0]
-            beyond += int(np.sum((y < found.lower[0]) | (y > found.upper[0])))
-            n_rows += _BLOCK
-        best = [_optimised(model, box, sign, rng) for sign in (1.0, -1.0)]
-        beyond += int(best[0] > found.upper[0]) + int(-best[1] < found.lower[0])
-        gap = max(found.upper[0] - best[0], -best[1] - found.lower[0])
+        found, seconds = timed(bounds, model, box)
+        lower, upper = found.lower[0], found.upper[0]
+        n_beyond, least, largest = _against(
+            lambda X, model=model: model.predict(X)[:, 0], box, lower, upper, _ROWS, rng
+        )
+        beyond += n_beyond
+        gap = max(upper - largest, least - lower)
         missed.append(gap / (found.highest[0] - found.lowest[0]))
         lines.append([label, f"{seconds:.2f}", found.n_boxes, f"{found.tightness[0]:.2g}"])
     measures = [
         Measure("rows and optima beyond", beyond, "", 0),
-        Measure("rows", n_rows, ""),
+        Measure("rows", _ROWS * len(lines), ""),
         Measure("models", len(lines), ""),
         Measure("bound less optimum, worst", max(missed), "of the range"),
     ]
     table = Table("Bounds of every family", ["model", "s", "boxes", "tightness"], lines)
-    return Row("bounds against random rows and L-BFGS-B", measures), [table]
-
-
-def _optimised(model, box, sign, rng):
-    """The largest sign times output that L-BFGS-B finds from several starts."""
-
-    def cost(u):
-        return -sign * model.predict((box[:, 0] + u * (box[:, 1] - box[:, 0]))[None])[0, 0]
-
-    starts = rng.uniform(size=(_STARTS, 3))
-    return max(-minimize(cost, u, bounds=[(0.0, 1.0)] * 3, method="L-BFGS-B").fun for u in starts)
+    return Row("bounds against random rows and L-BFGS-B", measures), table
 
 
 def _proofs():
@@ -225,12 +233,16 @@ def _proofs():
         times = []
         for params in kinds:
             model = ANFISRegressor(**params, max_iter=10, monotonic_cst=signs).fit(X, y)
-            start = process_time()
-            if not all(monotonicity(model, j)[0] == 1 for j in (0, 1)):
+            proven, seconds = timed(_rises, model)
+            if not proven:
                 raise AssertionError(f"{params}: what a fit certifies is not proven.")
-            times.append(process_time() - start)
+            times.append(seconds)
         measures.append(Measure(f"{n_rules} rules, worst kind", max(times), "s", most))
     return Row("proof that two of ten inputs rise: a grid, a tree, scattered rules", measures)
+
+
+def _rises(model):
+    return all(monotonicity(model, j)[0] == 1 for j in (0, 1))
 
 
 def _tables(options):
@@ -246,14 +258,11 @@ def _tables(options):
         parts = []
         for seed in range(5):
             rng = np.random.default_rng(seed)
-            drawn = [
-                rng.uniform(size=(n_rows, len(signs))),
-                rng.uniform(0.02, 0.98, (2000, len(signs))),
-            ]
-            scale = noise * truth(drawn[1]).std()
-            parts.append(
-                [one for X in drawn for one in (X, truth(X) + scale * rng.standard_normal(len(X)))]
-            )
+            X = rng.uniform(size=(n_rows, len(signs)))
+            X_new = rng.uniform(0.02, 0.98, (2000, len(signs)))
+            scale = noise * truth(X_new).std()
+            y = truth(X) + scale * rng.standard_normal(n_rows)
+            parts.append((X, y, X_new, truth(X_new) + scale * rng.standard_normal(2000)))
         found.append((name, signs, parts))
     return [one for one in found if options.only in one[0]][:: options.every]
 
@@ -266,9 +275,8 @@ def _known_to_rise(options):
         for what, make in _fits(signs).items():
             squares, spent = [], []
             for X, y, X_new, y_new in parts:
-                start = process_time()
-                model = make().fit(X, y)
-                spent.append(process_time() - start)
+                model, each = timed(make().fit, X, y)
+                spent.append(each)
                 squares.append(np.mean((model.predict(X_new) - y_new) ** 2))
                 if what == "told":
                     told.append(model.constraints_["certified"])

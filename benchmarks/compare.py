@@ -8,8 +8,9 @@ import argparse
 
 import numpy as np
 
-from .cases import geometric_mean, kept
+from .cases import kept
 from .report import Results, Table, markdown
+from .scores import geometric_mean
 
 __all__ = ["compared"]
 

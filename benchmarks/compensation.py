@@ -18,9 +18,9 @@ from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, ThermalRate
 
-from .cases import rms
 from .report import Measure, Results, Row, Table
-from .timing import best_of
+from .scores import rms
+from .timing import timed
 
 __all__ = ["cold_starts", "polynomial", "run", "with_thermal_rate"]
 
@@ -76,9 +76,7 @@ def residual(make_estimator, log, target):
     X, y, run = log[_INPUTS], log[target].to_numpy(), log["run"].to_numpy()
     left, seconds = np.empty(len(log)), []
     for train, test in LeaveOneGroupOut().split(X, y, run):
-        spent, model = best_of(
-            lambda train=train: make_estimator().fit(X.iloc[train], y[train]), rounds=1
-        )
+        model, spent = timed(make_estimator().fit, X.iloc[train], y[train])
         seconds.append(spent)
         left[test] = model.predict(X.iloc[test]) - y[test]
     return rms(left), float(np.mean(seconds))

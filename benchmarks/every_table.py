@@ -7,13 +7,15 @@ rows are drawn. A digest deals the tables to ten parts: some for looking into, o
 be judged.
 """
 
+from functools import cache
 from hashlib import sha1
 
 import numpy as np
 import pandas as pd
 
-__all__ = ["part", "tables"]
+__all__ = ["part"]
 
+_N_PARTS = 10
 _LEAST_ROWS, _MOST_ROWS, _MOST_COLUMNS, _MOST_WORDS = 60, 1200, 60, 8
 
 
@@ -69,8 +71,11 @@ def is_measured(values):
     return np.unique(values).size >= max(12, 0.05 * min(values.size, 1000)) and np.ptp(steps) > 0.0
 
 
-def part(number, of=10):
-    """The tables of one part."""
-    for name, X, y in tables():
-        if digest(name.split(":")[0]) // 1000 % of == number:
-            yield name, X, y
+@cache
+def part(number):
+    """X and y of the tables of one part, by name; to read all takes some seconds."""
+    return {
+        name: (X, y)
+        for name, X, y in tables()
+        if digest(name.split(":")[0]) // 1000 % _N_PARTS == number
+    }

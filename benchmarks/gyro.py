@@ -13,9 +13,10 @@ from skanfis import ANFISRegressor
 
 from .compensation import polynomial
 from .report import Measure, Results, Row, Table
+from .scores import in_box
 from .timing import best_of
 
-__all__ = ["SIGMA", "error_in_sigma", "gaussian_process", "make_surface", "run", "score"]
+__all__ = ["gaussian_process", "make_surface", "run", "score"]
 
 # Standard deviation of the noise, degrees per second.
 SIGMA = 1e-3
@@ -48,11 +49,10 @@ def error_in_sigma(difference):
     return float(np.sqrt(np.mean(difference**2) + SIGMA**2) / SIGMA)
 
 
-def score(prediction, X, X_test, truth):
+def score(model, X, X_test, truth):
     """Error over the test rows in the box of the training data, and over all of them."""
-    inside = ((X.min(axis=0) <= X_test) & (X.max(axis=0) >= X_test)).all(axis=1)
-    difference = prediction - truth
-    return error_in_sigma(difference[inside]), error_in_sigma(difference)
+    difference = model.predict(X_test) - truth
+    return error_in_sigma(difference[in_box(X_test, X)]), error_in_sigma(difference)
 
 
 def gaussian_process(n_inputs=3):
@@ -69,8 +69,8 @@ def measure(make_estimator, seeds, rounds=1):
     figures = []
     for seed in seeds:
         X, y, X_test, truth = make_surface(seed)
-        seconds, model = best_of(lambda X=X, y=y: make_estimator().fit(X, y), rounds)
-        figures.append([*score(model.predict(X_test), X, X_test, truth), seconds])
+        model, seconds = best_of(rounds, make_estimator().fit, X, y)
+        figures.append([*score(model, X, X_test, truth), seconds])
     return np.array(figures)
 
 

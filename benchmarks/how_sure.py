@@ -9,20 +9,20 @@ another at equal coverage: intervals are stretched about their centres until the
 
 import numpy as np
 from sklearn.frozen import FrozenEstimator
-from sklearn.model_selection import KFold
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
 from skanfis.intervals import ConformalRegressor
 
 from . import battery, real_sets
-from .cases import evaluate, geometric_mean
+from .cases import evaluate, folds
 from .compensation import with_thermal_rate
 from .random_functions import make_data
 from .report import Measure, Results, Row
 from .rivals import gaussian_process
+from .scores import geometric_mean
 
-__all__ = ["cases", "run"]
+__all__ = ["run"]
 
 COVERAGE = 0.9
 _NORMAL = 1.6448536269514722
@@ -65,7 +65,7 @@ def parts(case):
         return X[~test], y[~test], run[~test], X[test], y[test], run[test]
     if isinstance(case, real_sets.RealSet):
         X, y = real_sets.load(case)
-        train, test = next(KFold(3, shuffle=True, random_state=0).split(X))
+        train, test = next(folds(X, 3))
         train = np.random.default_rng(0).permutation(train)[:_MOST_ROWS]
         return X[train], y[train], None, X[test], y[test], None
     data = make_data(case)

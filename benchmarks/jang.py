@@ -6,22 +6,17 @@ closer, and the rows that check it no better.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_jang_sinc, make_jang_three_input, make_mackey_glass
 
-from .cases import rms
 from .report import Measure, Results, Row
+from .scores import rms_error
 from .timing import best_of
 
 __all__ = ["run"]
-
-
-def rmse(model, X, y):
-    return rms(model.predict(X) - y)
 
 
 def percentage_error(model, X, y):
@@ -35,28 +30,22 @@ class Problem:
 
     name: str
     reference: str
-    mf: str
-    n_mfs: int
+    params: dict
     train: tuple
     check: tuple
     error: Callable
-    names: tuple[str, str]
-    unit: str
-    bars: tuple
-    aims: tuple
-    penalty: tuple[tuple[str, Any], ...] = ()  # weights that are not found by the evidence
-
-    def fit(self):
-        weights = dict(self.penalty)
-        return ANFISRegressor(n_mfs=self.n_mfs, mf=self.mf, **weights).fit(*self.train)
+    # What it is called on either data, its unit, the bar and the aim.
+    on_train: tuple
+    on_check: tuple
 
     def row(self):
-        seconds, model = best_of(self.fit)
-        errors = [self.error(model, *rows) for rows in (self.train, self.check)]
-        told = zip(self.names, errors, [self.unit] * 2, self.bars, self.aims, strict=True)
-        measures = [Measure(*entry) for entry in told]
+        model, seconds = best_of(3, ANFISRegressor(**self.params).fit, *self.train)
+        measures = [
+            Measure(name, self.error(model, *rows), *asked)
+            for rows, (name, *asked) in ((self.train, self.on_train), (self.check, self.on_check))
+        ]
         return Row(
-            f"{self.name}, {self.mf} ({self.reference})",
+            f"{self.name}, {self.params['mf']} ({self.reference})",
             [*measures, Measure("CPU", seconds, "s", 1.0)],
         )
 
@@ -65,47 +54,38 @@ PROBLEMS = [
     Problem(
         name="Jang's sinc, 16 rules",
         reference="Jang's rule: 2.1e-3 after 250 epochs",
-        mf="gaussian",
-        n_mfs=4,
+        params={"n_mfs": 4, "mf": "gaussian"},
         train=make_jang_sinc(),
         check=make_jang_sinc(midpoints=True),
-        error=rmse,
-        names=("grid RMSE", "midpoint RMSE"),
-        unit="",
-        bars=(2.1e-3, None),
-        aims=(None, 0.0145),
+        error=rms_error,
+        on_train=("grid RMSE", "", 2.1e-3, None),
+        on_check=("midpoint RMSE", "", None, 0.0145),
     ),
     Problem(
         name="Jang's three-input, 8 rules",
         reference="Jang 1993: 0.043 % / 1.066 %",
-        mf="bell",
-        n_mfs=2,
+        params={"n_mfs": 2, "mf": "bell"},
         train=make_jang_three_input(),
         check=make_jang_three_input("check"),
         error=percentage_error,
-        names=("train APE", "check APE"),
-        unit="%",
-        bars=(0.043, 1.066),
-        aims=(None, 0.25),
+        on_train=("train APE", "%", 0.043, None),
+        on_check=("check APE", "%", 1.066, 0.25),
     ),
     Problem(
         name="Mackey-Glass, 16 rules",
         reference="Jang 1993: 0.0016 / 0.0015 after 500 epochs",
-        mf="bell",
-        n_mfs=2,
+        params={"n_mfs": 2, "mf": "bell"},
         train=make_mackey_glass(),
         check=make_mackey_glass("check"),
-        error=rmse,
-        names=("train RMSE", "check RMSE"),
-        unit="",
-        bars=(0.0016, 0.0026),
-        aims=(0.0011, 0.0022),
+        error=rms_error,
+        on_train=("train RMSE", "", 0.0016, 0.0011),
+        on_check=("check RMSE", "", 0.0026, 0.0022),
     ),
 ]
 SQUARED_ERROR_ALONE = replace(
     PROBLEMS[-1],
     name="Mackey-Glass, 16 rules, squared error alone",
-    penalty=(("agreement", 0.0), ("alpha", 0.0)),
+    params=PROBLEMS[-1].params | {"agreement": 0.0, "alpha": 0.0},
 )
 
 

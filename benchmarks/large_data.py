@@ -11,10 +11,9 @@ import numpy as np
 
 from skanfis import ANFISRegressor
 
-from .cases import rms
-from .fresh import alone
 from .report import Measure, Results, Row
-from .timing import best_of
+from .scores import rms_error
+from .timing import timed
 
 __all__ = ["run"]
 
@@ -38,10 +37,10 @@ def million():
         if _STATUS.exists():
             _CLEAR.write_text(_RESET_PEAK, encoding="ascii")
             before = status("VmRSS")
-        seconds, model = best_of(lambda: ANFISRegressor(_N_MFS).fit(X, y), rounds=1)
+        model, seconds = timed(ANFISRegressor(_N_MFS).fit, X, y)
         extra = (status("VmHWM") - before) * 1024 / 1e6 if _STATUS.exists() else None
     fresh = np.random.default_rng(99).uniform(-0.999, 0.999, (50_000, 3))
-    off = rms(model.predict(fresh) - surface(fresh))
+    off = rms_error(model, fresh, surface(fresh))
     return seconds, off, extra
 
 
@@ -52,7 +51,7 @@ def status(name):
 
 
 def run(options):
-    seconds, off, extra = alone(million)
+    seconds, off, extra = million()
     measures = [
         Measure("CPU", seconds, "s", 4.0),
         Measure("peak beyond the rows", extra, "MB", 300.0, 100.0),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-__all__ = ["INPUTS", "OTHERS", "SMOOTH", "Case", "Data", "make_data", "outside"]
+__all__ = ["INPUTS", "OTHERS", "SMOOTH", "Case", "make_data", "outside"]
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,6 @@ class Data:
     X_test: np.ndarray
     truth: np.ndarray
     noise: float  # standard deviation, in the target's units
-
-    @property
-    def in_box(self):
-        """Which test rows lie in the range of the training rows, input by input."""
-        low, high = self.X.min(axis=0), self.X.max(axis=0)
-        return ((low <= self.X_test) & (self.X_test <= high)).all(axis=1)
 
 
 def make_data(case, n_test=2000, n_scale=4000):

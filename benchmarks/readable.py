@@ -4,6 +4,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from .scores import rms
+
 __all__ = ["readability"]
 
 
@@ -18,10 +20,10 @@ def readability(model, X, y):
     rows = np.arange(X.shape[0])
     outputs = consequents[:, 0] + X @ consequents[:, 1:].T
     alone = outputs[rows, strengths.argmax(axis=1)]
-    distance = np.sqrt(np.mean((alone - model.predict(X)) ** 2)) / y.std()
-    n_false, n_alike = _terms(model.memberships_, X, list(_names(model)))
+    distance = rms(alone - model.predict(X)) / y.std()
+    n_false, n_alike = _terms(model.memberships_, X)
     return {
-        "strongest": float(distance),
+        "strongest": distance,
         "false": n_false,
         "alike": n_alike,
         "rules": int(model.n_rules_),
@@ -30,17 +32,13 @@ def readability(model, X, y):
     }
 
 
-def _names(model):
-    names = getattr(model, "feature_names_in_", None)
-    return [f"x{j}" for j in range(model.n_features_in_)] if names is None else names
-
-
-def _terms(terms, X, names):
+def _terms(terms, X):
+    """How many are false, and how many pairs alike; the inputs are called x0, x1 and so on."""
     n_false = n_alike = 0
-    for j, name in enumerate(names):
-        mine = sorted((t for t in terms if t["input"] == name), key=lambda t: t["center"])
-        n_false += sum(_truth(term, X[:, j]).max() < 0.5 for term in mine)
-        grid = np.linspace(X[:, j].min(), X[:, j].max(), 1001)
+    for j, x in enumerate(X.T):
+        mine = sorted((t for t in terms if t["input"] == f"x{j}"), key=lambda t: t["center"])
+        n_false += sum(_truth(term, x).max() < 0.5 for term in mine)
+        grid = np.linspace(x.min(), x.max(), 1001)
         truths = [_truth(term, grid) for term in mine]
         for left, right in pairwise(truths):
             n_alike += np.minimum(left, right).max() > 0.9

@@ -9,17 +9,17 @@ Needs what ``pip install --group bench`` installs.
 """
 
 from dataclasses import dataclass, field
-from time import perf_counter
 
 import numpy as np
 import pandas as pd
 
-from .cases import evaluate, fitted_in_folds, geometric_mean
+from .cases import evaluate, fitted_in_folds
 from .readable import readability
 from .report import Measure, Results, Row, Table
-from .rivals import BEST_OF, rival_in_folds
+from .rivals import BEST_OF, rival_errors
+from .scores import geometric_mean, in_deviations, median
 
-__all__ = ["SETS", "RealSet", "cases", "in_deviations", "load", "rival_errors", "run"]
+__all__ = ["SETS", "RealSet", "load", "load_frame", "run"]
 
 _SEED = 0
 
@@ -110,32 +110,10 @@ def load_frame(real_set):
     return X, y
 
 
-def cases():
-    return SETS
-
-
-def in_deviations(squares, y):
-    """The error of all rows from sums of squares."""
-    return float(np.sqrt(np.sum(squares) / len(y)) / y.std())
-
-
-def rival_errors(key, X, y, n_folds=5, fit=True):
-    """The errors of rivals, by name; LookupError where one is not remembered and not fitted."""
-    found = {}
-    for name in BEST_OF:
-        parts = rival_in_folds(name, key, X, y, n_folds, fit)
-        if None in parts:
-            raise LookupError("its rivals are not remembered yet")
-        found[name] = in_deviations([squares for squares, _ in parts], y)
-    return found
-
-
 def measure(real_set, options):
     """What is kept of a set: everything of five folds."""
     X, y = load(real_set)
-    start = perf_counter()
     errors = rival_errors(f"real_sets/{real_set.name}", X, y, fit=not options.quick)
-    rivals_wall = perf_counter() - start
     squares, parts = [], []
     for model, seconds, train, left in fitted_in_folds(X, y, options):
         squares.append(left @ left)
@@ -147,48 +125,41 @@ def measure(real_set, options):
         "inputs": X.shape[1],
         "error": error,
         "ratio": error / min(errors.values()),
-        **{key: float(np.median([part[key] for part in parts])) for key in parts[0]},
+        **{key: median(parts, key) for key in parts[0]},
         "rivals": errors,
-        "rivals_wall": rivals_wall,
     }
 
 
 def run(options):
-    found, failed = evaluate("real_sets", measure, cases(), options)
+    found, failed = evaluate("real_sets", measure, SETS, options)
     if not found:
         return Results([Row("real sets", [failed])])
     worst = max(found, key=lambda figures: figures["ratio"])
-
-    def middle(key):
-        return float(np.median([figures[key] for figures in found]))
-
-    def most(key):
-        return max(figures[key] for figures in found)
-
     work = f"{len(found)} real sets, five folds, defaults"
     ratios = [figures["ratio"] for figures in found]
+    strongest, text = (max(figures[key] for figures in found) for key in ("strongest", "text"))
     rows = [
         Row(
             f"{work}: over the best of {', '.join(BEST_OF)}",
             [
                 Measure("geometric mean", geometric_mean(ratios), "", 1.0, 0.96),
                 Measure(f"worst ({worst['case']})", worst["ratio"], "", 1.15),
-                Measure("median fit, CPU", middle("seconds"), "s"),
+                Measure("median fit, CPU", median(found, "seconds"), "s"),
                 failed,
             ],
         ),
         Row(
             f"{work}: strongest rule alone, RMS to the model in deviations of the target",
             [
-                Measure("median", middle("strongest"), "", 0.3, 0.15),
-                Measure("worst", most("strongest"), "", 0.6, 0.3),
+                Measure("median", median(found, "strongest"), "", 0.3, 0.15),
+                Measure("worst", strongest, "", 0.6, 0.3),
             ],
         ),
         Row(
             f"{work}: reading cost, numerals in the rules",
             [
-                Measure("median", middle("cost"), ""),
-                Measure("text over model, worst", most("text"), "", 1.05, 1.02),
+                Measure("median", median(found, "cost"), ""),
+                Measure("text over model, worst", text, "", 1.05, 1.02),
             ],
         ),
     ]

@@ -1,8 +1,5 @@
 """What ANFISRegressor is put beside on many data sets, and how they are made."""
 
-import warnings
-from time import process_time
-
 import numpy as np
 import pandas as pd
 from sklearn.compose import TransformedTargetRegressor
@@ -16,14 +13,15 @@ from sklearn.preprocessing import FunctionTransformer, PolynomialFeatures, Stand
 from sklearn.svm import SVR
 
 from .cases import folds, remembered
+from .scores import in_deviations
+from .timing import timed
 
 __all__ = [
     "BEST_OF",
     "GLASS_BOXES",
-    "GP_ROWS",
-    "RIVALS",
     "fitted_rival",
     "gaussian_process",
+    "rival_errors",
     "rival_in_folds",
 ]
 
@@ -43,15 +41,8 @@ def lasso(n_inputs):
 
 
 def support_vectors(n_inputs):
-    """Tuned in three folds, on a standardised target."""
     grid = {"C": [1, 10, 100], "gamma": [0.03, 0.1, 0.3], "epsilon": [0.01, 0.1]}
-    model = make_pipeline(StandardScaler(), SVR())
-    search = tuned(model, {f"svr__{name}": values for name, values in grid.items()})
-    return TransformedTargetRegressor(search, transformer=StandardScaler())
-
-
-def tuned(model, grid):
-    return GridSearchCV(model, grid, scoring="neg_mean_squared_error", cv=3)
+    return tuned(SVR(), {f"svr__{name}": values for name, values in grid.items()})
 
 
 def gaussian_process(n_inputs):
@@ -60,11 +51,16 @@ def gaussian_process(n_inputs):
 
 
 def network(n_inputs):
-    """One hidden layer or two, tuned in three folds, on a standardised target."""
+    """One hidden layer or two."""
     grid = {"hidden_layer_sizes": [(50,), (50, 50)], "alpha": [1e-4, 1e-2]}
     model = MLPRegressor(solver="lbfgs", max_iter=500, random_state=0)
+    return tuned(model, {f"mlpregressor__{name}": values for name, values in grid.items()})
+
+
+def tuned(model, grid):
+    """The best of a grid in three folds, inputs and target standardised."""
     pipeline = make_pipeline(StandardScaler(), model)
-    search = tuned(pipeline, {f"mlpregressor__{name}": values for name, values in grid.items()})
+    search = GridSearchCV(pipeline, grid, scoring="neg_mean_squared_error", cv=3)
     return TransformedTargetRegressor(search, transformer=StandardScaler())
 
 
@@ -107,11 +103,7 @@ def fitted_rival(name, X, y, gp_rows=GP_ROWS):
     if name == "Gaussian process" and X.shape[0] > gp_rows:
         chosen = np.random.default_rng(0).choice(X.shape[0], gp_rows, replace=False)
         X, y = X[chosen], y[chosen]
-    start = process_time()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        model = RIVALS[name](X.shape[1]).fit(X, y)
-    return model, process_time() - start
+    return timed(RIVALS[name](X.shape[1]).fit, X, y)
 
 
 def rival_in_folds(name, key, X, y, n_folds=5, fit=True):
@@ -127,4 +119,15 @@ def rival_in_folds(name, key, X, y, n_folds=5, fit=True):
         file = f"{key} {name} {k} of {n_folds}".replace(" ", "_")
         data = X[train], y[train], X[test], y[test]
         found.append(remembered(file, figures, *data, packages=packages, fit=fit))
+    return found
+
+
+def rival_errors(key, X, y, n_folds=5, fit=True):
+    """The errors of the rivals by name; LookupError where one is neither remembered nor fitted."""
+    found = {}
+    for name in BEST_OF:
+        parts = rival_in_folds(name, key, X, y, n_folds, fit)
+        if None in parts:
+            raise LookupError("its rivals are not remembered yet")
+        found[name] = in_deviations([squares for squares, _ in parts], y)
     return found

@@ -17,11 +17,12 @@ from sklearn.model_selection import LeaveOneGroupOut
 from skanfis.datasets import make_ofog
 
 from . import gyro
-from .cases import evaluate, fitted, rms
+from .cases import evaluate, fitted
 from .compensation import cold_starts, polynomial
 from .report import Measure, Results, Row
+from .scores import median, rms, rms_error
 
-__all__ = ["cases", "run"]
+__all__ = ["run"]
 
 _N_TEST = 2000
 _JITTER = 1e-9
@@ -64,7 +65,7 @@ def replicated(X, fresh, truth, seed, options):
     found = []
     for rows in (X, X + _JITTER * rng.standard_normal(X.shape)):
         model, seconds = fitted(rows, y, options)
-        found.append((rms(model.predict(fresh) - truth(fresh)), seconds))
+        found.append((rms_error(model, fresh, truth(fresh)), seconds))
     (error, seconds), (without, _) = found
     return {"ratio": error / without, "error": error, "seconds": seconds}
 
@@ -77,7 +78,10 @@ def friedman(seed, n_rows, n_inputs, options):
     X, y = make_friedman1(n_rows, n_inputs, noise=1.0, random_state=seed)
     fresh, truth = make_friedman1(_N_TEST, n_inputs, noise=0.0, random_state=1000 + seed)
     model, seconds = fitted(X, y, options)
-    return {"ratio": np.hypot(rms(model.predict(fresh) - truth), 1.0), "seconds": seconds}
+    return {"ratio": np.hypot(rms_error(model, fresh, truth), 1.0), "seconds": seconds}
+
+
+# Rows outside the training data -----------------------------------------------------------------
 
 
 def by_policy(model, X):
@@ -85,6 +89,27 @@ def by_policy(model, X):
     yield "ratio", model.predict(X)
     for policy in ("clip", "linear"):
         yield policy, model.set_params(out_of_bounds=policy).predict(X)
+
+
+def saturating(seed, options):
+    """Trained where it has nearly come to rest, tested up to three times as far.
+
+    RMS error on the rows outside, in deviations of the target.
+    """
+    rng = np.random.default_rng(seed)
+    X, fresh = rng.uniform(-1, 1, (500, 2)), rng.uniform(-3, 3, (_N_TEST, 2))
+
+    def truth(X):
+        return np.tanh(2.5 * X[:, 0]) + 0.5 * np.tanh(2.5 * X[:, 1] + 1.0)
+
+    y = truth(X) + 0.05 * rng.standard_normal(len(X))
+    model, seconds = fitted(X, y, options)
+    beyond = (np.abs(fresh) > 1).any(axis=1)
+    found = {
+        policy: rms(prediction - truth(fresh[beyond])) / y.std()
+        for policy, prediction in by_policy(model, fresh[beyond])
+    }
+    return {**found, "seconds": seconds}
 
 
 # Cold starts, one left out ----------------------------------------------------------------------
@@ -119,37 +144,13 @@ def fourth_run(seed, grouped, options):
     train, test = run < run.max(), run == run.max()
     model, seconds = fitted(X[train], y[train], options, run[train] if grouped else None)
     cubic = polynomial(3).fit(X[train], y[train])
-    error, other = (rms(m.predict(X[test]) - y[test]) for m in (model, cubic))
+    error, other = (rms_error(one, X[test], y[test]) for one in (model, cubic))
     return {
         "ratio": error / other,
         "error": error,
-        "on the three": rms(model.predict(X[train]) - y[train]),
+        "on the three": rms_error(model, X[train], y[train]),
         "seconds": seconds,
     }
-
-
-# A function that saturates ----------------------------------------------------------------------
-
-
-def saturating(seed, options):
-    """Trained where it has nearly come to rest, tested up to three times as far.
-
-    RMS error on the rows outside, in deviations of the target.
-    """
-    rng = np.random.default_rng(seed)
-    X, fresh = rng.uniform(-1, 1, (500, 2)), rng.uniform(-3, 3, (_N_TEST, 2))
-
-    def truth(X):
-        return np.tanh(2.5 * X[:, 0]) + 0.5 * np.tanh(2.5 * X[:, 1] + 1.0)
-
-    y = truth(X) + 0.05 * rng.standard_normal(len(X))
-    model, seconds = fitted(X, y, options)
-    beyond = (np.abs(fresh) > 1).any(axis=1)
-    found = {
-        policy: rms(prediction - truth(fresh[beyond])) / y.std()
-        for policy, prediction in by_policy(model, fresh[beyond])
-    }
-    return {**found, "seconds": seconds}
 
 
 # The gyro-like surface --------------------------------------------------------------------------
@@ -164,7 +165,7 @@ def surface(seed, options, with_product=False):
     if with_product:
         X, fresh = (np.column_stack([Z, Z[:, 1] * Z[:, 2]]) for Z in (X, fresh))
     model, seconds = fitted(X, y, options)
-    inside, everywhere = gyro.score(model.predict(fresh), X, fresh, truth)
+    inside, everywhere = gyro.score(model, X, fresh, truth)
     return {"ratio": inside, "all rows": everywhere, "seconds": seconds}
 
 
@@ -172,7 +173,7 @@ def surface(seed, options, with_product=False):
 
 
 def wide(seed, n_rows, options, n_inputs=200):
-    """Four inputs matter; error on fresh rows with noise, over the noise."""
+    """Four inputs matter; error on fresh rows with noise, over such a target's deviation."""
     rng = np.random.default_rng(seed)
     X, fresh = rng.standard_normal((n_rows, n_inputs)), rng.standard_normal((_N_TEST, n_inputs))
     noise = 0.3
@@ -182,7 +183,7 @@ def wide(seed, n_rows, options, n_inputs=200):
 
     y = truth(X) + noise * rng.standard_normal(n_rows)
     model, seconds = fitted(X, y, options)
-    error = np.hypot(rms(model.predict(fresh) - truth(fresh)), noise)
+    error = np.hypot(rms_error(model, fresh, truth(fresh)), noise)
     return {"ratio": float(error / np.hypot(truth(fresh).std(), noise)), "seconds": seconds}
 
 
@@ -194,7 +195,7 @@ def few_rows(seed, n_rows, n_inputs, n_active, options):
     y = X[:, :n_active].sum(axis=1) + noise * rng.standard_normal(n_rows)
     model, seconds = fitted(X, y, options)
     errors = [
-        np.hypot(rms(one.predict(fresh) - fresh[:, :n_active].sum(axis=1)), noise)
+        np.hypot(rms_error(one, fresh, fresh[:, :n_active].sum(axis=1)), noise)
         for one in (model, BayesianRidge().fit(X, y))
     ]
     return {
@@ -216,23 +217,23 @@ class Kind:
     figure: str
     bar: float | None = None
     aim: float | None = None
-    # Or the worst.
-    summary: str = "median"
-    # Further figures to be told, with their bars.
-    further: tuple = ()
+    summary: str = "median"  # or "worst", of the seeds
+    further: tuple = ()  # names of figures that are told too
 
 
+# Of further figures.
+_BARS = {"seconds": 6.0}
 _FLOOR = "over the noise floor"
-_POLICIES = (("clip", None), ("linear", None))
+_POLICIES = ("clip", "linear")
 _COLD_STARTS = {
     f"cold starts {name}, one left out{', groups' if grouped else ''}": Kind(
         partial(left_out, make_log=make_log, inputs=inputs, grouped=grouped),
         seeds,
         _FLOOR,
-        5.0,
-        2.5,
-        "worst",
-        _POLICIES,
+        bar=5.0,
+        aim=2.5,
+        summary="worst",
+        further=_POLICIES,
     )
     for name, make_log, inputs, seeds in (
         ("at rest", at_rest, _AT_REST, range(3)),
@@ -245,10 +246,9 @@ _REPLICATED = {
         measure,
         range(5),
         "RMSE to the truth over that without repeats",
-        1.05,
-        None,
-        "worst",
-        (("error", None),),
+        bar=1.05,
+        summary="worst",
+        further=("error",),
     )
     for name, measure in (("21 levels x 100", levels_21), ("7 x 9 levels x 50", levels_7_9))
 }
@@ -257,10 +257,9 @@ _FEW_ROWS = {
         partial(few_rows, n_rows=n_rows, n_inputs=n_inputs, n_active=n_active),
         range(4),
         "error over Bayesian ridge regression's",
-        1.1,
-        1.02,
-        "median",
-        (("over the target's deviation", None),),
+        bar=1.1,
+        aim=1.02,
+        further=("over the target's deviation",),
     )
     for n_rows, n_inputs in ((60, 20), (60, 50), (100, 200), (150, 200), (300, 200))
     for n_active in (0, 3)
@@ -270,10 +269,7 @@ _FOURTH_RUN = {
         partial(fourth_run, grouped=grouped),
         range(11, 31),
         "RMS in the fourth over a cubic's",
-        None,
-        None,
-        "median",
-        (("error", None), ("on the three", None)),
+        further=("error", "on the three"),
     )
     for grouped in (False, True)
 }
@@ -287,22 +283,17 @@ KINDS = {
         partial(friedman, n_rows=5000, n_inputs=8), range(3), "test RMSE", 1.02
     ),
     "gyro-like surface, 2,000 x 3": Kind(
-        surface, range(10), "in the box [σ]", 1.05, None, "median", (("all rows", None),)
+        surface, range(10), "in the box [σ]", bar=1.05, further=("all rows",)
     ),
     "gyro-like surface, a product beside": Kind(
         partial(surface, with_product=True), range(10), "in the box [σ]"
     ),
-    "saturating, rows outside": Kind(
-        saturating, range(5), "RMS outside [sd]", None, None, "median", _POLICIES
-    ),
+    "saturating, rows outside": Kind(saturating, range(5), "RMS outside [sd]", further=_POLICIES),
     "200 inputs x 1,000 rows": Kind(
         partial(wide, n_rows=1000),
         range(2),
         "error over the target's deviation",
-        None,
-        None,
-        "median",
-        (("seconds", 6.0),),
+        further=("seconds",),
     ),
     **_FOURTH_RUN,
     **_COLD_STARTS,
@@ -336,6 +327,6 @@ def row(name, kind, some):
         return Measure(f"{label}, {kind.summary}", value, "", *limits)
 
     measures = [measured("ratio", kind.figure, kind.bar, kind.aim)]
-    measures += [measured(key, key, bar) for key, bar in kind.further]
-    measures.append(Measure("median fit, CPU", float(np.median([f["seconds"] for f in some])), "s"))
+    measures += [measured(key, key, _BARS.get(key)) for key in kind.further]
+    measures.append(Measure("median fit, CPU", median(some, "seconds"), "s"))
     return Row(f"{name}; {len(some)} seeds", measures)

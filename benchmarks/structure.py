@@ -10,7 +10,6 @@ below a fiftieth of the target's deviation count as that.
 
 import math
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from sklearn.base import clone
@@ -18,13 +17,13 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.preprocessing import StandardScaler
 
 from . import real_sets
-from .cases import evaluate, fitted, fitted_in_folds, geometric_mean, remembered, rms
+from .cases import evaluate, fitted, fitted_in_folds, remembered
 from .every_table import part
-from .real_sets import in_deviations, rival_errors
 from .report import Measure, Results, Row
-from .rivals import fitted_rival
+from .rivals import fitted_rival, rival_errors
+from .scores import geometric_mean, in_deviations, median, rms_error
 
-__all__ = ["cases", "run"]
+__all__ = ["borehole", "friedman", "run"]
 
 SIMPLICITIES = (0.0, 0.05)
 _EXACT, _N_TEST, _TUNED_ON = 0.02, 2000, 4000
@@ -36,6 +35,8 @@ _RIVALS = {
 }
 # Rows for each column, of tables with so many columns at least.
 _FEW, _MANY_COLUMNS = (1.5, 3.0, 5.0), 10
+# Rows of smooth functions.
+_SMOOTH_ROWS = (250, 1000, 4000, 16000)
 # One row decides.
 _APART = "carData Davis"
 
@@ -156,7 +157,7 @@ def of_functions(case, options, n_seeds=1):
         for seed in range(n_seeds):
             X, y, fresh, truth, noise = drawn(case, seed)
             model, _ = fitted(X, y, options, simplicity=simplicity)
-            left = rms(model.predict(fresh) - truth)
+            left = rms_error(model, fresh, truth)
             figures = figures_of(model, y.std() / math.hypot(left, noise))
             parts.append(figures | {"error": left / (truth.std() or noise)})
         found[simplicity] = parts
@@ -176,18 +177,18 @@ def figures_of(model, unit):
 
 
 def of_folds(X, y, n_folds, options):
-    """Error in the target's deviations, by simplicity, and the medians of what else there is."""
+    """The same of every fold, by simplicity; the error is one of all rows."""
     found = {}
     for simplicity in SIMPLICITIES:
         parts, squares = [], []
-        in_folds = fitted_in_folds(X, y, options, n_folds, simplicity=simplicity)
-        for model, _, train, left in in_folds:
+        folds = fitted_in_folds(X, y, options, n_folds, simplicity=simplicity)
+        for model, _, train, left in folds:
             squares.append(left @ left)
             parts.append(figures_of(model, y[train].std() / y.std()))
         error = max(in_deviations(squares, y), _EXACT)
-        found[simplicity] = [each | {"error": error} for each in parts]
-        for each in found[simplicity]:
-            each["true"] /= error
+        found[simplicity] = [
+            each | {"error": error, "true": each["true"] / error} for each in parts
+        ]
     return found
 
 
@@ -199,7 +200,7 @@ def rivals_of(case):
         if case.n_rows > _TUNED_ON and name != "Gaussian process":
             best = clone(rival.regressor_.best_estimator_)
             rival = TransformedTargetRegressor(best, transformer=StandardScaler()).fit(X, y)
-        found[name] = rms(rival.predict(fresh) - truth) / truth.std()
+        found[name] = rms_error(rival, fresh, truth) / truth.std()
     return found
 
 
@@ -222,7 +223,7 @@ def measure(case, options):
     best = max(min(rivals.values(), default=np.nan), least)
     figures = {"case": str(case), "kind": case.kind}
     for simplicity, parts in found.items():
-        middle = {name: float(np.median([p[name] for p in parts])) for name in ("error", "cost")}
+        middle = {name: median(parts, name) for name in ("error", "cost")}
         middle["over the rivals"] = max(middle["error"], least) / best
         figures[f"{simplicity:g}"] = middle | {"parts": parts}
     return figures
@@ -231,13 +232,7 @@ def measure(case, options):
 def _loaded(case):
     if case.kind == "real set":
         return real_sets.load(next(one for one in real_sets.SETS if one.name == case.name))
-    return tables()[case.name]
-
-
-@cache
-def tables():
-    """X and y by name; to read all takes some seconds."""
-    return {name: (X, y) for name, X, y in part(0)}
+    return part(0)[case.name]
 
 
 def cases():
@@ -248,17 +243,17 @@ def cases():
     yield from (Case("weak", "wave", 5000, noise) for noise in (3.0, 4.4, 7.0))
     yield from (Case("Friedman", "Friedman", n, 0.2) for n in (500, 1000))
     yield from (Case("real set", one.name) for one in real_sets.SETS)
-    yield from (Case("table", name) for name in tables())
+    yield from (Case("table", name) for name in part(0))
     yield from (Case("formula", name, n, 0.01) for n in (150, 600) for name in FORMULAS)
     yield from (
         Case("few rows", name, int(each * X.shape[1]))
-        for name, (X, y) in tables().items()
+        for name, (X, y) in part(0).items()
         if X.shape[1] >= _MANY_COLUMNS and len(y) >= 60 + (2 + _FEW[-1]) * X.shape[1]
         for each in _FEW
     )
     yield from (
         Case("smooth", name, n, noise)
-        for n in (250, 1000, 4000, 16000)
+        for n in _SMOOTH_ROWS
         for noise in (0.05, 0.2)
         for name in list(FUNCTIONS)[:6]
     )
@@ -270,7 +265,7 @@ def run(options):
     for kind in dict.fromkeys(one["kind"] for one in found):
         some = [one for one in found if one["kind"] == kind and _APART not in one["case"]]
         if kind == "smooth":
-            rows += [_smooth(some, n) for n in (250, 1000, 4000, 16000)]
+            rows += [_smooth(some, n) for n in _SMOOTH_ROWS]
         else:
             rows.append(_row(kind, some))
     return Results(rows)
@@ -293,18 +288,18 @@ def _row(kind, some):
         measures += [Measure("one rule", float(alone)), Measure("within 15 %", float(near))]
         measures.append(Measure("expected over true, several rules", float(np.median(several))))
     elif kind == "weak":
-        kept = [
-            np.mean([1.0 - each["error"] ** 2 for each in b["parts"]])
-            / np.mean([1.0 - each["error"] ** 2 for each in a["parts"]])
-            for a, b in zip(zero, default, strict=True)
-        ]
+        kept = [_explained(b) / _explained(a) for a, b in zip(zero, default, strict=True)]
         measures.append(Measure("explained, default over 0", float(np.mean(kept))))
     else:
         noisy = [(1.0 - each["error"] ** 2) / (1.0 + 0.2**2) for each in parts]
         measures.append(Measure("R2 on new rows", float(np.mean(noisy))))
-    true = [each["true"] for each in parts]
-    measures.append(Measure("expected over true, median", float(np.median(true))))
+    measures.append(Measure("expected over true, median", median(parts, "true")))
     return Row(f"structure: {len(some)} x {kind}", measures)
+
+
+def _explained(one):
+    """The part of the truth's variance that is explained."""
+    return np.mean([1.0 - each["error"] ** 2 for each in one["parts"]])
 
 
 def _smooth(some, n_rows):

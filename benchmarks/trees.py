@@ -5,16 +5,16 @@ functions on 2,000 fresh rows, the noise that fresh targets have included.
 """
 
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 
 from . import real_sets
-from .cases import evaluate, fitted, fitted_in_folds, geometric_mean, rms
+from .cases import evaluate, fitted, fitted_in_folds
 from .report import Measure, Results, Row, Table
 from .rivals import GLASS_BOXES, rival_in_folds
+from .scores import geometric_mean, in_deviations, rms_error
 
-__all__ = ["cases", "run"]
+__all__ = ["run"]
 
 # What is fitted to the real sets, and the most that it may be over each rival.
 MODELS = {
@@ -83,12 +83,11 @@ def measure(case, options):
 def of_set(case, options):
     """Errors of five folds in deviations of the target, and what else there is of each model."""
     X, y = real_sets.load(case)
-    start = perf_counter()
     squares = {}
     for name in GLASS_BOXES:
         parts = rival_in_folds(name, f"real_sets/{case.name}", X, y, fit=not options.quick)
         squares[name] = [part and part[0] for part in parts]
-    figures = {"case": str(case), "rivals_wall": perf_counter() - start}
+    figures = {"case": str(case)}
     for name, params in MODELS.items():
         left, parts = [], []
         for model, seconds, _, errors in fitted_in_folds(X, y, options, **params):
@@ -98,7 +97,7 @@ def of_set(case, options):
         keys = ("rules", "cost", "seconds")
         figures[name] = dict(zip(keys, np.median(parts, axis=0), strict=False)) | {
             "squares": left,
-            "error": real_sets.in_deviations(left, y),
+            "error": in_deviations(left, y),
             "jump": float(np.max(parts, axis=0)[-1]),
             "over": {rival: over(left, of) for rival, of in squares.items()},
         }
@@ -127,7 +126,7 @@ def of_planted(case, options):
     figures = {"case": str(case), "name": case.name}
     for kind in KINDS:
         model, _ = fitted(X, y, options, partition=kind)
-        left = rms(model.predict(fresh) - truth)
+        left = rms_error(model, fresh, truth)
         figures[kind] = {"error": float(np.hypot(left, noise)) / noise, "left": left / noise}
     return figures
 
