@@ -3,13 +3,12 @@
 import argparse
 import json
 import sys
-from pathlib import Path
 from shlex import join
 
 from .fresh import run_alone
 from .report import Results, machine, markdown
 
-ALWAYS = ("jang", "gyro", "campaign", "one_pass", "one_row", "command")
+ALWAYS = ("jang", "gyro", "one_pass", "one_row", "command")
 ON_REQUEST = (
     "structure",
     "beyond",
@@ -20,10 +19,10 @@ ON_REQUEST = (
     "how_sure",
     "certain",
     "compensation",
+    "campaign",
     "c_code",
     "large_data",
 )
-RESULTS = Path(__file__).with_name("RESULTS.md")
 
 
 def parse():
@@ -36,9 +35,8 @@ def parse():
     )
     parser.add_argument(
         "--campaign",
-        type=Path,
         metavar="PATH",
-        help="a CSV of a rate-table campaign, columns gyro_counts, temp_c, rate_true_deg_s",
+        help="for campaign: a CSV with the columns gyro_counts, temp_c, rate_true_deg_s",
     )
     parser.add_argument("--details", action="store_true", help="certain: also bounds, one by one")
     many = parser.add_argument_group("structure, trees, and what else has many cases")
@@ -63,11 +61,12 @@ def parse():
         metavar="NAME",
         help="keep the results of all cases in .cache/NAME, for benchmarks.compare (default: last)",
     )
-    parser.add_argument("--write", action="store_true", help=f"write {RESULTS.name}")
     options = parser.parse_args()
     unknown = [name for name in options.names if name not in ALWAYS + ON_REQUEST]
     if unknown:
         parser.error(f"no such benchmark: {', '.join(unknown)}")
+    if "campaign" in options.names and not options.campaign:
+        parser.error("campaign needs --campaign PATH")
     return options
 
 
@@ -90,10 +89,7 @@ def main():
     for name in options.names or ALWAYS:
         print(f"{name} ...", file=sys.stderr, flush=True)
         results += run_alone(name, options)
-    text = markdown(results, [*machine(), f"command: `{command(options)}`"])
-    print(text)
-    if options.write:
-        RESULTS.write_text(text + "\n", encoding="utf-8")
+    print(markdown(results, [*machine(), f"command: `{command(options)}`"]))
 
 
 if __name__ == "__main__":

@@ -5,6 +5,8 @@ distribution, those outside the box of the training rows among them, and has the
 fresh target would have: sqrt(mean((prediction - truth)^2) + noise^2).
 """
 
+from functools import partial
+
 import numpy as np
 
 from .cases import evaluate, fitted, remembered
@@ -51,7 +53,7 @@ def error(prediction, data):
     return float(np.sqrt(np.mean((prediction - data.truth) ** 2) + data.noise**2))
 
 
-def rival_error(name, data):
+def rival_error(name, data, *_):
     model, _ = fitted_rival(name, data.X, data.y, _GP_ROWS)
     return error(model.predict(data.X_test), data)
 
@@ -60,9 +62,10 @@ def rivals(case, data, fit=True):
     """The error of each rival."""
     found = {}
     for name in BEST_OF:
-        key = f"battery/{case.seed:03} {name} error".replace(" ", "_")
+        file = f"{case.seed:03} {name} error"
         rows = data.X, data.y, data.X_test, data.truth
-        found[name] = remembered(key, lambda *_, n=name: rival_error(n, data), *rows, fit=fit)
+        error_of = partial(rival_error, name, data)
+        found[name] = remembered("battery", file, error_of, *rows, fit=fit)
     if None in found.values():
         raise LookupError("its rivals are not remembered yet")
     return found

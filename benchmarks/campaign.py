@@ -20,7 +20,6 @@ __all__ = ["run"]
 
 _LEVEL = 3.6  # deg/s
 _N_GROUPS = 5
-_WORK = "rate-table campaign, rate levels held out"
 
 
 def read(path):
@@ -43,12 +42,14 @@ def held_out_rms(make_estimator, X, rate, level):
 
 
 def run(options):
-    if options.campaign is None:
-        return Results([row(f"{_WORK}, --campaign PATH", None, None)])
     data = read(options.campaign)
     (error, model), seconds = best_of(3, held_out_rms, ANFISRegressor, *data)
     lines = [["ANFISRegressor()", model.n_rules_, error, seconds / _N_GROUPS]]
-    rows = [row(f"{_WORK}, defaults", error, model.n_rules_)]
+    measures = [
+        Measure("RMS", error, "deg/s", 0.050, 0.047),
+        Measure("rules", model.n_rules_, "", 12),
+    ]
+    rows = [Row("rate-table campaign, rate levels held out, defaults", measures)]
     rivals = {
         "cubic polynomial": partial(polynomial, 3),
         "Gaussian process": partial(gaussian_process, n_inputs=2),
@@ -58,9 +59,3 @@ def run(options):
         lines.append([name, "", error, seconds / _N_GROUPS])
     head = ["model", "rules", "RMS [deg/s]", "CPU per fit [s]"]
     return Results(rows, [Table("Rate-table campaign", head, lines)])
-
-
-def row(work, error, n_rules):
-    return Row(
-        work, [Measure("RMS", error, "deg/s", 0.050, 0.047), Measure("rules", n_rules, "", 12)]
-    )

@@ -127,13 +127,13 @@ def _commit():
     return found.stdout.strip() or str(folder)
 
 
-def remembered(key, function, *data, packages=(), fit=True):
+def remembered(folder, name, function, *data, packages=(), fit=True):
     """What a function of arrays gave the last time, if data and versions are the same.
 
     Parameters
     ----------
-    key : str
-        A file's name, with folders.
+    folder, name : str
+        Of the file in ``.cache/rivals``.
     function : callable
         Of ``data``; gives what JSON can hold.
     *data : arrays
@@ -152,7 +152,8 @@ def remembered(key, function, *data, packages=(), fit=True):
         return None
     for array in data:
         digest.update(np.ascontiguousarray(array).tobytes())
-    path = CACHE / "rivals" / f"{key}-{digest.hexdigest()[:12]}.json"
+    name = name.replace("/", "-").replace(" ", "_")
+    path = CACHE / "rivals" / folder / f"{name}-{digest.hexdigest()[:12]}.json"
     if path.exists():
         return json.loads(path.read_text(encoding="utf-8"))
     if not fit:

@@ -43,19 +43,13 @@ _DIAMONDS = next(one for one in SETS if one.item == "diamonds")
 _CARSEATS = next(one for one in SETS if one.item == "Carseats")
 # What the target rises (1) and falls (-1) with.
 _REAL = (
-    (
-        RealSet("MASS", "Boston", "medv"),
-        {"rm": 1, "lstat": -1, "crim": -1, "ptratio": -1},
-    ),
+    (RealSet("MASS", "Boston", "medv"), {"rm": 1, "lstat": -1, "crim": -1, "ptratio": -1}),
     (_CARSEATS, {"Price": -1, "CompPrice": 1, "Advertising": 1, "ShelveLoc": 1}),
     (
         RealSet("ISLR", "Auto", "mpg", dropped=("name", "origin")),
         {"weight": -1, "horsepower": -1, "year": 1},
     ),
-    (
-        RealSet("AER", "HousePrices", "price"),
-        {"lotsize": 1, "bathrooms": 1, "aircon_yes": 1},
-    ),
+    (RealSet("AER", "HousePrices", "price"), {"lotsize": 1, "bathrooms": 1, "aircon_yes": 1}),
     (
         RealSet("modeldata", "concrete", "compressive_strength"),
         {"cement": 1, "water": -1, "age": 1},

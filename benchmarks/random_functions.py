@@ -111,14 +111,7 @@ def lognormal(rng, n, d):
     return rng.lognormal(0, 1, (n, d))
 
 
-INPUTS = {
-    "uniform": uniform,
-    "correlated": correlated,
-    "clusters": clusters,
-    "integer": integer,
-    "t3": t3,
-    "lognormal": lognormal,
-}
+INPUTS = {f.__name__: f for f in (uniform, correlated, clusters, integer, t3, lognormal)}
 
 # Functions ------------------------------------------------------------------------------------
 

@@ -64,11 +64,7 @@ SETS = (
     RealSet("fpp2", "elecdaily", "Demand"),
     RealSet("ISLR", "Carseats", "Sales", ordered={"ShelveLoc": ("Bad", "Medium", "Good")}),
     RealSet(
-        "AER",
-        "CASchools",
-        "score",
-        dropped=("district", "school", "county"),
-        averaged=("read", "math"),
+        "AER", "CASchools", "score", ("district", "school", "county"), averaged=("read", "math")
     ),
     RealSet("MASS", "Boston", "medv"),
     RealSet("ISLR", "College", "Outstate"),
@@ -113,7 +109,7 @@ def load_frame(real_set):
 def measure(real_set, options):
     """What is kept of a set: everything of five folds."""
     X, y = load(real_set)
-    errors = rival_errors(f"real_sets/{real_set.name}", X, y, fit=not options.quick)
+    errors = rival_errors("real_sets", real_set.name, X, y, fit=not options.quick)
     squares, parts = [], []
     for model, seconds, train, left in fitted_in_folds(X, y, options):
         squares.append(left @ left)

@@ -7,6 +7,7 @@ from datetime import date
 from importlib.metadata import version
 from pathlib import Path
 
+import numpy as np
 from threadpoolctl import threadpool_info
 
 import skanfis
@@ -16,10 +17,10 @@ __all__ = ["Measure", "Results", "Row", "Table", "machine", "markdown"]
 
 @dataclass(frozen=True)
 class Measure:
-    """A figure (or None), and the most it should be: at least the bar, better the aim."""
+    """A figure, and the most that it should be: the bar at least, better the aim."""
 
     name: str
-    value: float | None
+    value: float
     unit: str = ""
     bar: float | None = None
     aim: float | None = None
@@ -34,8 +35,6 @@ class Measure:
         return limit is None or self.value <= limit
 
     def __str__(self):
-        if self.value is None:
-            return f"{self.name} not given"
         return f"{self.name} {self.value:.3g}{self._suffix()}"
 
     def _suffix(self):
@@ -62,8 +61,6 @@ class Row:
         return ", ".join(filter(None, (measure.limit(kind) for measure in self.measures)))
 
     def _verdict(self):
-        if any(measure.value is None for measure in self.measures):
-            return ""
         missed = {k: [m.name for m in self.measures if not m.meets(k)] for k in ("bar", "aim")}
         if missed["bar"]:
             return f"**no**: {', '.join(missed['bar'])}"
@@ -132,5 +129,5 @@ def _table(head, lines):
 
 
 def _cell(value):
-    text = f"{value:.3g}" if isinstance(value, float) else str(value)
+    text = f"{value:.3g}" if isinstance(value, float | np.floating) else str(value)
     return text.replace("|", "\\|")

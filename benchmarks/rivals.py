@@ -106,7 +106,7 @@ def fitted_rival(name, X, y, gp_rows=GP_ROWS):
     return timed(RIVALS[name](X.shape[1]).fit, X, y)
 
 
-def rival_in_folds(name, key, X, y, n_folds=5, fit=True):
+def rival_in_folds(name, folder, case, X, y, n_folds=5, fit=True):
     """Of each fold, the sum of squared errors and seconds; None where ``remembered`` gives that."""
 
     def figures(X_train, y_train, X_test, y_test):
@@ -116,17 +116,17 @@ def rival_in_folds(name, key, X, y, n_folds=5, fit=True):
     packages = [GLASS_BOXES[name]] if name in GLASS_BOXES else []
     found = []
     for k, (train, test) in enumerate(folds(X, n_folds)):
-        file = f"{key} {name} {k} of {n_folds}".replace(" ", "_")
+        file = f"{case} {name} {k} of {n_folds}"
         data = X[train], y[train], X[test], y[test]
-        found.append(remembered(file, figures, *data, packages=packages, fit=fit))
+        found.append(remembered(folder, file, figures, *data, packages=packages, fit=fit))
     return found
 
 
-def rival_errors(key, X, y, n_folds=5, fit=True):
+def rival_errors(folder, case, X, y, n_folds=5, fit=True):
     """The errors of the rivals by name; LookupError where one is neither remembered nor fitted."""
     found = {}
     for name in BEST_OF:
-        parts = rival_in_folds(name, key, X, y, n_folds, fit)
+        parts = rival_in_folds(name, folder, case, X, y, n_folds, fit)
         if None in parts:
             raise LookupError("its rivals are not remembered yet")
         found[name] = in_deviations([squares for squares, _ in parts], y)

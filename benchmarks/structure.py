@@ -212,13 +212,12 @@ def measure(case, options):
         X, y = _loaded(case)
         found = of_folds(X, y, n_folds, options)
         if not options.quick:
-            key = f"{folder}/{case.name.replace('/', '-')}"
-            rivals = rival_errors(key, X, y, n_folds)
+            rivals = rival_errors(folder, case.name, X, y, n_folds)
     else:
         found = of_functions(case, options, 1 if case.kind in _RIVALS else 5)
         if case.kind in _RIVALS and not options.quick:
-            key = f"structure/{case}".replace("/", "-").replace(" ", "_")
-            rivals = remembered(key, lambda *_: rivals_of(case), *drawn(case)[:2])
+            rows = drawn(case)[:2]
+            rivals = remembered("structure", str(case), lambda *_: rivals_of(case), *rows)
     least = 0.0 if case.kind in ("smooth", "formula") else _EXACT
     best = max(min(rivals.values(), default=np.nan), least)
     figures = {"case": str(case), "kind": case.kind}
@@ -265,10 +264,17 @@ def run(options):
     for kind in dict.fromkeys(one["kind"] for one in found):
         some = [one for one in found if one["kind"] == kind and _APART not in one["case"]]
         if kind == "smooth":
-            rows += [_smooth(some, n) for n in _SMOOTH_ROWS]
+            rows += _smooth(some)
         else:
             rows.append(_row(kind, some))
     return Results(rows)
+
+
+def _over_the_rivals(some):
+    """Errors over the best rival's, by simplicity."""
+    ratios = ([one[f"{s:g}"]["over the rivals"] for one in some] for s in SIMPLICITIES)
+    names = ("simplicity=0", "default")
+    return [Measure(name, geometric_mean(own)) for name, own in zip(names, ratios, strict=True)]
 
 
 def _row(kind, some):
@@ -276,9 +282,7 @@ def _row(kind, some):
     parts = [each for one in zero for each in one["parts"]]
     measures = []
     if kind in ("real set", "table", "formula", "few rows"):
-        for name, own in (("simplicity=0", zero), ("default", default)):
-            ratios = [each["over the rivals"] for each in own]
-            measures.append(Measure(name, geometric_mean(ratios)))
+        measures += _over_the_rivals(some)
         costs = [b["cost"] / a["cost"] for a, b in zip(zero, default, strict=True)]
         measures.append(Measure("reading cost, default over 0, median", float(np.median(costs))))
     elif kind == "noise":
@@ -302,11 +306,9 @@ def _explained(one):
     return np.mean([1.0 - each["error"] ** 2 for each in one["parts"]])
 
 
-def _smooth(some, n_rows):
-    own = [one for one in some if f", {n_rows} rows" in one["case"]]
-    measures = [
-        Measure(name, geometric_mean([one[key]["over the rivals"] for one in own]))
-        for name, key in (("simplicity=0", "0"), ("default", "0.05"))
-        if own
-    ]
-    return Row(f"structure: smooth functions, {n_rows:,} rows, over the best rival", measures)
+def _smooth(some):
+    for n_rows in _SMOOTH_ROWS:
+        own = [one for one in some if f", {n_rows} rows" in one["case"]]
+        if own:
+            work = f"structure: smooth functions, {n_rows:,} rows, over the best rival"
+            yield Row(work, _over_the_rivals(own))

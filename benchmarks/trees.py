@@ -12,7 +12,7 @@ from . import real_sets
 from .cases import evaluate, fitted, fitted_in_folds
 from .report import Measure, Results, Row, Table
 from .rivals import GLASS_BOXES, rival_in_folds
-from .scores import geometric_mean, in_deviations, rms_error
+from .scores import geometric_mean, in_deviations, median, rms_error
 
 __all__ = ["run"]
 
@@ -85,20 +85,20 @@ def of_set(case, options):
     X, y = real_sets.load(case)
     squares = {}
     for name in GLASS_BOXES:
-        parts = rival_in_folds(name, f"real_sets/{case.name}", X, y, fit=not options.quick)
+        parts = rival_in_folds(name, "real_sets", case.name, X, y, fit=not options.quick)
         squares[name] = [part and part[0] for part in parts]
     figures = {"case": str(case)}
     for name, params in MODELS.items():
-        left, parts = [], []
+        left, parts, jumps = [], [], []
         for model, seconds, _, errors in fitted_in_folds(X, y, options, **params):
             left.append(errors @ errors)
             cost = model.readability_.reading_cost
-            parts.append([model.n_rules_, cost, seconds, jump(model, X, y)])
-        keys = ("rules", "cost", "seconds")
-        figures[name] = dict(zip(keys, np.median(parts, axis=0), strict=False)) | {
+            parts.append({"rules": model.n_rules_, "cost": cost, "seconds": seconds})
+            jumps.append(jump(model, X, y))
+        figures[name] = {key: median(parts, key) for key in parts[0]} | {
             "squares": left,
             "error": in_deviations(left, y),
-            "jump": float(np.max(parts, axis=0)[-1]),
+            "jump": max(jumps),
             "over": {rival: over(left, of) for rival, of in squares.items()},
         }
     return figures | {"folds": {rival: sum(map(bool, of)) for rival, of in squares.items()}}
@@ -137,7 +137,7 @@ def run(options):
     planted = [figures for figures in found if "name" in figures]
     rows, tables = [Row("trees: cases", [failed])], []
     if sets:
-        rows += [*(beside(sets, *pair, *bars) for pair, bars in BARS.items()), jumps(sets)]
+        rows += [*(beside(sets, *pair, *bars) for pair, bars in BARS.items()), largest_jumps(sets)]
         tables.append(one_by_one(sets))
     for name in dict.fromkeys(figures["name"] for figures in planted):
         rows.append(of_kinds(name, [one for one in planted if one["name"] == name]))
@@ -158,7 +158,7 @@ def beside(sets, name, rival, bar, aim):
     )
 
 
-def jumps(sets):
+def largest_jumps(sets):
     measures = []
     for name in MODELS:
         found = [figures[name]["jump"] for figures in sets]
