@@ -1,8 +1,8 @@
 """ANFISRegressor() on 240 random functions, beside quadratic ridge and a Gaussian process.
 
-Chosen before anything was fitted, and never changed. An error is over 2,000 fresh rows of the same
-distribution, those outside the box of the training rows among them, and has the noise in it that a
-fresh target would have: sqrt(mean((prediction - truth)^2) + noise^2).
+The functions were chosen before anything was fitted, and never changed. An error is that of 2,000
+new rows from the same distribution, some of them outside the box of the training rows. It includes
+the noise that a new target would have: sqrt(mean((prediction - truth)^2) + noise^2).
 """
 
 from functools import partial
@@ -22,15 +22,15 @@ N_CASES = 240
 _SEED = 9
 BEST_OF = ("quadratic ridge", "Gaussian process")
 _GP_ROWS = 1000
-# Beyond the training target's range by so much of it.
+# What counts as beyond the training target's range, in parts of it.
 _BEYOND = 0.25
 _WORSE_THAN_MEAN = 1.02
 
 
 def cases():
-    """As many of each dimension, of each kind of inputs; half the functions smooth.
+    """All numbers of inputs and all kinds of inputs equally often; half of the functions smooth.
 
-    Rows from 30 to 2,000, equally spread in their logarithm, and noise from 0 to 50 %.
+    There are 30 to 2,000 rows, equally spread in their logarithm, and noise from 0 to 50 %.
     """
     rng = np.random.default_rng(_SEED)
     functions = [f for f in SMOOTH for _ in range(N_CASES // 8)]
@@ -80,7 +80,7 @@ def measure(case, options):
     best = min(found, key=found.get)
     inside = in_box(data.X_test, data.X)
     excess = np.maximum(data.y.min() - prediction, prediction - data.y.max()) / np.ptp(data.y)
-    # Where the truth is not beyond the target's range itself.
+    # Where the truth is beyond that range too, a prediction may be.
     beyond = outside(prediction, data.y, _BEYOND) & ~outside(data.truth, data.y, _BEYOND)
     return {
         "case": str(case),

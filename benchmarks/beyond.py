@@ -1,7 +1,7 @@
-"""Predictions beyond the data: the default's tangent over one followed for half a deviation.
+"""Predictions beyond the data: the default beside a tangent followed for half a deviation.
 
-Of every table, the rows beyond the 12 % and 88 % quantiles of the input with the most values are
-left out, and predicted. Errors below a fiftieth of the target's deviation count as that.
+In every table, the rows beyond the 12 % and 88 % quantiles of the input with the most values are
+left out, and predicted. Errors below 0.02 of the target's deviation count as 0.02 of it.
 """
 
 import numpy as np

@@ -1,6 +1,6 @@
 """Many cases of one kind: fitted in several processes, rivals remembered, results kept.
 
-What other packages make of a case does not change with this one: it is computed once and kept in
+What other packages make of a case does not depend on this one. It is computed once and kept in
 ``.cache/rivals``. The results of the last run of each benchmark are kept in ``.cache/last``, or in
 ``.cache/NAME`` with ``--keep NAME``: ``python -m benchmarks.compare`` puts two side by side.
 """
@@ -41,15 +41,15 @@ _spent = {"rivals": 0.0}
 
 
 def evaluate(name, function, cases, options):
-    """What a function finds for each case, and writes it to a file.
+    """Call a function for each case, and write what it finds to a file.
 
     Parameters
     ----------
     name : str
-        Of the benchmark; the file is called so.
+        Of the benchmark, and of the file.
     function : callable
-        Of a case and the options; gives a dict of figures with "case", which names the case. It is
-        called in other processes.
+        Of a case and the options; returns a dict of figures, and the case's name as "case". With
+        ``options.jobs`` above 1, other processes call it.
     cases : iterable
         Every ``options.every``-th of those with ``options.only`` in their names is taken.
     options : Namespace
@@ -57,9 +57,9 @@ def evaluate(name, function, cases, options):
     Returns
     -------
     found : list of dict
-        In the order of the cases. A case that raised is not among them: it is in the file.
+        In the order of the cases. A case that raised is in the file only.
     failed : Measure
-        How many those are.
+        How many cases raised.
     """
     chosen = [case for case in cases if options.only in str(case)][:: options.every]
     tasks = (delayed(_guarded)(function, k, case, options) for k, case in enumerate(chosen))
@@ -87,13 +87,13 @@ def evaluate(name, function, cases, options):
 
 
 def _guarded(function, number, case, options):
-    """A case's figures; what it raised, so that one case does not end the run."""
+    """A case's figures, or what it raised: one case must not end the run."""
     start, before = perf_counter(), _spent["rivals"]
     try:
         figures = function(case, options)
     except Exception as error:
         figures = {"case": str(case), _FAILED: f"{type(error).__name__}: {error}"}
-    # The rivals are no part of it, so that it is the same whether they are remembered or not.
+    # Without the rivals, which take no time once they are remembered.
     wall = perf_counter() - start - (_spent["rivals"] - before)
     return figures | {"wall": wall, "number": number}
 
@@ -128,14 +128,14 @@ def _commit():
 
 
 def remembered(folder, name, function, *data, packages=(), fit=True):
-    """What a function of arrays gave the last time, if data and versions are the same.
+    """What a function of arrays returned the last time with the same data and versions.
 
     Parameters
     ----------
     folder, name : str
         Of the file in ``.cache/rivals``.
     function : callable
-        Of ``data``; gives what JSON can hold.
+        Of ``data``; returns what JSON can hold.
     *data : arrays
     packages : sequence of str
         Whose versions count too, beside NumPy's, SciPy's and scikit-learn's.

@@ -1,9 +1,9 @@
-"""Certain bounds: how tight in what time, held against rows and an optimiser; constrained fits.
+"""Certain bounds: how tight, in what time, checked by rows and an optimiser; constrained fits.
 
 Twelve tables have one to four inputs with which the truth rises or falls: seven real ones (five
 folds; signs by what columns mean, chosen before anything was fitted) and five planted functions
-(five draws, noise on the new rows too). Beside the free fit stand histogram boosting and, where it
-is installed, pyGAM, all told the same.
+(five draws, noise on the new rows too). Told fits are compared with free ones, with histogram
+boosting, free and told the same, and with pyGAM, told the same, where it is installed.
 """
 
 from dataclasses import replace

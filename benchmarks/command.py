@@ -14,7 +14,7 @@ from .report import Measure, Results, Row
 __all__ = ["run"]
 
 _N_RUNS, _RUN = 12, 83_340.0  # s, a row a second
-# Units stand in the names: the values of this log leave its clock open.
+# The names give the units: the values do not tell that of the clock.
 _COLUMNS = {
     "time": "time_s",
     "temperature": "temp_degC",

@@ -1,4 +1,4 @@
-"""A compensated gyro beside its bars: simulated cold starts, where the truth is known.
+"""A compensated gyro in simulated cold starts, where the truth is known.
 
 Whole runs are held out. The law is that of an open-loop fibre-optic gyro; rules learn what is left
 of it by output, time and thermal rate. The real campaign is in ``campaign``.

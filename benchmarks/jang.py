@@ -1,7 +1,6 @@
 """Three problems of Jang 1993; defaults but for ``n_mfs`` and ``mf``.
 
-Mackey-Glass once more with the cost that Jang has, squared error alone: it fits the training rows
-closer, and the rows that check it no better.
+Mackey-Glass is also fitted with Jang's cost, squared error alone.
 """
 
 from collections.abc import Callable

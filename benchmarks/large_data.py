@@ -1,7 +1,7 @@
 """A million rows in one process: processor time and peak memory of a fit.
 
-Every page of the file is read before: what the peak then exceeds the memory before the fit by is
-the fit's own.
+All rows are read before the fit, so that they are in memory already. What the peak adds to that
+belongs to the fit.
 """
 
 import tempfile

@@ -1,4 +1,4 @@
-"""What ANFISRegressor is put beside on many data sets, and how they are made."""
+"""The regressors that ANFISRegressor is compared with on many data sets."""
 
 import numpy as np
 import pandas as pd
@@ -99,7 +99,7 @@ GLASS_BOXES = {"EBM": "interpret-core", "FIGS": "imodels", "cubist": "cubist"}
 
 
 def fitted_rival(name, X, y, gp_rows=GP_ROWS):
-    """A rival, and processor seconds of its fit; the Gaussian process sees a part of many rows."""
+    """A rival, and seconds of its fit; a Gaussian process learns from ``gp_rows`` rows at most."""
     if name == "Gaussian process" and X.shape[0] > gp_rows:
         chosen = np.random.default_rng(0).choice(X.shape[0], gp_rows, replace=False)
         X, y = X[chosen], y[chosen]
@@ -107,7 +107,7 @@ def fitted_rival(name, X, y, gp_rows=GP_ROWS):
 
 
 def rival_in_folds(name, folder, case, X, y, n_folds=5, fit=True):
-    """Of each fold, the sum of squared errors and seconds; None where ``remembered`` gives that."""
+    """Of each fold: the sum of squared errors and seconds, or None if ``remembered`` has none."""
 
     def figures(X_train, y_train, X_test, y_test):
         model, seconds = fitted_rival(name, X_train, y_train)

@@ -1,9 +1,9 @@
 """Problems that the defaults have failed on, or must not lose.
 
-Replicated tables against the same with the inputs moved by next to nothing; Friedman's first
-function; simulated cold starts, one left out, and a run after three; a function that saturates,
-with rows outside; the gyro-like surface; 200 inputs. Chosen before anything was fitted, and never
-changed.
+They are: tables in which inputs repeat, against the same with the inputs moved by next to nothing;
+Friedman's first function; a function that saturates, with rows outside; simulated cold starts, one
+left out; a run after three; the gyro-like surface; few rows of many inputs. All were chosen before
+anything was fitted, and never changed.
 """
 
 from dataclasses import dataclass

@@ -1,11 +1,14 @@
-"""The structure that is chosen, with simplicity=0 and by default: its error, cost and expectation.
+"""The structure that is chosen, with simplicity=0 and by default: error, cost, expected error.
 
-All cases were chosen before any was fitted. Real sets and tables are judged in folds, beside the
-best of quadratic ridge, SVR and a Gaussian process; tables of which few rows for each column are
-learnt from, by the other rows, beside the better of the lasso and a Gaussian process; formulas of
-physics by their error to the truth, beside a Gaussian process, and smooth functions of inputs that
-all act together beside the best of SVR, a neural network and a Gaussian process. Errors in tables
-below a fiftieth of the target's deviation count as that.
+All cases were chosen before any was fitted. What they are compared with:
+
+* real sets and tables, in folds: the best of quadratic ridge, SVR and a Gaussian process;
+* few rows of tables, judged by the other rows: the better of the lasso and a Gaussian process;
+* formulas of physics, by the error to the truth: a Gaussian process;
+* smooth functions of inputs that all act together, by the error to the truth: the best of SVR, a
+  neural network and a Gaussian process.
+
+Errors in tables below 0.02 of the target's deviation count as 0.02 of it.
 """
 
 import math
@@ -33,7 +36,7 @@ _RIVALS = {
     "formula": ("Gaussian process",),
     "few rows": ("lasso", "Gaussian process"),
 }
-# Rows for each column, of tables with so many columns at least.
+# Few rows: how many for each column, and in tables of how many columns at least.
 _FEW, _MANY_COLUMNS = (1.5, 3.0, 5.0), 10
 # Rows of smooth functions.
 _SMOOTH_ROWS = (250, 1000, 4000, 16000)
@@ -43,7 +46,7 @@ _APART = "carData Davis"
 
 @dataclass(frozen=True)
 class Case:
-    """What kind it is of, and what it is made from."""
+    """Its kind, the function or table, and for functions rows and noise."""
 
     kind: str
     name: str
@@ -112,7 +115,7 @@ FUNCTIONS = {
 }
 
 
-# Of numbers from 1 to 5, after Feynman's lectures: products and quotients, with long tails.
+# From Feynman's lectures, for numbers from 1 to 5: products and quotients, with long tails.
 FORMULAS = {
     "gravity": (lambda m, n, x, y: m * n / (x**2 + y**2), 4),
     "Coulomb": (lambda p, q, e, r: p * q / (e * r**2), 4),

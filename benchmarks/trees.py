@@ -1,7 +1,7 @@
 """Trees of soft splits and few rules beside models that people read; functions that are planted.
 
-Chosen before anything was fitted. Real sets are judged in the folds of ``real_sets``, planted
-functions on 2,000 fresh rows, the noise that fresh targets have included.
+All were chosen before anything was fitted. Real sets are judged in the folds of ``real_sets``,
+planted functions on 2,000 new rows. Errors include the noise that new targets would have.
 """
 
 from dataclasses import dataclass
