@@ -227,7 +227,7 @@ def check_values(values, part, allow_missing=False):
         return
     row = int(np.argmax(bad))
     if part in LABELS:
-        raise LogError(f"no label ({bad.sum()} such rows).", part, row)
+        raise LogError(f"the label is missing ({bad.sum()} such rows); fill it in.", part, row)
     kind = "is missing" if missing[row] else "is infinite"
     raise LogError(
         f"the value {kind} ({bad.sum()} such in {bad.size} rows); drop these rows.", part, row
@@ -266,7 +266,7 @@ def _check_output_follows_rate(log, units):
             told = f"all values are {values[0]:g}, which tells no scale factor. {advice}"
             raise LogError(told, part)
     if np.array_equal(output, rate):
-        raise LogError(f"equals the {RATE_COLUMN}: one of them is the wrong one.", "output")
+        raise LogError(f"equals the {RATE_COLUMN}: one of them is not that.", "output")
     _check_stuck(output, rate)
     correlation = np.corrcoef(output, rate)[0, 1]
     if abs(correlation) < _LEAST_CORRELATION:
@@ -290,8 +290,8 @@ def _check_output_follows_rate(log, units):
             if 0.7 < slope * ratio**power < 1.4:
                 told = f"is the {part} in {unit}?"
     raise LogError(
-        f"changes by {slope:.4g} deg/s per deg/s of rate: {told} A raw signal, whose scale factor "
-        "and sign are found, is declared as counts (units: output=counts).",
+        f"changes by {slope:.4g} deg/s per deg/s of rate: {told} If it is a raw signal, say so "
+        "(units: output=counts): then its scale factor and sign are found.",
         "output",
     )
 

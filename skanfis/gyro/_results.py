@@ -49,7 +49,10 @@ _PICTURES = {
         ResidualSurfaceDisplay,
         "Mean residual and number of rows over temperature and rate.",
     ),
-    "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group; no dot: not in range."),
+    "held-out-groups": (
+        GroupResidualDisplay,
+        "RMS error by held-out group. One without rows in range has no dot.",
+    ),
     "allan-deviation": (
         AllanDisplay,
         "Allan deviation of the error, over stretches in range without a gap. It is the root of "

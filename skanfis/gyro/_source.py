@@ -10,6 +10,7 @@ from itertools import islice
 import numpy as np
 import pandas as pd
 
+from ..inspection.text import counted
 from ._columns import unit_in
 from ._tables import EXCEL, HEAD_ROWS, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
 from .errors import LogError
@@ -101,9 +102,7 @@ class _TextSource:
         self._n_above = first
         self._n_lines = head[first][0] - 1 if first < len(head) else None
         if place:
-            self.notes.append(
-                f"the header is line {head[place][0]}; {place} lines above it are passed over"
-            )
+            self.notes.append(f"the header is line {head[place][0]}; what is above it is skipped")
 
     def _check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut silently."""
@@ -114,8 +113,8 @@ class _TextSource:
         for line, values in islice(self._records(), self._n_above, None):
             if len(values) > n_columns and "".join(values[n_columns:]).strip():
                 raise LogError(
-                    f"{self.path}, line {line}: has {len(values)} values, more than the "
-                    f"{n_columns} columns of the header."
+                    f"{self.path}, line {line}: has {counted(len(values), 'value')}, "
+                    f"and the header {counted(n_columns, 'column')}."
                 )
 
     def _records(self):
@@ -155,8 +154,8 @@ class _TextSource:
         for number, line in enumerate(iter(partial(file.readline, _LONGEST_LINE), ""), 1):
             if len(line) == _LONGEST_LINE:
                 raise LogError(
-                    f"{self.path}, line {number}: is longer than {_LONGEST_LINE:,} signs; that is "
-                    "no log."
+                    f"{self.path}, line {number}: is longer than {_LONGEST_LINE:,} characters: "
+                    "that is no log."
                 )
             yield line
 

@@ -180,7 +180,10 @@ def _recipe(options, reading, at_rest):
         )
     is_open = unit in SIGNALS and reading.log["rate"].nunique() == 1
     if options.scale_factor is not None and not is_open:
-        raise UsageError("--scale-factor is for a raw signal at one rate: else the rates tell it.")
+        raise UsageError(
+            "--scale-factor is only for a raw signal in a log with one rate. Leave it out: several "
+            "rates tell it."
+        )
     if is_open and options.scale_factor is None:
         raise LogError(
             f"is in {unit}, and one rate, as at rest, does not tell its scale factor. Give that of "

@@ -316,7 +316,7 @@ class LogFile:
         counts = ", ".join(f"{name!r} in {n:,}" for name, n in names.items())
         said = f"{self.path}: {bad.sum():,} of {bad.size:,} rows lack a value ({counts})"
         if 2 * bad.sum() > bad.size:
-            raise LogError(f"{said}: too many to go on without them.")
+            raise LogError(f"{said}: too many to leave out. Fill them in, or name other columns.")
         place = self.source.place_of(int(bad.idxmax()))
         self.notes.append(f"{said}; they are left out, the first of them {place}")
 
@@ -325,7 +325,7 @@ class LogFile:
         if part == "time" and not np.isfinite(numbers).any():
             self._form = clock_form(column)
             if self._form:
-                self.notes.append(f"the time is read in s, its form is {self._form}")
+                self.notes.append(f"the time is read in s, from texts of the form {self._form}")
         form = self._form if part == "time" else ""
         numbers = as_numbers(column, form=form) if form else numbers
         bad = np.isnan(numbers)

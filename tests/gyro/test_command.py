@@ -184,7 +184,7 @@ def test_progress_and_summary(tmp_path, log, say, monkeypatch):
     code, out, err = say("l*.csv", "--inputs", "temperature", "output", "--limits", *limits)
     # All is written, and a limit is not kept.
     assert code == 6
-    assert "specification  1 of 2 limits are kept; not kept: residual rms" in out
+    assert "specification  1 of 2 limits kept; not kept: residual rms" in out
     assert (tmp_path / "log-compensator" / "report.html").exists()
     for text in ("reading", "270 rows, 3 runs", "fold 3 of 3", "done"):
         assert text in err
@@ -243,7 +243,7 @@ def largest_number(log):
 @pytest.mark.parametrize(
     ("spoil", "typed", "message"),
     [
-        (groups_apart, f"{SMALL} --groups run", "every row lies outside the range"),
+        (groups_apart, f"{SMALL} --groups run", "lies outside the range of the other"),
         (
             largest_number,
             "--units output=counts",
@@ -263,7 +263,7 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
 @pytest.mark.parametrize(
     ("typed", "message"),
     [
-        ("--columns time", "'time' must be of the form PART=..."),
+        ("--columns time", "'time' must be of the form PART=NAME."),
         ("--columns speed=v", "columns: there is no 'speed'"),
         ("--columns time=a time=b", "time is given twice"),
         ("--units time=year", "time has no unit 'year'"),
@@ -280,13 +280,13 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
         ("--terms 99999999,1,1,1", "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
         (f"--terms {'9' * 9000}", "must be search, or numbers"),
         ("--inputs time time", "--inputs: time is given twice"),
-        ("--scale-factor 131", "is for a raw signal at one rate"),
-        ("--target px4", "'px4' must be one of: in C table"),
-        ("--target ardupilot:x:0", "(1 to 3)"),
+        ("--scale-factor 131", "is only for a raw signal in a log with one rate"),
+        ("--target px4", "'px4' must be one of: table[:TYPE], in C"),
+        ("--target ardupilot:x:0", "from 1 to 3"),
         ("--target table table:q15", "--target: table is given twice"),
         ("--limits bias=5", "bias takes deg/s or deg/h; found ''"),
-        ("--apply m --terms 1 --write law", "--terms, --write: of no use with --apply."),
-        ("--apply m --scale-factor 3", "--scale-factor: of no use with --apply."),
+        ("--apply m --terms 1 --write law", "--terms, --write: for a calibration only."),
+        ("--apply m --scale-factor 3", "--scale-factor: for a calibration only."),
     ],
 )
 def test_options_that_make_no_sense(tmp_path, log, typed, message, run):
@@ -436,9 +436,9 @@ def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_p
     code, said, _ = run(log, "--terms 3,1 --scale-factor 131")
     assert code == 0
     assert "pieces of the legs" in said
-    assert "whether a cycle repeats, so few cannot show" in said
+    assert "so few cycles cannot show whether they repeat" in said
     # What is safe is written, and pieces have one number.
-    assert "One cycle cannot tell whether this repeats; until then a constant is safe" in said
+    assert "Use a constant: one thermal cycle cannot show whether more would repeat" in said
     assert "record two more" in said
     assert "2 legs, 5 pieces of each" in said
     assert "written is     a constant, as recommended" in said

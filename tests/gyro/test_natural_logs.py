@@ -85,7 +85,7 @@ def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth
     with pytest.raises(LogError, match="line 212, column 'time': the value is missing"):
         found(tmp_path / "log.csv", guess=False)
     table.loc[100:, "rate"] = ""
-    with pytest.raises(LogError, match=r"rows lack a value .* too many to go on"):
+    with pytest.raises(LogError, match=r"rows lack a value .* too many to leave out"):
         found_in(tmp_path, table)
 
 
@@ -271,7 +271,7 @@ def test_a_file_of_labview(tmp_path, truth):
     reading = found(tmp_path / "log.lvm")
     same(reading, truth)
     np.testing.assert_allclose(reading.log["time"], truth["clock"])
-    assert "the header is line 17; 16 lines above it are passed over" in reading.notes
+    assert "the header is line 17; what is above it is skipped" in reading.notes
     assert reading.units["time"] == "s"
     assert "time" not in reading.assumed
 
@@ -312,7 +312,7 @@ def test_a_file_of_matlab(tmp_path, truth, how):
     reading = found(path)
     same(reading, truth)
     np.testing.assert_allclose(reading.log["time"], truth["clock"])
-    assert "variables of another length are passed over: fs, other" in "; ".join(reading.notes)
+    assert "variables of another length are skipped: fs, other" in "; ".join(reading.notes)
     assert reading.name_row(3).endswith("row 3")
 
 
@@ -331,7 +331,7 @@ def test_a_file_of_excel_with_lines_above_the_header(tmp_path, truth):
     np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-5)
     assert reading.name_row(0).endswith("row 4")
     assert reading.assumed == {}
-    for told in ("of 2 sheets 'data' is read", "2 rows above the header are passed over"):
+    for told in ("of 2 sheets 'data' is read", "the header is row 3; what is above it is skipped"):
         assert told in reading.notes
 
 
