@@ -37,6 +37,10 @@ _LEAST_CORRELATION = 0.9  # of output and rate
 # An output is saturated if at least this many rows have its largest or smallest value, at rates
 # that differ by more than this part of their range.
 _FEWEST_SATURATED, _SATURATED = 3, 0.02
+# An output at rest is stuck if it keeps one value in this many rows on end, although in this share
+# of the rows its noise turns back by two steps of its resolution. Rounded white noise with such a
+# share keeps a value in 15 rows at most, of 400,000; so do counts of pulses.
+_FEWEST_AT_REST, _NOISY = 50, 0.2
 # Placeholder in messages: if a file was read, ``LogFile.located`` puts in the column's name.
 RATE_COLUMN = "column of the rate"
 
@@ -121,6 +125,8 @@ def check_log(
             )
     if "output" in inputs and "rate" in log:
         _check_output_follows_rate(log, units)
+    if "output" in log and ("rate" not in log or log["rate"].nunique() == 1):
+        _check_stuck_at_rest(log["output"].to_numpy())
     return log
 
 
@@ -307,12 +313,32 @@ def _check_stuck(output, rate):
 
     Its largest and smallest value do not count: there it is saturated, or not the gyro's column.
     """
-    starts = np.flatnonzero(np.diff(output, prepend=np.nan) != 0.0)
-    lengths = np.diff(starts, append=output.size)
+    starts, lengths = _stretches(output)
     is_between = (output.min() < output[starts]) & (output[starts] < output.max())
     long = (lengths >= _FEWEST_ROWS) & is_between
     stretches = map(np.arange, starts[long], (starts + lengths)[long])
     _check_standing(output, rate, stretches, "rows on end", "stuck")
+
+
+def _check_stuck_at_rest(output):
+    """Raise LogError if the output keeps one value, row after row, and its noise is far larger."""
+    steps, (starts, lengths) = np.diff(output), _stretches(output)
+    smallest = np.abs(steps[steps != 0.0]).min(initial=np.inf)
+    is_noise = (steps[1:] * steps[:-1] < 0.0) & (np.abs(steps[1:]) > 1.5 * smallest)
+    longest = lengths.argmax()
+    if lengths[longest] >= _FEWEST_AT_REST and is_noise.mean() > _NOISY:
+        raise LogError(
+            f"stands at {output[starts[longest]]:.6g} in {lengths[longest]} rows on end, and has "
+            "noise in the others: it is stuck. Leave these rows out.",
+            "output",
+            int(starts[longest]),
+        )
+
+
+def _stretches(values):
+    """First rows and lengths of stretches of equal values."""
+    starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    return starts, np.diff(starts, append=values.size)
 
 
 def _check_standing(output, rate, places, rows, what):

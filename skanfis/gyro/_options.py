@@ -62,7 +62,8 @@ exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
   5  a target was refused; all else is written
-  6  all is written; a limit is not met, or could not be measured    130  interrupted by Ctrl-C
+  6  all is written; a limit is not met, or could not be measured
+  130  interrupted by Ctrl-C    141  nobody reads the output any more, as behind a pipe to head
 """
 
 

@@ -29,7 +29,7 @@ _VALUE = re.compile(r"[+\u2212-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
 _FRACTION = re.compile(r"[+\u2212-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
 
 CLOCK = "hours:minutes:seconds"
-_DATES = "%d.%m.%Y %d.%m.%y %d-%m-%Y %d-%b-%Y %m/%d/%Y %m/%d/%y %d/%m/%Y %Y/%m/%d"
+_DATES = "%d.%m.%Y %d.%m.%y %d-%m-%Y %d-%b-%Y %m/%d/%Y %m/%d/%y %d/%m/%Y %d/%m/%y %Y/%m/%d"
 _FORMATS = [
     CLOCK,
     "ISO8601",

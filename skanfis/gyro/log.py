@@ -323,9 +323,10 @@ class LogFile:
     def _numbers(self, column, part):
         numbers = as_numbers(column, self.source.decimal)
         if part == "time" and not np.isfinite(numbers).any():
-            self._form = clock_form(column)
+            self._form, open_still = _settled_date(column, clock_form(column))
             if self._form:
-                self.notes.append(f"the time is read in s, from texts of the form {self._form}")
+                told = f"the time is read in s, from texts of the form {self._form}"
+                self.notes.append(told + open_still)
         form = self._form if part == "time" else ""
         numbers = as_numbers(column, form=form) if form else numbers
         bad = np.isnan(numbers)
@@ -351,6 +352,17 @@ class LogFile:
         rate = f"column {self.layout.name('rate')!r} of the rate"
         reason = error.reason.replace(RATE_COLUMN, rate)
         return LogError(f"{where}, column {name!r}{part}: {reason}")
+
+
+def _settled_date(column, form):
+    """The time format, with month or day first as all rows tell; a clause if they do not tell."""
+    if "%m/%d" not in form:
+        return form, ""
+    forms = form, form.replace("%m/%d", "%d/%m")
+    month_first, day_first = (np.isfinite(as_numbers(column, form=one)).sum() for one in forms)
+    if day_first == month_first:
+        return form, " (%d/%m would fit as well: if the day is first, write dates as 2024-12-31)"
+    return forms[int(day_first > month_first)], ""
 
 
 def _joined_by_clock(table, runs, paths):

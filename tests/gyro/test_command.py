@@ -210,15 +210,20 @@ def test_physics_and_policy(tmp_path, log, run):
     assert (hot["status"] == 1 + 8).all()
 
 
-def test_targets_are_written_or_refused_by_name(tmp_path, log, run):
+def test_targets_are_written_or_refused_by_name(tmp_path, log, run, monkeypatch):
     typed, out = f"{SMALL} --quiet --write line", tmp_path / "out"
-    both = "--inputs temperature output --terms 1,1 --physics --write rules"
-    code, told, _ = run(log, f"{both} --target rate-table --target px4:x --target table")
-    assert code == 5
+    both = "--inputs temperature output --terms 1,1 --physics --write rules --target rate-table"
+    code, told, err = run(log, f"{both} px4:x")
+    # Before the calibration.
+    assert (code, "checking" in err) == (2, False)
+    assert "px4:x: needs a model with the inputs temperature; it would have temperature out" in err
+    code, told, _ = run(log, both)
+    assert code == 0
     assert "target         rate-table: it differs from the model by " in told
-    for name in ("px4:x", "table"):
-        assert f"REFUSED        {name}: the model needs temperature and output, and this" in told
     assert names_in(out) == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
+    monkeypatch.setattr("skanfis.gyro.targets.write._MOST_TIMES", 0.5)
+    code, told, _ = run(log, f"{both} --force")
+    assert (code, "REFUSED        rate-table: it leaves " in told) == (5, True)
     # What an earlier run has written goes with it, what is not the command's stays.
     for name in ("compensator.c", "px4.params", "notes.txt"):
         (out / name).write_text("old")
@@ -301,7 +306,7 @@ def test_help_names_every_option(say):
     assert code == 0
     for text in ("exit codes", "--apply MODEL", *make_parser()._option_string_actions):
         assert text in told
-    codes = (command.REFUSED, command.EXISTS, command.INCOMPLETE, command.NOT_KEPT)
+    codes = (command.REFUSED, command.EXISTS, command.INCOMPLETE, command.NOT_KEPT, command.CLOSED)
     assert all(f"\n  {code}  " in told or f"    {code}  " in told for code in codes)
 
 
@@ -340,6 +345,39 @@ def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, 
     (out / "report.html").write_text("old")
     assert run(log, f"{SMALL} --force", out)[0] == 1
     assert [(p.name, p.read_text()) for p in out.iterdir()] == [("report.html", "old")]
+
+
+def test_a_failure_while_files_are_moved_leaves_those_of_before(
+    tmp_path, log, calibrated, monkeypatch, run
+):
+    out, typed = tmp_path / "out", f"{SMALL} --quiet --force --write line"
+    assert run(log, f"{typed} --c c99")[0] == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    move, moves = os.replace, []
+
+    def fail(*places):
+        moves.append(places)
+        if len(moves) == 6:
+            raise OSError(28, "No space left on device")
+        move(*places)
+
+    monkeypatch.setattr(os, "replace", fail)
+    assert run(log, typed)[0] == 1
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there a closed pipe is another error")
+def test_a_reader_that_goes_away_ends_it_quietly(calibrated, tmp_path, monkeypatch):
+    reader, writer = os.pipe()
+    os.close(reader)
+    model, rates = calibrated / "out" / "compensator.json", tmp_path / "rates.csv"
+    typed = f"{calibrated / 'raw.csv'} --apply {model} {RAW} --columns rate=table --output {rates}"
+    with open(writer, "w") as out, open(tmp_path / "err", "w", 1) as err:
+        monkeypatch.setattr(sys, "stdout", out)
+        monkeypatch.setattr(sys, "stderr", err)
+        assert main(typed.split()) == command.CLOSED
+    assert (tmp_path / "err").read_text().endswith(("done\n", f"writing {rates}\n"))
+    assert rates.exists()
 
 
 def test_a_backend_that_does_not_exist(fresh_process):

@@ -196,6 +196,26 @@ def test_a_log_without_an_input_or_beyond_any_converter_is_refused(log):
             check_log(scaled("output", factor)(log), units={"output": "counts"})
 
 
+def test_a_gyro_at_rest_that_is_stuck_is_told_from_one_of_a_coarse_output():
+    rng, n_rows = np.random.default_rng(0), 6000
+    temperature = 20.0 + 40.0 * np.sin(np.arange(n_rows) / 600.0)
+    log = pd.DataFrame({"time": np.arange(n_rows), "temperature": temperature})
+    noise, bias = rng.normal(size=n_rows), 0.05 * temperature
+    stuck = bias + noise
+    stuck[2000:2200] = 7.0
+    for decimals in (9, 0):
+        with pytest.raises(LogError, match="in 200 rows on end, and has noise") as caught:
+            check_log(log.assign(output=stuck.round(decimals)), inputs=["temperature"])
+        assert (caught.value.column, caught.value.row) == ("output", 2000)
+    for size in (0.0, 0.1, 0.3, 0.5, 1.0):
+        # Rounded values, and a counter of pulses, which are of the angle: in 200 rows on end both
+        # may be equal.
+        coarse = (bias + size * noise).round()
+        pulses = np.diff(np.floor(np.cumsum(bias + size * noise)), prepend=0.0)
+        for output in (coarse, pulses):
+            check_log(log.assign(output=output), inputs=["temperature"])
+
+
 def test_a_log_at_rest_is_told_from_one_that_moves(log):
     at_rest = make_ofog(n_devices=1, n_runs=3, rates=[0.0], profile="ramps", random_state=0)
     check_at_rest(at_rest, "deg/s")

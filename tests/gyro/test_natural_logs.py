@@ -243,6 +243,30 @@ def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
     assert "time = 'Time' on 'Date'; " in "; ".join(reading.notes)
 
 
+@pytest.mark.parametrize(
+    ("start", "form", "told"),
+    [
+        # A first file that ends before the 13th leaves it open; a midnight later on may not.
+        ("2024-06-01", "%m/%d/%Y", "the form %m/%d/%Y %H:%M:%S (%d/%m would fit as well: "),
+        ("2024-06-12", "%d/%m/%Y", "the form %d/%m/%Y %H:%M:%S"),
+        ("2024-06-12", "%m/%d/%y", "the form %m/%d/%y %H:%M:%S"),
+        ("2024-06-13", "%d/%m/%y", "the form %d/%m/%y %H:%M:%S"),
+    ],
+)
+def test_whether_month_or_day_comes_first_is_told(tmp_path, truth, start, form, told):
+    clock = np.arange(300) + (0.0 if start == "2024-06-01" else 86_400 - 250)
+    moment = pd.Timestamp(start) + pd.to_timedelta(clock, unit="s")
+    table = truth[["temperature", "output", "rate"]].assign(
+        Time=moment.strftime(f"{form} %H:%M:%S")
+    )
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    assert (np.diff(reading.log["time"]) == 1.0).all()
+    [note] = [note for note in reading.notes if "is read in s" in note]
+    assert told in note
+    assert ("as well" in note) == ("as well" in told)
+
+
 LVM = """LabVIEW Measurement\t
 Writer_Version\t2
 Separator\tTab

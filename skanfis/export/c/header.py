@@ -124,10 +124,10 @@ def _precision_lines(numbers):
 
 def header_of(title, lines, dialect, n_inputs, n_outputs, include=""):
     """A header whose first comment has these lines; ``include`` is a line of code."""
-    facts = [part for line in lines for part in textwrap.wrap(line, 95, break_on_hyphens=False) or [""]]
+    wrapped = (textwrap.wrap(line, 95, break_on_hyphens=False) or [""] for line in lines)
     return dialect.write(
         _CODE.replace("$status_lines", status_lines()),
-        facts="\n".join(f" * {line}".rstrip() for line in facts),
+        facts="\n".join(f" * {line}".rstrip() for parts in wrapped for line in parts),
         title=title,
         n_inputs=n_inputs,
         n_outputs=n_outputs,
