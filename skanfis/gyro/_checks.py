@@ -84,7 +84,8 @@ def check_log(
     ------
     LogError
         If a column of the inputs or a value is missing, a value is implausible, time does not
-        increase within a run, a range is too small, or the output does not follow the rate.
+        increase within a run, a range is too small, or the output is stuck or does not follow the
+        rate.
 
     Examples
     --------

@@ -63,7 +63,7 @@ def header(source, units, notes):
     lowest, highest = np.clip(model.output_limits, *asked)
     lines = [
         *map(remark, [notes] if isinstance(notes, str) else notes),
-        f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
+        f"Rules: {model.n_rules}, of order {model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(source.cost),
         "",
         *input_lines(model.input_names, numbers.low, numbers.high, units),

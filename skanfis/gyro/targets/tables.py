@@ -173,14 +173,14 @@ class Table:
             pairs = enumerate(zip(self.names, self.scale, strict=True))
             inputs = ", ".join(f"x[{k}] is {name} / {_shown(scale)}" for k, (name, scale) in pairs)
             lines.append(
-                f"Fixed point: {inputs}, rounded by the caller, who saturates it to {-2 * one} and "
+                f"Fixed point: {inputs}, rounded by the caller and held within {-2 * one} and "
                 f"{2 * one - 1}. The error is y[0] * {_shown(self.unit)} deg/s. No sum or product "
                 "overflows: nothing else is saturated."
             )
         else:
             lines.append("A row with an input that is not finite gets no output.")
         include = "#include <stdint.h>" if bits else ""
-        header = header_of("The error of a gyro", lines, dialect, d, 1, include)
+        header = header_of("A table of the error of a gyro", lines, dialect, d, 1, include)
         return SimpleNamespace(name=dialect.name, header=header, source="\n".join(source))
 
     def _answers(self):

@@ -68,8 +68,8 @@ def _write(calibration, text, folder):
     if name == "px4":
         edges = spread(made.piecewise.ends).T
         steepest = np.abs(made.piecewise.ranges(edges[:, :-1], edges[:, 1:])[1]).max()
-        worth += f"; PX4, which holds it for up to 1 degC, adds {steepest:.4g} deg/s at most"
-    notes = [f"In the place of the model in compensator.json: {worth}.", *notes_on(compensator)[1:]]
+        worth += f"; PX4, which updates it every 1 degC, adds {steepest:.4g} deg/s at most"
+    notes = [f"This replaces the model in compensator.json: {worth}.", *notes_on(compensator)[1:]]
     if is_code:
         use = f"{SUBTRACT} {raw_rate_of(compensator)}"
         write_files(
