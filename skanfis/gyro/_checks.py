@@ -37,9 +37,8 @@ _LEAST_CORRELATION = 0.9  # of output and rate
 # An output is saturated if at least this many rows have its largest or smallest value, at rates
 # that differ by more than this part of their range.
 _FEWEST_SATURATED, _SATURATED = 3, 0.02
-# An output at rest is stuck if it keeps one value in this many rows on end, although in this share
-# of the rows its noise turns back by two steps of its resolution. Rounded white noise with such a
-# share keeps a value in 15 rows at most, of 400,000; so do counts of pulses.
+# An output at rest is stuck if it keeps one value in so many rows on end, and noise turns back by
+# two steps of its resolution in such a share of all: chance alone gives 15 rows at most in 400,000.
 _FEWEST_AT_REST, _NOISY = 50, 0.2
 # Placeholder in messages: if a file was read, ``LogFile.located`` puts in the column's name.
 RATE_COLUMN = "column of the rate"
@@ -84,8 +83,7 @@ def check_log(
     ------
     LogError
         If a column of the inputs or a value is missing, a value is implausible, time does not
-        increase within a run, a range is too small, or the output is stuck or does not follow the
-        rate.
+        increase within a run, a range is too small, or the output is stuck or off the rate.
 
     Examples
     --------
@@ -101,8 +99,7 @@ def check_log(
     """
     units = CANONICAL | declared_units(units)
     if len(log) < _FEWEST_ROWS:
-        rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
-        raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
+        raise LogError(f"the log has {counted(len(log), 'row')}; it takes {_FEWEST_ROWS}.")
     for part in columns_of(inputs):
         if part not in log:
             raise LogError(f"the log has no {part}.")
@@ -328,12 +325,9 @@ def _check_stuck_at_rest(output):
     is_noise = (steps[1:] * steps[:-1] < 0.0) & (np.abs(steps[1:]) > 1.5 * smallest)
     longest = lengths.argmax()
     if lengths[longest] >= _FEWEST_AT_REST and is_noise.mean() > _NOISY:
-        raise LogError(
-            f"stands at {output[starts[longest]]:.6g} in {lengths[longest]} rows on end, and has "
-            "noise in the others: it is stuck. Leave these rows out.",
-            "output",
-            int(starts[longest]),
-        )
+        row = int(starts[longest])
+        told = f"stands at {output[row]:.6g} in {lengths[longest]} rows on end, and has noise in "
+        raise LogError(f"{told}the others: it is stuck. Leave these rows out.", "output", row)
 
 
 def _stretches(values):

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from .. import __version__
+from ..export.limits import shown
 from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
@@ -20,7 +21,7 @@ from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
 from .displays import signs
-from .errors import UsageError, shortened
+from .errors import UsageError
 from .metrics import ALLAN_FIGURES, figures_of_merit
 
 PROGRAM = "python -m skanfis.gyro"
@@ -39,9 +40,8 @@ _TARGETS = (
     "gyro, from 0 to 3 for PX4 and from 1 to 3 for ArduPilot"
 )
 _OF_OUTSIDE = (
-    "what a row outside the range of the calibration gets, which is flagged: clip holds the value "
-    "at the edge; linear (default) follows the tangent for a while, but holds a cubic; nan gives "
-    "no rate"
+    "what rows outside the range get, which are flagged: clip holds the value at the edge; linear "
+    "(default) follows the tangent for a while, but holds a cubic; nan gives no rate"
 )
 _WHAT = """\
 Calibrate a gyro from its logs. The command learns the error, indicated minus true rate, from what
@@ -167,7 +167,7 @@ def check_once(option, names):
 
 def _target(text):
     if not _TARGET.fullmatch(text):
-        raise ArgumentTypeError(f"{shortened(text)} must be one of: {_TARGETS}")
+        raise ArgumentTypeError(f"{shown(text)} must be one of: {_TARGETS}")
     return text
 
 
@@ -177,7 +177,7 @@ def _scale_factor(text):
         value = float(text)
     if not 1e-30 <= abs(value) <= 1e30:
         raise ArgumentTypeError(
-            f"{shortened(text)} must be a number from 1e-30 to 1e30, or such a negative one"
+            f"{shown(text)} must be a number from 1e-30 to 1e30, or such a negative one"
         )
     return value
 
@@ -189,13 +189,12 @@ def _terms(text):
     with contextlib.suppress(ValueError):
         numbers = tuple(int(part) for part in text.split(","))
     if not numbers or min(numbers) < 1:
-        raise ArgumentTypeError(f"{shortened(text)} must be search, or numbers such as 2,3,3")
+        raise ArgumentTypeError(f"{shown(text)} must be search, or numbers such as 2,3,3")
     n_rules = math.prod(numbers)
     if n_rules > _MOST_RULES:
         made = f"{n_rules:,}" if n_rules < 10**15 else "too many"
         raise ArgumentTypeError(
-            f"{shortened(text, str)} makes {made} rules; at most {_MOST_RULES} are learnt. Use "
-            "fewer terms"
+            f"{shown(text)} makes {made} rules; at most {_MOST_RULES} are learnt. Use fewer terms"
         )
     return numbers
 

@@ -49,10 +49,7 @@ _PICTURES = {
         ResidualSurfaceDisplay,
         "Mean residual and number of rows over temperature and rate.",
     ),
-    "held-out-groups": (
-        GroupResidualDisplay,
-        "RMS error by held-out group. One without rows in range has no dot.",
-    ),
+    "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group. No dot: out of range."),
     "allan-deviation": (
         AllanDisplay,
         "Allan deviation of the error, over stretches in range without a gap. It is the root of "

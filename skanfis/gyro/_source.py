@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..inspection.text import counted
-from ._columns import unit_in
+from ._columns import evenly_chosen, unit_in
 from ._tables import EXCEL, HEAD_ROWS, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
 from .errors import LogError
 
@@ -273,8 +273,10 @@ def as_numbers(column, decimal=".", form=""):
 
 
 def clock_form(column):
-    """The time format of most of a column's first texts; empty if they are no times."""
-    texts = _plain(column).dropna()[:_CLOCK_ROWS]
+    """The time format of most of a column's texts; empty if they are no times."""
+    # To the last row: the 13th of a month may tell it from the day.
+    texts = column.dropna()
+    texts = _plain(texts.iloc[evenly_chosen(len(texts), _CLOCK_ROWS)]).dropna()
     fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
     best = max(_FORMATS, key=lambda form: fits[form])
     return best if 2 * fits[best] > len(texts) else ""

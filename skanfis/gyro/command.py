@@ -63,9 +63,8 @@ def main(arguments=None):
         parser.error(printable(error))  # exits
     except BrokenPipeError:
         # As Python's "Note on SIGPIPE" advises: else what is left to flush fails again at the end.
-        nowhere = os.open(os.devnull, os.O_WRONLY)
         for stream in (sys.stdout, sys.stderr):
-            os.dup2(nowhere, stream.fileno())
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
         return CLOSED
     except (LogError, ExistsError) as error:
         return _say_error(error, REFUSED if isinstance(error, LogError) else EXISTS)
@@ -185,11 +184,8 @@ def _recipe(options, reading, at_rest):
         raise UsageError(f"{asked}: the arcsine law needs the output among the inputs.")
     for text in options.target:
         if set(inputs) != set(axes_of(text)):
-            axes = " ".join(axes_of(text))
-            raise UsageError(
-                f"--target {text}: needs a model with the inputs {axes}; it would have "
-                f"{' '.join(inputs)}. Give --inputs {axes}, or leave out this target."
-            )
+            told = f"--target {text} needs --inputs {' '.join(axes_of(text))}"
+            raise UsageError(f"{told}; the model would have {', '.join(inputs)}.")
     if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
         raise UsageError(
             f"--terms has {counted(len(options.terms), 'number')} for "
@@ -197,10 +193,7 @@ def _recipe(options, reading, at_rest):
         )
     is_open = unit in SIGNALS and reading.log["rate"].nunique() == 1
     if options.scale_factor is not None and not is_open:
-        raise UsageError(
-            "--scale-factor is only for a raw signal in a log with one rate. Leave it out: several "
-            "rates tell it."
-        )
+        raise UsageError("--scale-factor is only for a raw signal at one rate. Leave it out.")
     if is_open and options.scale_factor is None:
         raise LogError(
             f"is in {unit}, and one rate, as at rest, does not tell its scale factor. Give that of "
@@ -354,11 +347,9 @@ def _staged(folder, replaced=()):
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=_STAGED, dir=folder) as name:
-            new, old = Path(name, "new"), Path(name, "old")
-            new.mkdir()
-            old.mkdir()
+            new, old = (Path(tempfile.mkdtemp(dir=name)) for _ in range(2))
             yield new
-            _exchange({*replaced, *(path.name for path in new.iterdir())}, new, folder, old)
+            _exchange({*replaced, *os.listdir(new)}, new, folder, old)
     except BaseException:
         for path in made:
             with contextlib.suppress(OSError):  # another program has put something there

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..export.limits import shown
 from ..inspection.text import counted
 from ..naming import distinct
 from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
@@ -23,7 +24,7 @@ from ._columns import SIGNALS, convert
 from ._guess import Request, settle
 from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_source
 from ._units import assumed_text, settle_by_all
-from .errors import LogError, shortened
+from .errors import LogError
 
 # A gap between two runs is at least this long, and this many steps: more than a logger drops.
 _SHORTEST_GAP = 60.0  # s
@@ -323,10 +324,12 @@ class LogFile:
     def _numbers(self, column, part):
         numbers = as_numbers(column, self.source.decimal)
         if part == "time" and not np.isfinite(numbers).any():
-            self._form, open_still = _settled_date(column, clock_form(column))
+            self._form = clock_form(column)
             if self._form:
                 told = f"the time is read in s, from texts of the form {self._form}"
-                self.notes.append(told + open_still)
+                if "%m/%d" in self._form:
+                    told += ", the month first (if it is the day, write dates as 2024-12-31)"
+                self.notes.append(told)
         form = self._form if part == "time" else ""
         numbers = as_numbers(column, form=form) if form else numbers
         bad = np.isnan(numbers)
@@ -336,7 +339,7 @@ class LogFile:
         if bad.any():
             row = int(bad.argmax())
             kind = "no time like those before" if form else "not a number"
-            raise LogError(f"{shortened(column.iloc[row])} is {kind}.", part, row)
+            raise LogError(f"{shown(column.iloc[row])} is {kind}.", part, row)
         is_in_seconds = form or column.dtype.kind in "mM"
         return numbers if is_in_seconds else convert(numbers, self.layout.units[part])
 
@@ -352,17 +355,6 @@ class LogFile:
         rate = f"column {self.layout.name('rate')!r} of the rate"
         reason = error.reason.replace(RATE_COLUMN, rate)
         return LogError(f"{where}, column {name!r}{part}: {reason}")
-
-
-def _settled_date(column, form):
-    """The time format, with month or day first as all rows tell; a clause if they do not tell."""
-    if "%m/%d" not in form:
-        return form, ""
-    forms = form, form.replace("%m/%d", "%d/%m")
-    month_first, day_first = (np.isfinite(as_numbers(column, form=one)).sum() for one in forms)
-    if day_first == month_first:
-        return form, " (%d/%m would fit as well: if the day is first, write dates as 2024-12-31)"
-    return forms[int(day_first > month_first)], ""
 
 
 def _joined_by_clock(table, runs, paths):

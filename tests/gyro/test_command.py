@@ -216,7 +216,7 @@ def test_targets_are_written_or_refused_by_name(tmp_path, log, run, monkeypatch)
     code, told, err = run(log, f"{both} px4:x")
     # Before the calibration.
     assert (code, "checking" in err) == (2, False)
-    assert "px4:x: needs a model with the inputs temperature; it would have temperature out" in err
+    assert "--target px4:x needs --inputs temperature; the model would have temperature, out" in err
     code, told, _ = run(log, both)
     assert code == 0
     assert "target         rate-table: it differs from the model by " in told
@@ -282,10 +282,10 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
             "--write law-line: the arcsine law needs the output",
         ),
         ("--inputs rate", "invalid choice: 'rate'"),
-        ("--terms 99999999,1,1,1", "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
+        ("--terms 99999999,1,1,1", "'99999999,1,1,1' makes 99,999,999 rules; at most 500"),
         (f"--terms {'9' * 9000}", "must be search, or numbers"),
         ("--inputs time time", "--inputs: time is given twice"),
-        ("--scale-factor 131", "is only for a raw signal in a log with one rate"),
+        ("--scale-factor 131", "is only for a raw signal at one rate"),
         ("--target px4", "'px4' must be one of: table[:TYPE], in C"),
         ("--target ardupilot:x:0", "from 1 to 3"),
         ("--target table table:q15", "--target: table is given twice"),

@@ -153,7 +153,7 @@ def scaled(part, factor):
         (scaled("time", 1e6), "time", None, "smaller unit than s"),
         (scaled("time", 1e-4), "time", None, "larger unit than s"),
         (lambda log: log[log["run"] == 0], "temperature", None, "at least 10 degC"),
-        (lambda log: log.iloc[:3], None, None, "3 rows are too few"),
+        (lambda log: log.iloc[:3], None, None, "has 3 rows; it takes 20"),
         (lambda log: log.assign(rate=0.0), "rate", None, "leave output out"),
         (lambda log: log.assign(rate=5.0), "rate", None, r"Log at several rates\.$"),
         (

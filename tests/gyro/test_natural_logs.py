@@ -246,10 +246,10 @@ def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
 @pytest.mark.parametrize(
     ("start", "form", "told"),
     [
-        # A first file that ends before the 13th leaves it open; a midnight later on may not.
-        ("2024-06-01", "%m/%d/%Y", "the form %m/%d/%Y %H:%M:%S (%d/%m would fit as well: "),
+        # What ends before the 13th leaves it open; a midnight at the end may tell it.
+        ("2024-06-01", "%d/%m/%Y", "the form %m/%d/%Y %H:%M:%S, the month first (if it is the day"),
         ("2024-06-12", "%d/%m/%Y", "the form %d/%m/%Y %H:%M:%S"),
-        ("2024-06-12", "%m/%d/%y", "the form %m/%d/%y %H:%M:%S"),
+        ("2024-06-12", "%m/%d/%y", "the form %m/%d/%y %H:%M:%S, the month first"),
         ("2024-06-13", "%d/%m/%y", "the form %d/%m/%y %H:%M:%S"),
     ],
 )
@@ -264,7 +264,7 @@ def test_whether_month_or_day_comes_first_is_told(tmp_path, truth, start, form, 
     assert (np.diff(reading.log["time"]) == 1.0).all()
     [note] = [note for note in reading.notes if "is read in s" in note]
     assert told in note
-    assert ("as well" in note) == ("as well" in told)
+    assert ("month first" in note) == ("month first" in told)
 
 
 LVM = """LabVIEW Measurement\t
