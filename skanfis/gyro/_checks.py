@@ -233,9 +233,7 @@ def check_values(values, part, allow_missing=False):
     if part in LABELS:
         raise LogError(f"the label is missing ({bad.sum()} such rows); fill it in.", part, row)
     kind = "is missing" if missing[row] else "is infinite"
-    raise LogError(
-        f"the value {kind} ({bad.sum()} such in {bad.size} rows); drop these rows.", part, row
-    )
+    raise LogError(f"the value {kind} ({bad.sum()} of {bad.size} rows); drop them.", part, row)
 
 
 def _check_plausible(values, part, unit):
@@ -323,10 +321,9 @@ def _check_stuck_at_rest(output):
     steps, (starts, lengths) = np.diff(output), _stretches(output)
     smallest = np.abs(steps[steps != 0.0]).min(initial=np.inf)
     is_noise = (steps[1:] * steps[:-1] < 0.0) & (np.abs(steps[1:]) > 1.5 * smallest)
-    longest = lengths.argmax()
-    if lengths[longest] >= _FEWEST_AT_REST and is_noise.mean() > _NOISY:
-        row = int(starts[longest])
-        told = f"stands at {output[row]:.6g} in {lengths[longest]} rows on end, and has noise in "
+    row, n_rows = int(starts[lengths.argmax()]), lengths.max()
+    if n_rows >= _FEWEST_AT_REST and is_noise.mean() > _NOISY:
+        told = f"stands at {output[row]:.6g} in {n_rows} rows on end, and has noise in "
         raise LogError(f"{told}the others: it is stuck. Leave these rows out.", "output", row)
 
 

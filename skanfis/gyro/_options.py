@@ -84,16 +84,16 @@ def make_parser():
         group.add_argument(name, help=told, **settings)
 
     group = parser.add_argument_group("reading the log")
-    told = "text with a header (CSV, .lvm), .mat, .xlsx or Parquet; several files are several runs"
+    told = "text with a header (CSV, .lvm), .mat, .xlsx or Parquet; one log, or one file a run"
     add("logs", told, nargs="+", metavar="LOG")
     told = f"the column of each part: {', '.join(PARTS)} (default: guessed from names and units)"
     add("--columns", told, metavar="PART=NAME", **several)
     told = f"the unit of each part (default: from the columns' names, or their values). {units}"
     add("--units", told, metavar="PART=UNIT", **several)
-    told = "of a raw signal, such as counts per deg/s; needed only if the log has a single rate"
+    told = "of a raw signal, as in counts per deg/s; needed only if the log has a single rate"
     add("--scale-factor", told, type=_scale_factor)
     group = parser.add_argument_group("the model")
-    told = "of the model (default: all that the log has, but time only with three runs or more)"
+    told = "inputs of the model (default: all in the log, but time only with three runs or more)"
     add("--inputs", told, nargs="+", choices=INPUTS)
     told = "fuzzy terms of each input, such as 2,1,3 (default: search, which finds the rules)"
     add("--terms", told, type=_terms, default="search")
@@ -106,13 +106,13 @@ def make_parser():
     group = parser.add_argument_group("the report")
     add("--serial", "serial number of the gyro", default="")
     add("--operator", "who made the calibration", default="")
-    told = "that the report checks: at most residual_rms=0.01deg/s, at least reduction_factor=10"
+    told = "of the specification: residual_rms=0.01deg/s is the most, reduction_factor=10 the least"
     add("--limits", told, type=parse_limit, metavar="FIGURE=VALUE", **several)
     add("--pdf", "also write the report as report.pdf", action="store_true")
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
-    told = "folder to write (default: LOG-compensator), or with --apply file (LOG-compensated.csv)"
+    told = "folder to write (default: LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
     told = "which compensation: the recommended one (default), the rules, or a simpler one"
     add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
@@ -176,9 +176,7 @@ def _scale_factor(text):
     with contextlib.suppress(ValueError):
         value = float(text)
     if not 1e-30 <= abs(value) <= 1e30:
-        raise ArgumentTypeError(
-            f"{shown(text)} must be a number from 1e-30 to 1e30, or such a negative one"
-        )
+        raise ArgumentTypeError(f"{shown(text)} must be a number of size 1e-30 to 1e30")
     return value
 
 
@@ -193,9 +191,7 @@ def _terms(text):
     n_rules = math.prod(numbers)
     if n_rules > _MOST_RULES:
         made = f"{n_rules:,}" if n_rules < 10**15 else "too many"
-        raise ArgumentTypeError(
-            f"{shown(text)} makes {made} rules; at most {_MOST_RULES} are learnt. Use fewer terms"
-        )
+        raise ArgumentTypeError(f"{shown(text)} makes {made} rules; give at most {_MOST_RULES}")
     return numbers
 
 
@@ -215,9 +211,7 @@ def parse_limit(text):
     """Parse a limit such as ``bias=5deg/h``; ArgumentTypeError if it is none."""
     figure, _, typed = text.partition("=")
     if figure not in _UNITS:
-        raise ArgumentTypeError(
-            f"{text!r} must be FIGURE=VALUE; the figures are {', '.join(_UNITS)}."
-        )
+        raise ArgumentTypeError(f"{text!r} must be FIGURE=VALUE; figures: {', '.join(_UNITS)}.")
     usual, found = _UNITS[figure], _FORM.fullmatch(typed)
     if found is None:
         raise ArgumentTypeError(

@@ -217,9 +217,7 @@ def header_place(rows):
     ]
     first = next(iter(together), data.index(True) if any(data) else start + 1)
     if first == 0:
-        raise LogError(
-            "has numbers where the names of the columns are due; give the file a header."
-        )
+        raise LogError("has numbers where names of columns are due; give the file a header.")
     n_fields = len(rows[first]) if first < len(rows) else len(rows[start])
     fits = [k for k in range(start, first) if len(rows[k]) == n_fields]
     place = fits[-1] if fits else start

@@ -327,9 +327,7 @@ def _refuse_existing(paths, force, read=()):
     """Refuse to replace existing files; with ``force`` only those that are ``read``."""
     for path in paths:
         if any(path.resolve() == Path(other).resolve() for other in read):
-            raise ExistsError(
-                f"{path} is what is read; --force does not replace it: choose another --output."
-            )
+            raise ExistsError(f"{path} is read, and never replaced: choose another --output.")
         if path.is_dir():
             raise ExistsError(f"{path} is a folder: choose another --output.")
         if path.exists() and not force:

@@ -147,10 +147,7 @@ def read(paths, request, *, tell=lambda text: None):
         tell(f"reading {path}" + (f", {number + 1} of {len(paths)}" if len(paths) > 1 else ""))
         files.append(LogFile(path, request, files[0] if files else None))
         for same in [file for file in files[:-1] if file.digest == files[-1].digest]:
-            raise LogError(
-                f"{path}: holds the same bytes as {same.path}; a run that is there twice would be "
-                "tested by itself. Leave one of them out."
-            )
+            raise LogError(f"{path}: holds the same bytes as {same.path}. Leave one of them out.")
         tables.append(files[-1].read().assign(file=np.int32(number)))
     table = pd.concat(tables)
     if table.empty:
@@ -326,10 +323,9 @@ class LogFile:
         if part == "time" and not np.isfinite(numbers).any():
             self._form = clock_form(column)
             if self._form:
-                told = f"the time is read in s, from texts of the form {self._form}"
-                if "%m/%d" in self._form:
-                    told += ", the month first (if it is the day, write dates as 2024-12-31)"
-                self.notes.append(told)
+                self.notes.append(f"the time is read in s, from texts of the form {self._form}")
+            if "%m/%d" in self._form:
+                self.notes.append("dates are read month first; if it is the day, write 2024-12-31")
         form = self._form if part == "time" else ""
         numbers = as_numbers(column, form=form) if form else numbers
         bad = np.isnan(numbers)

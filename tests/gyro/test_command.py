@@ -282,7 +282,7 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
             "--write law-line: the arcsine law needs the output",
         ),
         ("--inputs rate", "invalid choice: 'rate'"),
-        ("--terms 99999999,1,1,1", "'99999999,1,1,1' makes 99,999,999 rules; at most 500"),
+        ("--terms 99999999,1,1,1", "'99999999,1,1,1' makes 99,999,999 rules; give at most 500"),
         (f"--terms {'9' * 9000}", "must be search, or numbers"),
         ("--inputs time time", "--inputs: time is given twice"),
         ("--scale-factor 131", "is only for a raw signal at one rate"),
