@@ -189,10 +189,10 @@ def _check(results):
         blocks.append(Block("text", text))
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
-        'All on the same held-out rows in range. "This model" is the fuzzy rules; how many times '
-        "its RMS error each of the others leaves is the geometric mean over "
-        f"{held_out_groups(calibration)}. Recommended is the simplest compensation, unless a still "
-        "simpler one errs less, or a more elaborate one is better by 2 %, interval included."
+        'All on the same held-out rows in range. "This model" is the fuzzy rules. It is better by as '
+        "many times as the other's RMS error is larger, in the geometric mean over "
+        f"{held_out_groups(calibration)}. Recommended is the simplest compensation that no simpler "
+        "one beats, and no more elaborate one by 2 %, interval included."
     )
     blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
     lines = []
@@ -253,9 +253,9 @@ def _use(results):
         added = f"; in what is added, {policy}" if model.coefficients.any() else ""
         policy = f"{LAW_GOES_ON}{added}"
     text = (
-        f"A row with an input outside its range below is flagged (status 1): {policy}. Of the "
-        "other rows those near which there are hardly any calibration data "
-        f"(coverage below {compensator.min_coverage:g}) are flagged too (status 4). The C code "
+        f"A row with an input outside its range below is flagged (status 1): {policy}. A row "
+        "near which there are hardly any calibration data "
+        f"(coverage below {compensator.min_coverage:g}) is flagged too (status 4). The C code "
         "that --c writes flags the same rows with the same numbers."
     )
     pictures = Block("pictures", list(results.coverage()))
