@@ -189,8 +189,8 @@ def _check(results):
         blocks.append(Block("text", text))
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
-        'All on the same held-out rows in range. "This model" is the fuzzy rules. It is better by as '
-        "many times as the other's RMS error is larger, in the geometric mean over "
+        'All on the same held-out rows in range. "This model" is the fuzzy rules. It is better by '
+        "as many times as the other's RMS error is larger, in the geometric mean over "
         f"{held_out_groups(calibration)}. Recommended is the simplest compensation that no simpler "
         "one beats, and no more elaborate one by 2 %, interval included."
     )
