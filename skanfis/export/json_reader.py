@@ -324,7 +324,7 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     n_rows = np.unique(antecedent.tied).size if found["premises"] else 0
     n_pinned = len(_list(_list(found["pinned"], "posterior.pinned")[0], "posterior.pinned[0]", 0))
     if n_pinned > n_columns + n_rows:
-        raise ValueError(f"posterior.pinned has {n_pinned} rows, more than columns.")
+        raise ValueError(f"posterior.pinned has {n_pinned} rows; {n_columns + n_rows} fit.")
     shapes = {
         "noise": (n_outputs,),
         "consequents": (n_columns * (n_columns + 1) // 2,),

@@ -6,6 +6,8 @@ import numpy as np
 
 # 160 MB: a rule base has rules x terms numbers, consequents rules x (1 + inputs) x outputs.
 MOST_NUMBERS = 20_000_000
+# A model of 27 rules takes 10 kB: enough for thousands of rules, too little to fill the memory.
+MOST_BYTES = 2**24
 # Squares of numbers up to this size, and of their ratios, are finite.
 LARGEST_NUMBER = 1e50
 # Lengths and factors are no smaller, because they are divided by.
@@ -46,7 +48,7 @@ def numbers(values, where, shape):
 
 def shown(value):
     """The value, shortened and safe to print."""
-    text = ascii(value)
+    text = repr(value)
     return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
 
 

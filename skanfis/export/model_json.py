@@ -15,10 +15,7 @@ from ..model import TSKModel
 from ._families import check_own
 from .folding import fold
 from .json_reader import FORMAT, INPUT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
-from .limits import read_bytes
-
-# A model of 27 rules takes 10 kB: enough for thousands of rules, too little to fill the memory.
-_MOST_BYTES = 2**24
+from .limits import MOST_BYTES, read_bytes
 
 
 def export_json(
@@ -97,8 +94,8 @@ def export_json(
     try:
         model_of(document)
         text = _laid_out(document)
-        if (n_bytes := len(text.encode())) > _MOST_BYTES:
-            raise ValueError(f"{n_bytes:,} bytes, of at most {_MOST_BYTES:,}. joblib can keep it.")
+        if (n_bytes := len(text.encode())) > MOST_BYTES:
+            raise ValueError(f"{n_bytes:,} bytes, of at most {MOST_BYTES:,}. joblib can keep it.")
     except ValueError as error:
         raise ValueError(f"cannot write what read_json would refuse: {error}") from None
     if path is not None:
@@ -137,7 +134,7 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
     ...     read_json(path).n_rules
     4
     """
-    data = read_bytes(path, _MOST_BYTES)
+    data = read_bytes(path, MOST_BYTES)
     try:
         return parse_json(data.decode("utf-8"))
     except RecursionError:

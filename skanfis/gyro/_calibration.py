@@ -143,8 +143,8 @@ class Calibration:
         found = list(self.split.cautions)
         if "output" not in self.recipe.inputs and np.abs(self.rate).max() > LARGEST_AT_REST:
             found.append(
-                "the gyro turned, and its output is no input: what is learnt as its bias has the "
-                "error of the scale factor at these rates in it."
+                "the gyro turned, but its output is no input: the bias that is learnt has the "
+                "scale factor error at the rates of this log in it."
             )
         for rows, where in ((self.inside, "in range"), (~self.inside, "out of range")):
             answered = rows & np.isfinite(self.after)
@@ -171,7 +171,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
     glitches = [
-        f"{name_row(row)}: {reason} is supported by no other row; if that is a glitch, drop such "
+        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop such "
         "rows and calibrate again."
         for row, reason in find_glitches(log, before - rate)
     ]
@@ -274,9 +274,9 @@ def _held_out(X, target, groups, split, recipe, tell, rng):
         models.append(model)
     if not (inside & np.isfinite(predicted)).any():
         raise LogError(
-            f"the compensator could not be checked: every row lies outside the range of the rows "
-            f"that the model had seen while its group was held out ({split.kind}). Log groups that "
-            "overlap in temperature, rate and time."
+            f"the compensator could not be checked: every row of a held-out group ({split.kind}) "
+            "lies outside the range of the other groups. Log groups that overlap in temperature, "
+            "rate and time."
         )
     return predicted, inside, folds, models
 

@@ -37,6 +37,9 @@ _LEAST_CORRELATION = 0.9  # of output and rate
 # An output is saturated if at least this many rows have its largest or smallest value, at rates
 # that differ by more than this part of their range.
 _FEWEST_SATURATED, _SATURATED = 3, 0.02
+# An output at rest is stuck if it keeps one value in so many rows on end, and noise turns back by
+# two steps of its resolution in such a share of all: chance alone gives 15 rows at most in 400,000.
+_FEWEST_AT_REST, _NOISY = 50, 0.2
 # Placeholder in messages: if a file was read, ``LogFile.located`` puts in the column's name.
 RATE_COLUMN = "column of the rate"
 
@@ -80,7 +83,7 @@ def check_log(
     ------
     LogError
         If a column of the inputs or a value is missing, a value is implausible, time does not
-        increase within a run, a range is too small, or the output does not follow the rate.
+        increase within a run, a range is too small, or the output is stuck or off the rate.
 
     Examples
     --------
@@ -96,8 +99,7 @@ def check_log(
     """
     units = CANONICAL | declared_units(units)
     if len(log) < _FEWEST_ROWS:
-        rows = "1 row is" if len(log) == 1 else f"{len(log)} rows are"
-        raise LogError(f"{rows} too few; at least {_FEWEST_ROWS} are needed.")
+        raise LogError(f"the log has {counted(len(log), 'row')}; it takes {_FEWEST_ROWS}.")
     for part in columns_of(inputs):
         if part not in log:
             raise LogError(f"the log has no {part}.")
@@ -121,6 +123,8 @@ def check_log(
             )
     if "output" in inputs and "rate" in log:
         _check_output_follows_rate(log, units)
+    if "output" in log and ("rate" not in log or log["rate"].nunique() == 1):
+        _check_stuck_at_rest(log["output"].to_numpy())
     return log
 
 
@@ -227,11 +231,9 @@ def check_values(values, part, allow_missing=False):
         return
     row = int(np.argmax(bad))
     if part in LABELS:
-        raise LogError(f"no label ({bad.sum()} such rows).", part, row)
+        raise LogError(f"the label is missing ({bad.sum()} such rows); fill it in.", part, row)
     kind = "is missing" if missing[row] else "is infinite"
-    raise LogError(
-        f"the value {kind} ({bad.sum()} such in {bad.size} rows); drop these rows.", part, row
-    )
+    raise LogError(f"the value {kind} ({bad.sum()} of {bad.size} rows); drop them.", part, row)
 
 
 def _check_plausible(values, part, unit):
@@ -266,7 +268,7 @@ def _check_output_follows_rate(log, units):
             told = f"all values are {values[0]:g}, which tells no scale factor. {advice}"
             raise LogError(told, part)
     if np.array_equal(output, rate):
-        raise LogError(f"equals the {RATE_COLUMN}: one of them is the wrong one.", "output")
+        raise LogError(f"equals the {RATE_COLUMN}: one of them is not that.", "output")
     _check_stuck(output, rate)
     correlation = np.corrcoef(output, rate)[0, 1]
     if abs(correlation) < _LEAST_CORRELATION:
@@ -290,8 +292,8 @@ def _check_output_follows_rate(log, units):
             if 0.7 < slope * ratio**power < 1.4:
                 told = f"is the {part} in {unit}?"
     raise LogError(
-        f"changes by {slope:.4g} deg/s per deg/s of rate: {told} A raw signal, whose scale factor "
-        "and sign are found, is declared as counts (units: output=counts).",
+        f"changes by {slope:.4g} deg/s per deg/s of rate: {told} If it is a raw signal, say so "
+        "(units: output=counts): then its scale factor and sign are found.",
         "output",
     )
 
@@ -307,12 +309,28 @@ def _check_stuck(output, rate):
 
     Its largest and smallest value do not count: there it is saturated, or not the gyro's column.
     """
-    starts = np.flatnonzero(np.diff(output, prepend=np.nan) != 0.0)
-    lengths = np.diff(starts, append=output.size)
+    starts, lengths = _stretches(output)
     is_between = (output.min() < output[starts]) & (output[starts] < output.max())
     long = (lengths >= _FEWEST_ROWS) & is_between
     stretches = map(np.arange, starts[long], (starts + lengths)[long])
     _check_standing(output, rate, stretches, "rows on end", "stuck")
+
+
+def _check_stuck_at_rest(output):
+    """Raise LogError if the output keeps one value, row after row, and its noise is far larger."""
+    steps, (starts, lengths) = np.diff(output), _stretches(output)
+    smallest = np.abs(steps[steps != 0.0]).min(initial=np.inf)
+    is_noise = (steps[1:] * steps[:-1] < 0.0) & (np.abs(steps[1:]) > 1.5 * smallest)
+    row, n_rows = int(starts[lengths.argmax()]), lengths.max()
+    if n_rows >= _FEWEST_AT_REST and is_noise.mean() > _NOISY:
+        told = f"stands at {output[row]:.6g} in {n_rows} rows on end, and has noise in "
+        raise LogError(f"{told}the others: it is stuck. Leave these rows out.", "output", row)
+
+
+def _stretches(values):
+    """First rows and lengths of stretches of equal values."""
+    starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    return starts, np.diff(starts, append=values.size)
 
 
 def _check_standing(output, rate, places, rows, what):

@@ -21,8 +21,8 @@ from .targets.error_model import ErrorModel
 ARTICLES = {name: f"{'the' if 'law' in name else 'a'} {name}" for name in NAMES.values()}
 ARTICLES[NOTHING] = NOTHING
 # What a log cannot show, and what it has too few of: rates or temperatures; thermal cycles.
-_FEW = "So few rates or temperatures cannot tell what is left at others", "few: log five or more"
-_CYCLE = "One cycle cannot tell whether this repeats", "cycle: record two more"
+_FEW = "so few rates or temperatures cannot show what is left at others", "few: log five or more"
+_CYCLE = "one thermal cycle cannot show whether more would repeat it", "cycle: record two more"
 _DIGITS = 4  # of the noise: to these, numbers are exact enough for the text to err as the rules do
 _MOST_ROWS = 20_000  # evenly chosen, to see whether the rules can be read
 _MANY_FLAGGED = 0.2  # of the rows
@@ -57,8 +57,8 @@ def headline(calibration, unit):
         title = "Leave the gyro as it is: no compensation that was tried is better"
     if most:
         cannot, advice = _CYCLE if most == "constant" else _FEW
-        safe = "leave the gyro as it is" if name == NOTHING else f"{ARTICLES[name]} is safe"
-        title, hint = f"{cannot}; until then {safe}", ""
+        safe = "Leave the gyro as it is" if name == NOTHING else f"Use {ARTICLES[name]}"
+        title, hint = f"{safe}: {cannot}", ""
     what = {
         NOTHING: "Without any compensation the error is",
         "constant": "Subtracting a constant leaves",
@@ -68,11 +68,11 @@ def headline(calibration, unit):
         f"{groups} can explain (95 %)."
     )
     if most:
-        why = f"Anything more was learnt and judged on the same {advice}, then calibrate anew."
+        why = f"Anything more was learnt and judged on the same {advice}, then calibrate again."
     elif verdict.n_groups == 1:
         why = (
-            "Only one held-out group has rows in range: how far errors scatter is not known, and "
-            "nothing can be shown to be better. Log more groups that overlap."
+            "Only one held-out group has rows in range: how far errors scatter between groups is "
+            "not known, so nothing can be shown to be better. Log more groups that overlap."
         )
     return title, (
         f"{what} {left[name]} RMS on the held-out rows in range; the fuzzy rules leave "

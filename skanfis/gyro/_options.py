@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from .. import __version__
+from ..export.limits import shown
 from ._calibration import Recipe
 from ._checks import PARTS, QUANTITIES
 from ._columns import RATE_UNITS, in_rate_unit, rate_unit_of, units_of
@@ -20,7 +21,7 @@ from ._simpler import NAMES
 from ._split import KINDS
 from .compensator import INPUTS
 from .displays import signs
-from .errors import UsageError, shortened
+from .errors import UsageError
 from .metrics import ALLAN_FIGURES, figures_of_merit
 
 PROGRAM = "python -m skanfis.gyro"
@@ -33,21 +34,22 @@ _TARGET = re.compile(
     r"(rate-)?table(:(float|double|q31|q15))?|px4:[xyz](:[0-3](:\d+)?)?|ardupilot:[xyz](:[1-3])?"
 )
 _TARGETS = (
-    "in C table[:TYPE] over temperature, rate-table[:TYPE] over output too (TYPE float, double, "
-    "q31, q15); parameters of one AXIS (x, y, z) of a gyro, px4:AXIS[:INSTANCE[:DEVICE_ID]] "
-    "(INSTANCE 0 to 3) or ardupilot:AXIS[:INSTANCE] (1 to 3)"
+    "table[:TYPE], in C over temperature; rate-table[:TYPE], in C over temperature and output; "
+    "TYPE is float, double, q31 or q15; px4:AXIS[:INSTANCE[:DEVICE_ID]] or "
+    "ardupilot:AXIS[:INSTANCE], parameters of one axis, x, y or z; INSTANCE is the number of the "
+    "gyro, from 0 to 3 for PX4 and from 1 to 3 for ArduPilot"
 )
 _OF_OUTSIDE = (
-    "beyond the range of the calibration, where rows are flagged: hold the value at the edge "
-    "(clip), follow the tangent for a while (linear, default; a cubic is held), or none (nan)"
+    "what rows outside the range get, which are flagged: clip holds the value at the edge; linear "
+    "(default) follows the tangent for a while, but holds a cubic; nan gives no rate"
 )
 _WHAT = """\
-Calibrate a gyro from its logs: learn the error of its indicated rate (indicated minus true) from
-what is known on board, its output, its temperature and how fast that changes, and the time since
-power-on. The result is checked on whole runs, devices or rate levels that the model has not seen.
+Calibrate a gyro from its logs. The command learns the error, indicated minus true rate, from what
+is known on board: the output, the temperature, its rate of change, and the time since power-on. It
+checks the result on whole runs, devices or rate levels that the model has not seen.
 
-Written to a folder: the model (compensator.json), a report with tables and pictures for any browser
-(report.html), and the rules as text (rules.txt).
+It writes a folder with the model (compensator.json), a report with tables and pictures for any
+browser (report.html), and the rules as text (rules.txt).
 """
 _EPILOG = """\
 examples:
@@ -60,7 +62,8 @@ exit codes:
   0  done    1  failed, such as a disk that is full    2  options that make no sense
   3  the log was refused    4  a file exists already (--force replaces it)
   5  a target was refused; all else is written
-  6  all is written; a limit is not kept, or not measured    130  interrupted by Ctrl-C
+  6  all is written; a limit is not met, or could not be measured
+  130  interrupted by Ctrl-C    141  nobody reads the output any more, as behind a pipe to head
 """
 
 
@@ -81,39 +84,40 @@ def make_parser():
         group.add_argument(name, help=told, **settings)
 
     group = parser.add_argument_group("reading the log")
-    told = "text with a header, as CSV or .lvm, .mat, .xlsx or Parquet: one log, or a file per run"
+    told = "text with a header (CSV, .lvm), .mat, .xlsx or Parquet; one log, or one file a run"
     add("logs", told, nargs="+", metavar="LOG")
-    told = f"columns of {', '.join(PARTS)}; those not named are guessed from names and units"
+    told = f"the column of each part: {', '.join(PARTS)} (default: guessed from names and units)"
     add("--columns", told, metavar="PART=NAME", **several)
-    told = f"units in the files (default: from the names of columns, or the values). {units}"
+    told = f"the unit of each part (default: from the columns' names, or their values). {units}"
     add("--units", told, metavar="PART=UNIT", **several)
-    told = "of a raw signal, such as counts per deg/s; asked for where the log has one rate"
+    told = "of a raw signal, as in counts per deg/s; needed only if the log has a single rate"
     add("--scale-factor", told, type=_scale_factor)
     group = parser.add_argument_group("the model")
-    told = "default: all that the log has, the time since power-on only with three runs or more"
+    told = "inputs of the model (default: all in the log, but time only with three runs or more)"
     add("--inputs", told, nargs="+", choices=INPUTS)
-    told = "fuzzy terms per input, such as 2,1,3; 'search' (default) finds rules by held-out groups"
+    told = "fuzzy terms of each input, such as 2,1,3 (default: search, which finds the rules)"
     add("--terms", told, type=_terms, default="search")
-    told = "fit the arcsine law of open-loop fiber-optic gyros first; rules learn what it leaves"
+    told = "first fit the arcsine law of open-loop fiber-optic gyros; rules learn what it leaves"
     add("--physics", told, action="store_true")
     group = parser.add_argument_group("where it holds, and how it is checked")
     add("--outside", _OF_OUTSIDE, choices=("clip", "linear", "nan"), default=Recipe.outside)
-    add("--groups", "what is held out (auto: as the log asks)", choices=KINDS, default="auto")
+    told = "what is held out (default: auto, what suits the log)"
+    add("--groups", told, choices=KINDS, default="auto")
     group = parser.add_argument_group("the report")
     add("--serial", "serial number of the gyro", default="")
     add("--operator", "who made the calibration", default="")
-    told = "of the specification: at most residual_rms=0.01deg/s, at least reduction_factor=10"
+    told = "of the specification: residual_rms=0.01deg/s is the most, reduction_factor=10 the least"
     add("--limits", told, type=parse_limit, metavar="FIGURE=VALUE", **several)
-    add("--pdf", "also write it as report.pdf", action="store_true")
+    add("--pdf", "also write the report as report.pdf", action="store_true")
     group = parser.add_argument_group("output")
     told = "compensate the logs by this compensator.json instead of calibrating"
     add("--apply", told, metavar="MODEL")
-    told = "folder to write to (LOG-compensator); with --apply the file (LOG-compensated.csv)"
+    told = "folder to write (default: LOG-compensator); with --apply the file (LOG-compensated.csv)"
     add("--output", told, type=Path)
-    told = "the recommended compensation (default), the rules, or one of the simpler ones"
+    told = "which compensation: the recommended one (default), the rules, or a simpler one"
     add("--write", told, choices=("recommended", "rules", *NAMES), default=Recipe.write)
     stds = ("c99", "c89", "c99:float", "c89:float")
-    add("--c", "also write the model as C, by this standard, in double or float", choices=stds)
+    add("--c", "also write C code of this standard, in double or in float", choices=stds)
     told = f"also write a simple function in place of the model, if it is good enough: {_TARGETS}"
     add("--target", told, type=_target, **several)
     told = "replace files that exist, and remove those of an earlier run that are not written anew"
@@ -128,7 +132,7 @@ def check_kind(parser, options):
     given = [name for name in sorted(idle) if getattr(options, name) != parser.get_default(name)]
     if options.apply and given:
         named = ", ".join(f"--{name.replace('_', '-')}" for name in given)
-        raise UsageError(f"{named}: of no use with --apply.")
+        raise UsageError(f"{named}: for a calibration only. Leave this out with --apply.")
 
 
 def request_of(options, require, assumed=None, optional=()):
@@ -137,19 +141,20 @@ def request_of(options, require, assumed=None, optional=()):
     ``assumed`` are units of columns that name none; None leaves them to the values. Rows that lack
     a value of the ``optional`` parts are kept.
     """
-    columns, units = _pairs(options.columns, "--columns"), _pairs(options.units, "--units")
+    columns = _pairs(options.columns, "--columns", "NAME")
+    units = _pairs(options.units, "--units", "UNIT")
     try:
         return Request(columns, units, tuple(require), True, assumed, optional)
     except ValueError as error:
         raise UsageError(str(error)) from error
 
 
-def _pairs(texts, option):
-    """Options of the form PART=NAME as a dict."""
+def _pairs(texts, option, value):
+    """Options of the form PART=NAME, or UNIT, as a dict."""
     pairs = [text.partition("=") for text in texts]
     for text, pair in zip(texts, pairs, strict=True):
         if not all(pair):
-            raise UsageError(f"{option}: {text!r} must be of the form PART=...")
+            raise UsageError(f"{option}: {text!r} must be of the form PART={value}.")
     check_once(option, [part for part, *_ in pairs])
     return {part: name for part, _, name in pairs}
 
@@ -162,7 +167,7 @@ def check_once(option, names):
 
 def _target(text):
     if not _TARGET.fullmatch(text):
-        raise ArgumentTypeError(f"{shortened(text)} must be one of: {_TARGETS}")
+        raise ArgumentTypeError(f"{shown(text)} must be one of: {_TARGETS}")
     return text
 
 
@@ -171,9 +176,7 @@ def _scale_factor(text):
     with contextlib.suppress(ValueError):
         value = float(text)
     if not 1e-30 <= abs(value) <= 1e30:
-        raise ArgumentTypeError(
-            f"{shortened(text)} must be a number from 1e-30 to 1e30, or such a negative one"
-        )
+        raise ArgumentTypeError(f"{shown(text)} must be a number of size 1e-30 to 1e30")
     return value
 
 
@@ -184,14 +187,11 @@ def _terms(text):
     with contextlib.suppress(ValueError):
         numbers = tuple(int(part) for part in text.split(","))
     if not numbers or min(numbers) < 1:
-        raise ArgumentTypeError(f"{shortened(text)} must be search, or numbers such as 2,3,3")
+        raise ArgumentTypeError(f"{shown(text)} must be search, or numbers such as 2,3,3")
     n_rules = math.prod(numbers)
     if n_rules > _MOST_RULES:
         made = f"{n_rules:,}" if n_rules < 10**15 else "too many"
-        raise ArgumentTypeError(
-            f"{shortened(text, str)} makes {made} rules; at most {_MOST_RULES} are learnt. Use "
-            "fewer terms"
-        )
+        raise ArgumentTypeError(f"{shown(text)} makes {made} rules; give at most {_MOST_RULES}")
     return numbers
 
 
@@ -211,9 +211,7 @@ def parse_limit(text):
     """Parse a limit such as ``bias=5deg/h``; ArgumentTypeError if it is none."""
     figure, _, typed = text.partition("=")
     if figure not in _UNITS:
-        raise ArgumentTypeError(
-            f"{text!r} must be FIGURE=VALUE, with a figure of merit of: {', '.join(_UNITS)}."
-        )
+        raise ArgumentTypeError(f"{text!r} must be FIGURE=VALUE; figures: {', '.join(_UNITS)}.")
     usual, found = _UNITS[figure], _FORM.fullmatch(typed)
     if found is None:
         raise ArgumentTypeError(
@@ -254,5 +252,5 @@ def check_limit(limit, lines):
     # The smallest size in the interval is at an end, or zero.
     ends = (low, high, min(max(0.0, low), high))
     is_sure = math.isnan(low) or all(limit.keeps(end) == is_kept for end in ends)
-    remark = "" if is_sure else "its interval reaches over the limit"
+    remark = "" if is_sure else "the limit is within its interval"
     return Check(limit, value, "pass" if is_kept else "fail", remark)

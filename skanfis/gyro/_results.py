@@ -49,7 +49,7 @@ _PICTURES = {
         ResidualSurfaceDisplay,
         "Mean residual and number of rows over temperature and rate.",
     ),
-    "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group; no dot: not in range."),
+    "held-out-groups": (GroupResidualDisplay, "RMS error by held-out group. No dot: out of range."),
     "allan-deviation": (
         AllanDisplay,
         "Allan deviation of the error, over stretches in range without a gap. It is the root of "

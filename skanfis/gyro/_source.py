@@ -10,7 +10,8 @@ from itertools import islice
 import numpy as np
 import pandas as pd
 
-from ._columns import unit_in
+from ..inspection.text import counted
+from ._columns import evenly_chosen, unit_in
 from ._tables import EXCEL, HEAD_ROWS, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
 from .errors import LogError
 
@@ -28,7 +29,7 @@ _VALUE = re.compile(r"[+\u2212-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
 _FRACTION = re.compile(r"[+\u2212-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
 
 CLOCK = "hours:minutes:seconds"
-_DATES = "%d.%m.%Y %d.%m.%y %d-%m-%Y %d-%b-%Y %m/%d/%Y %m/%d/%y %d/%m/%Y %Y/%m/%d"
+_DATES = "%d.%m.%Y %d.%m.%y %d-%m-%Y %d-%b-%Y %m/%d/%Y %m/%d/%y %d/%m/%Y %d/%m/%y %Y/%m/%d"
 _FORMATS = [
     CLOCK,
     "ISO8601",
@@ -101,9 +102,7 @@ class _TextSource:
         self._n_above = first
         self._n_lines = head[first][0] - 1 if first < len(head) else None
         if place:
-            self.notes.append(
-                f"the header is line {head[place][0]}; {place} lines above it are passed over"
-            )
+            self.notes.append(f"the header is line {head[place][0]}; what is above it is skipped")
 
     def _check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut silently."""
@@ -114,8 +113,8 @@ class _TextSource:
         for line, values in islice(self._records(), self._n_above, None):
             if len(values) > n_columns and "".join(values[n_columns:]).strip():
                 raise LogError(
-                    f"{self.path}, line {line}: has {len(values)} values, more than the "
-                    f"{n_columns} columns of the header."
+                    f"{self.path}, line {line}: has {counted(len(values), 'value')}, "
+                    f"and the header {counted(n_columns, 'column')}."
                 )
 
     def _records(self):
@@ -155,8 +154,8 @@ class _TextSource:
         for number, line in enumerate(iter(partial(file.readline, _LONGEST_LINE), ""), 1):
             if len(line) == _LONGEST_LINE:
                 raise LogError(
-                    f"{self.path}, line {number}: is longer than {_LONGEST_LINE:,} signs; that is "
-                    "no log."
+                    f"{self.path}, line {number}: is longer than {_LONGEST_LINE:,} characters: "
+                    "that is no log."
                 )
             yield line
 
@@ -218,9 +217,7 @@ def header_place(rows):
     ]
     first = next(iter(together), data.index(True) if any(data) else start + 1)
     if first == 0:
-        raise LogError(
-            "has numbers where the names of the columns are due; give the file a header."
-        )
+        raise LogError("has numbers where names of columns are due; give the file a header.")
     n_fields = len(rows[first]) if first < len(rows) else len(rows[start])
     fits = [k for k in range(start, first) if len(rows[k]) == n_fields]
     place = fits[-1] if fits else start
@@ -274,8 +271,10 @@ def as_numbers(column, decimal=".", form=""):
 
 
 def clock_form(column):
-    """The time format of most of a column's first texts; empty if they are no times."""
-    texts = _plain(column).dropna()[:_CLOCK_ROWS]
+    """The time format of most of a column's texts; empty if they are no times."""
+    # To the last row: the 13th of a month may tell it from the day.
+    texts = column.dropna()
+    texts = _plain(texts.iloc[evenly_chosen(len(texts), _CLOCK_ROWS)]).dropna()
     fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
     best = max(_FORMATS, key=lambda form: fits[form])
     return best if 2 * fits[best] > len(texts) else ""

@@ -52,12 +52,12 @@ _NO_CLOCK = (
 )
 # Cautions if there are several groups of a kind, but too few to hold one out.
 _TOO_FEW = {
-    "level": "the table stood still at {} rates alone, but for their sign, too few to hold one "
-    "out: what is left at all others is not known, and may be any.",
-    "device": "{} devices share one compensator, and are too few to hold one out: what it leaves "
-    "of any other is not known, and one from the log of each alone may leave less.",
+    "level": "the table stood at only {} rates (without their signs), too few to hold one out: the "
+    "error that is left at any other rate is not known.",
+    "device": "{} devices share a compensator, and are too few to hold one out: the error that it "
+    "leaves in any other device is not known, and a compensator for each alone may leave less.",
 }
-_NO_ROWS = "no temperature is between {:.4g} and {:.4g} °C: what is left there is not known."
+_NO_ROWS = "the log has no temperature from {:.4g} to {:.4g} °C: the error there is not known."
 _LEGS = "legs between turning points of the temperature"
 # What is held out, and what of it is counted.
 _WORDS = {
@@ -189,7 +189,7 @@ def choose_split(log, kind="auto", *, uses_output=True):
     if kind == "auto":
         kind, reason = _choose(groups, counts, "time" in log)
     if kind == "piece":
-        reason += "; whether a cycle repeats, so few cannot show"
+        reason += "; so few cycles cannot show whether they repeat"
     parts = kind.split("+")
     for part in parts:
         _check(part, counts)
@@ -233,8 +233,8 @@ def _choose(groups, counts, has_time):
         clock = "" if has_time else _NO_CLOCK
         raise LogError(
             "the compensator could not be checked: the log has "
-            f"{', '.join(found)}. At least 3 runs (a column run, or one file each), 5 rate levels, "
-            f"or a temperature that rises and falls are needed, to be held out in turn.{clock}"
+            f"{', '.join(found)}. To hold them out in turn takes at least 3 runs (a column run, or "
+            f"one file each), 5 rate levels, or a temperature that rises and falls.{clock}"
         )
     whole = enough[0]
     if whole not in ("device", "run"):
@@ -251,11 +251,11 @@ def _check(part, counts):
     if part not in counts:
         what = {"level": "rate levels", "leg": "temperature", "piece": "temperature"}
         missing = what.get(part, f"column for the {part}")
-        raise LogError(f"cannot hold out by {part}: the log has no {missing}.")
+        raise LogError(f"--groups {part}: the log has no {missing} to hold out.")
     if counts[part] < _FEWEST[part]:
         found = counted(counts[part], "leg" if part == "piece" else part)
         raise LogError(
-            f"cannot hold out by {part}: the log has {found}; at least {_FEWEST[part]} are needed."
+            f"--groups {part}: the log has {found}; to hold one out takes {_FEWEST[part]} or more."
         )
 
 

@@ -75,7 +75,7 @@ def matlab_source(path):
     length = max(set(lengths), key=lengths.count)
     columns = {name: values for name, values in found.items() if len(values) == length}
     others = sorted(set(found) - set(columns))
-    notes = [f"variables of another length are passed over: {', '.join(others)}"] if others else []
+    notes = [f"variables of another length are skipped: {', '.join(others)}"] if others else []
     return TableSource(path, pd.DataFrame(columns), notes)
 
 
@@ -118,6 +118,6 @@ def excel_source(path, header_place):
     except LogError as error:
         raise LogError(f"{path}: {error}") from error
     if place:
-        notes.append(f"{place} rows above the header are passed over")
+        notes.append(f"the header is row {place + 1}; what is above it is skipped")
     table = sheet.iloc[first:].reset_index(drop=True).infer_objects()
     return TableSource(path, table.set_axis(header, axis=1), notes, first + 1)

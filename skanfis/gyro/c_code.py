@@ -65,7 +65,7 @@ law   |            status = $NAME_OUT_OF_RANGE;
 law   |        }
 law   |    }
 law   |
-law   |    /* Temperature of the coil from the reference, and the coefficients there. */
+law   |    /* The coil's temperature minus the reference, and the coefficients at it. */
 law   |    t = $temperature;
 law   |    amplitude = $name_polynomial($name_amplitude, $n_amplitude, t);
 law   |    sagnac = $name_polynomial($name_sagnac, $n_sagnac, t);
@@ -73,7 +73,7 @@ law   |    if (sagnac == 0.0R) {
 law   |        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
 law   |    }
 law   |
-law   |    /* The size of the sine, and its sign apart; no amplitude, no phase. */
+law   |    /* The size of the sine and its sign; without an amplitude there is no phase. */
 law   |    sine = x[$output];
 law   |    sine = amplitude != 0.0R ? sine / amplitude : (sine < 0.0R ? -$MAX : $MAX);
 law   |    if (sine < 0.0R) {
@@ -93,7 +93,7 @@ answer|    }
 law   |    rate = (sign < 0 ? -phase : phase) / sagnac - $name_polynomial($name_bias, $n_bias, t);
 law   |
 cubic |    for (i = 0; i < $NAME_N_INPUTS; ++i) {
-cubic |        /* Of the nearest point of the box. */
+cubic |        /* The input, held in its range, in standard deviations from its mean. */
 cubic |        u[i] = x[i] < $name_law_low[i] ? $name_law_low[i] : x[i];
 cubic |        u[i] = u[i] > $name_law_high[i] ? $name_law_high[i] : u[i];
 cubic |        u[i] = (u[i] - $name_center[i]) / $name_scale[i];
@@ -115,7 +115,7 @@ cubic |    }
       |        return $NAME_REJECT(y, status);
       |    }
       |    rate += left[0];
-      |    /* Not (a and b): NaN fails every comparison. */
+      |    /* Also true for NaN, which fails every comparison. */
       |    if (!(rate >= -$MAX && rate <= $MAX)) {
       |        return $NAME_REJECT(y, $NAME_OUT_OF_RANGE);
       |    }
@@ -270,7 +270,7 @@ def _source_of(dialect, whole, silent):
         asin = next(line for line in dialect.functions().splitlines() if called in line) + "\n\n"
     code = kept_lines(_CODE, facts).replace("$finite_input", FINITE_INPUT.strip("\n"))
     parts = [
-        "/* Of what the rules are added to: its range, coefficients, and columns of x. */\n",
+        "/* The law, or the cubic: its range, coefficients, and columns of x. */\n",
         *(f"{dialect.table(key, values)}\n" for key, values in whole.arrays.items()),
         asin,
         dialect.write(rejection(silent, dialect.std)).lstrip(),
@@ -293,7 +293,8 @@ def _header(whole, dialect, price, units, notes):
         past = past_phase(law.out_of_bounds, "output")
         policies = [f"Beyond a phase of {law.max_phase:g} rad {past}."]
         if model.coefficients.any():
-            beyond = policy_line(model, "Of what is added to the law: outside this range")
+            of_law = "" if model.out_of_bounds in SILENT else f" {LAW_GOES_ON}; in what is added,"
+            beyond = policy_line(model, f"Outside this range{of_law}")
         elif model.out_of_bounds not in SILENT:
             beyond = f"Outside this range {LAW_GOES_ON}."
     what += rules if model.coefficients.any() else ""
@@ -308,10 +309,10 @@ def _header(whole, dialect, price, units, notes):
         "",
         *policies,
         beyond,
-        "A row that is not finite gets no output either way, nor does one whose rate is not.",
+        "A row gets no output if one of its inputs, or the result, is not finite.",
     ]
     if part.min_coverage is not None:
-        lines.append(f"A row is uncovered where its coverage is below {part.min_coverage:g}.")
+        lines.append(f"A row is flagged as uncovered below a coverage of {part.min_coverage:g}.")
     title = "A cubic" if whole.is_cubic else "An arcsine law"
     title += " and Takagi-Sugeno-Kang fuzzy rules" if model.n_rules > 1 else ""
     return header_of(title, lines, dialect, len(whole.names), 1)

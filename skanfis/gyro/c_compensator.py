@@ -59,6 +59,4 @@ def raw_rate_of(compensator):
     factor = compensator.scale_factor
     divided = "" if factor == 1.0 else f" divided by {factor:.9g}"
     raw = f"The raw rate [deg/s] is the output of the gyro [{compensator.output_unit}]{divided}."
-    return (
-        f"{raw} What the true rate of the calibration left out, as the earth's, goes with the bias."
-    )
+    return f"{raw} What the true rate of the log left out, as the earth's, is taken for bias."

@@ -29,12 +29,12 @@ from .errors import ExistsError, LogError, UsageError
 from .html_report import check_installed, report_page, specification
 from .log import find_logs, read
 from .targets.autopilots import NOTES
-from .targets.write import FILES, write_targets
+from .targets.write import FILES, axes_of, write_targets
 
 DONE, FAILED, REFUSED, EXISTS = 0, 1, 3, 4  # 2 is argparse's own
 INCOMPLETE = 5  # a target was refused; all else is written
 NOT_KEPT = 6  # all is written; a limit is not kept, or not measured
-INTERRUPTED = 130  # a shell's code for Ctrl-C
+INTERRUPTED, CLOSED = 130, 141  # a shell's codes for Ctrl-C, and for a pipe that nobody reads
 
 # All files that a calibration may write.
 _FILES = (
@@ -56,9 +56,16 @@ def main(arguments=None):
             # From here on Ctrl-C raises an exception; until now it ended the process (__main__).
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, signal.default_int_handler)
-        return (_apply if options.apply else _calibrate)(options, tell)
+        code = (_apply if options.apply else _calibrate)(options, tell)
+        sys.stdout.flush()
+        return code
     except UsageError as error:
         parser.error(printable(error))  # exits
+    except BrokenPipeError:
+        # As Python's "Note on SIGPIPE" advises: else what is left to flush fails again at the end.
+        for stream in (sys.stdout, sys.stderr):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        return CLOSED
     except (LogError, ExistsError) as error:
         return _say_error(error, REFUSED if isinstance(error, LogError) else EXISTS)
     except (OSError, ImportError, ValueError, ArithmeticError, MemoryError) as error:
@@ -79,9 +86,11 @@ def _calibrate(options, tell):
         tell("drawing the report")
         checks = _write(calibration, options, reading.digests, written)
         targets = list(write_targets(calibration, options.target, written))
+        # Before files are moved: until then Ctrl-C and errors leave nothing behind.
+        summary = list(errors_and_verdict(calibration, reading.name_row))
     for message in calibration.warnings:
         tell(f"warning: {message}")
-    _say(errors_and_verdict(calibration, reading.name_row))
+    _say(summary)
     names = ", ".join(sorted(path.name for path in folder.iterdir()))
     _say([f"check          {split.sentence}", f"written to     {folder}: {names}"])
     _say(f"note           {note}" for note in reading.notes)
@@ -173,6 +182,10 @@ def _recipe(options, reading, at_rest):
     asked = "--physics" if options.physics else f"--write {options.write}"
     if (options.physics or "law" in options.write) and "output" not in inputs:
         raise UsageError(f"{asked}: the arcsine law needs the output among the inputs.")
+    for text in options.target:
+        if set(inputs) != set(axes_of(text)):
+            told = f"--target {text} needs --inputs {' '.join(axes_of(text))}"
+            raise UsageError(f"{told}; the model would have {', '.join(inputs)}.")
     if not isinstance(options.terms, str) and len(options.terms) != len(inputs):
         raise UsageError(
             f"--terms has {counted(len(options.terms), 'number')} for "
@@ -180,7 +193,7 @@ def _recipe(options, reading, at_rest):
         )
     is_open = unit in SIGNALS and reading.log["rate"].nunique() == 1
     if options.scale_factor is not None and not is_open:
-        raise UsageError("--scale-factor is for a raw signal at one rate: else the rates tell it.")
+        raise UsageError("--scale-factor is only for a raw signal at one rate. Leave it out.")
     if is_open and options.scale_factor is None:
         raise LogError(
             f"is in {unit}, and one rate, as at rest, does not tell its scale factor. Give that of "
@@ -275,7 +288,8 @@ def _apply(options, tell):
     with _staged(target.parent) as folder:
         # Twelve digits are more than any gyro resolves, and shorter than the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
-    _say([f"written        {target}: {n_rows}", *of_rates(compensator, log, rates)])
+        summary = list(of_rates(compensator, log, rates))
+    _say([f"written        {target}: {n_rows}", *summary])
     _say(f"note           {note}" for note in reading.notes)
     tell("done")
     return DONE
@@ -313,9 +327,7 @@ def _refuse_existing(paths, force, read=()):
     """Refuse to replace existing files; with ``force`` only those that are ``read``."""
     for path in paths:
         if any(path.resolve() == Path(other).resolve() for other in read):
-            raise ExistsError(
-                f"{path} is what is read; --force does not replace it: choose another --output."
-            )
+            raise ExistsError(f"{path} is read, and never replaced: choose another --output.")
         if path.is_dir():
             raise ExistsError(f"{path} is a folder: choose another --output.")
         if path.exists() and not force:
@@ -327,20 +339,33 @@ def _staged(folder, replaced=()):
     """A temporary folder to write to; at the end all its files are moved to ``folder``.
 
     Other files in ``folder`` with a name in ``replaced`` are from an earlier run, and are removed
-    then. An error before the move leaves no new file or folder behind.
+    then. After an error, ``folder`` is as it was.
     """
     made = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=_STAGED, dir=folder) as name:
-            yield Path(name)
-            written = sorted(path.name for path in Path(name).iterdir())
-            for each in written:
-                os.replace(Path(name) / each, folder / each)
-            for each in set(replaced) - set(written):
-                (folder / each).unlink(missing_ok=True)
+            new, old = (Path(tempfile.mkdtemp(dir=name)) for _ in range(2))
+            yield new
+            _exchange({*replaced, *os.listdir(new)}, new, folder, old)
     except BaseException:
         for path in made:
             with contextlib.suppress(OSError):  # another program has put something there
                 path.rmdir()
+        raise
+
+
+def _exchange(names, new, folder, old):
+    """Move files from ``folder`` to ``old``, and from ``new`` to ``folder``: all, or none."""
+    moves = []
+    try:
+        for name in sorted(names):
+            for here, there in ((folder / name, old / name), (new / name, folder / name)):
+                if here.exists():
+                    moves.append((here, there))
+                    os.replace(here, there)
+    except BaseException:
+        for here, there in reversed(moves):
+            if there.exists():  # the last of them may not have been made
+                os.replace(there, here)
         raise

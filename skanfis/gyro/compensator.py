@@ -15,7 +15,7 @@ from ..export import export_json
 from ..export.c.dialect import status_word
 from ..export.folding import found_by_search
 from ..export.json_reader import model_of
-from ..export.limits import SMALLEST_NUMBER, number, read_bytes, shown
+from ..export.limits import MOST_BYTES, SMALLEST_NUMBER, number, read_bytes, shown
 from ._columns import ask, declared_units
 from .compose import FrozenRules, Polynomial, ResidualRegressor, cubic_powers, joined, law_and_rules
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
@@ -30,8 +30,6 @@ _NUMBERS = ("thermometer_lag", "reference_temperature")
 _RANGE = ("minimum", "maximum")
 _OF_POLYNOMIAL = ("center", "scale", "coefficients")
 _PARAMETERS = ("max_phase", "out_of_bounds")
-# The limit for a model alone, too: see skanfis.export.model_json.
-_MOST_BYTES = 2**24
 # The name of a unit is shown in tables and on axes.
 _LONGEST_UNIT = 40
 
@@ -157,7 +155,7 @@ class GyroCompensator:
         OSError
             If the file cannot be opened.
         """
-        data = read_bytes(path, _MOST_BYTES)
+        data = read_bytes(path, MOST_BYTES)
         try:
             return cls(**_settings(json.loads(data.decode("utf-8"))))
         except (ValueError, RecursionError) as error:

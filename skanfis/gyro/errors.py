@@ -2,8 +2,6 @@
 
 from importlib import import_module
 
-_LONGEST_SHOWN = 60  # of a value in a message
-
 
 class LogError(ValueError):
     """A log, or a column or row of it, from which no compensator should be learnt.
@@ -48,9 +46,3 @@ def needed(module, told):
         return import_module(module)
     except ImportError as error:
         raise ImportError(told) from error
-
-
-def shortened(value, show=repr):
-    """A value as shown in a message, cut if it is long."""
-    shown = show(value)
-    return shown if len(shown) <= _LONGEST_SHOWN else f"{shown[:50]}...{shown[-1]}"

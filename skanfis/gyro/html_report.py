@@ -55,8 +55,8 @@ _TERMS = {
     "rate_random_walk": "rate random walk, K (528, 952)",
 }
 _PROOF = (
-    "This holds for the compensator, at every point in the range of the calibration. It says "
-    "nothing of how far the compensator is from the gyro."
+    "This holds for the compensator, at every point in the range of the calibration. It does not "
+    "say how well the compensator fits the gyro."
 )
 
 
@@ -134,7 +134,7 @@ def _without_hidden_signs(value):
 def specification(checks):
     """How many limits are kept, and which are not."""
     n_kept = sum(check.result == "pass" for check in checks)
-    parts = [f"{n_kept} of {len(checks)} limits are kept"]
+    parts = [f"{n_kept} of {counted(len(checks), 'limit')} kept"]
     for result, words in (("fail", "not kept"), ("not measured", "could not be measured")):
         names = [_words(check.limit.figure) for check in checks if check.result == result]
         parts += [f"{words}: {', '.join(names)}"] if names else []
@@ -185,14 +185,14 @@ def _check(results):
     beyond = ~calibration.inside & np.isfinite(calibration.after)
     if beyond.any():
         error = results.shown(rms((calibration.after - results.rate)[beyond]))
-        text = f"On rows out of range the RMS error after is {error} {results.symbol}."
+        text = f"On the flagged rows the RMS error after is {error} {results.symbol}."
         blocks.append(Block("text", text))
     blocks += [Block("warn", message) for message in calibration.warnings]
     text = (
-        'All on the same held-out rows in range. "This model" is the fuzzy rules; the others leave '
-        f"so many times its RMS error, in the geometric mean over {held_out_groups(calibration)}. "
-        "Recommended is the simplest that none beats: a simpler one by erring less, a more "
-        "elaborate one by 2 %, interval included."
+        'All on the same held-out rows in range. "This model" is the fuzzy rules. It is better by '
+        "as many times as the other's RMS error is larger, in the geometric mean over "
+        f"{held_out_groups(calibration)}. Recommended is the simplest compensation that no simpler "
+        "one beats, and no more elaborate one by 2 %, interval included."
     )
     blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
     lines = []
@@ -250,11 +250,12 @@ def _use(results):
     model = rules_of(compensator.estimator).model
     policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
     if compensator.predicts == "rate" and model.out_of_bounds not in SILENT:
-        policy = f"beside the law {policy}" if model.coefficients.any() else LAW_GOES_ON
+        added = f"; in what is added, {policy}" if model.coefficients.any() else ""
+        policy = f"{LAW_GOES_ON}{added}"
     text = (
-        f"Outside the ranges below, input by input, a row is flagged (status 1), and {policy}. "
-        "Inside them, rows near which there are hardly any data "
-        f"(coverage below {compensator.min_coverage:g}) are flagged too (status 4). The C code "
+        f"A row with an input outside its range below is flagged (status 1): {policy}. A row "
+        "near which there are hardly any calibration data "
+        f"(coverage below {compensator.min_coverage:g}) is flagged too (status 4). The C code "
         "that --c writes flags the same rows with the same numbers."
     )
     pictures = Block("pictures", list(results.coverage()))
@@ -269,7 +270,7 @@ def _sure(results):
     proven = [(f"largest {what}, proven", f"{results.shown(largest)} {results.symbol}")]
     if rate_rises is not None:
         told = "proven" if rate_rises else "not proven"
-        proven.append(("the compensated rate follows the output, never against it", told))
+        proven.append(("the compensated rate rises and falls as the indicated one does", told))
     table = _table(["in the range of the calibration", "result"], proven)
     return "What is proven", [table, Block("soft", _PROOF)]
 

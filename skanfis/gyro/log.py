@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..export.limits import shown
 from ..inspection.text import counted
 from ..naming import distinct
 from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
@@ -23,7 +24,7 @@ from ._columns import SIGNALS, convert
 from ._guess import Request, settle
 from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_source
 from ._units import assumed_text, settle_by_all
-from .errors import LogError, shortened
+from .errors import LogError
 
 # A gap between two runs is at least this long, and this many steps: more than a logger drops.
 _SHORTEST_GAP = 60.0  # s
@@ -146,10 +147,7 @@ def read(paths, request, *, tell=lambda text: None):
         tell(f"reading {path}" + (f", {number + 1} of {len(paths)}" if len(paths) > 1 else ""))
         files.append(LogFile(path, request, files[0] if files else None))
         for same in [file for file in files[:-1] if file.digest == files[-1].digest]:
-            raise LogError(
-                f"{path}: holds the same bytes as {same.path}; a run that is there twice would be "
-                "tested by itself. Leave one of them out."
-            )
+            raise LogError(f"{path}: holds the same bytes as {same.path}. Leave one of them out.")
         tables.append(files[-1].read().assign(file=np.int32(number)))
     table = pd.concat(tables)
     if table.empty:
@@ -316,7 +314,7 @@ class LogFile:
         counts = ", ".join(f"{name!r} in {n:,}" for name, n in names.items())
         said = f"{self.path}: {bad.sum():,} of {bad.size:,} rows lack a value ({counts})"
         if 2 * bad.sum() > bad.size:
-            raise LogError(f"{said}: too many to go on without them.")
+            raise LogError(f"{said}: too many to leave out. Fill them in, or name other columns.")
         place = self.source.place_of(int(bad.idxmax()))
         self.notes.append(f"{said}; they are left out, the first of them {place}")
 
@@ -325,7 +323,9 @@ class LogFile:
         if part == "time" and not np.isfinite(numbers).any():
             self._form = clock_form(column)
             if self._form:
-                self.notes.append(f"the time is read in s, its form is {self._form}")
+                self.notes.append(f"the time is read in s, from texts of the form {self._form}")
+            if "%m/%d" in self._form:
+                self.notes.append("dates are read month first; if it is the day, write 2024-12-31")
         form = self._form if part == "time" else ""
         numbers = as_numbers(column, form=form) if form else numbers
         bad = np.isnan(numbers)
@@ -335,7 +335,7 @@ class LogFile:
         if bad.any():
             row = int(bad.argmax())
             kind = "no time like those before" if form else "not a number"
-            raise LogError(f"{shortened(column.iloc[row])} is {kind}.", part, row)
+            raise LogError(f"{shown(column.iloc[row])} is {kind}.", part, row)
         is_in_seconds = form or column.dtype.kind in "mM"
         return numbers if is_in_seconds else convert(numbers, self.layout.units[part])
 

@@ -85,7 +85,7 @@ def figures_of_merit(full_scale=1.0):
     def spread(values):
         known = values[np.isfinite(values)]
         if known.size < 2:
-            raise ValueError("No repeatability: fewer than two runs tell it.")
+            raise ValueError("No repeatability: it takes two runs or more.")
         return np.std(known, ddof=1)
 
     def relative_spread(slopes):
@@ -273,7 +273,7 @@ def _peak(values):
 def _reduction(rate, before, after):
     left = rms(after - rate)
     if left == 0:
-        raise ValueError("after is zero everywhere: a factor without bound.")
+        raise ValueError("No reduction factor: the error after is zero in all rows.")
     return rms(before - rate) / left
 
 
@@ -344,7 +344,7 @@ def _squares_of_means(error, time, over):
         raise ValueError("time must increase within each run.")
     apart = np.median(steps) if steps.size else 0.0
     if apart > over * (1.0 + 1e-9):
-        raise ValueError(f"No bias stability: rows are {apart:g} s apart, means over {over:g} s.")
+        raise ValueError(f"No bias stability over {over:g} s: rows are {apart:g} s apart.")
     # A time on an edge belongs to the interval that starts there, rounding errors or not.
     place = np.floor((time - time[0]) / over + 1e-9).astype(int)
     _, place, counts = np.unique(place, return_inverse=True, return_counts=True)
@@ -357,7 +357,7 @@ def _pooled_deviation(squares):
     """Standard deviation within runs [deg/h] (GJB 2426), from each run's sum of squares."""
     sum_of_squares, degrees_of_freedom = np.sum(squares, axis=0)
     if degrees_of_freedom == 0:
-        raise ValueError("No bias stability: no run is as long as two means.")
+        raise ValueError("No bias stability: the means are too long for a run to hold two.")
     return float(PER_HOUR * np.sqrt(sum_of_squares / degrees_of_freedom))
 
 

@@ -161,7 +161,7 @@ def _interval(figure, value, rows, samples, draws, kind):
     """Ends of the interval, and a note if there is none."""
     nothing = (np.nan, np.nan)
     if figure.name in metrics.LARGEST_VALUES:
-        return nothing, "largest value: no interval"
+        return nothing, "no interval: it is a largest value"
     if figure.combine is None:
         found = [_or_nan(figure.of, sample)[0] for sample in samples]
     elif kind != "runs":

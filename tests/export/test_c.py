@@ -289,7 +289,7 @@ def test_grid_takes_an_exponential_per_term(rng):
     np.testing.assert_array_equal(cost_of(model, "linear", 0.1), whole)
     told = export_c(replace(model, out_of_bounds="linear"), name="m", min_coverage=0.1).header
     said = "{} exponentials, {} logarithms, {} square roots, {} multiply-adds, {} divisions."
-    assert f"whatever the row, at most: {said.format(*whole)}" in told.replace("\n *", "")
+    assert f"Largest cost of an evaluation: {said.format(*whole)}" in told.replace("\n *", "")
 
 
 def test_scattered_rules_take_an_exponential_per_rule_and_what_their_terms_do():
@@ -384,7 +384,7 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
         ({}, "name=None takes the name from path"),
         ({"name": "2x"}, "name='2x' must be a letter, then letters"),
         ({"name": "a__b"}, "single underscores"),
-        ({"name": "x" * 17}, "with 16 or fewer"),
+        ({"name": "x" * 17}, "at most 16 in all"),
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),
         ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of 'double', 'float'"),
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),

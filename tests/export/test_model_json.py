@@ -227,7 +227,7 @@ def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
 
 def test_what_would_be_larger_than_is_read_is_not_written(tmp_path, monkeypatch):
     size = len(export_json(A_GRID).encode())
-    monkeypatch.setattr("skanfis.export.model_json._MOST_BYTES", size - 1)
+    monkeypatch.setattr("skanfis.export.model_json.MOST_BYTES", size - 1)
     with pytest.raises(ValueError, match=rf"read_json would refuse: {size:,} bytes, of at most"):
         export_json(A_GRID, tmp_path / "large.json")
     assert not any(tmp_path.iterdir())

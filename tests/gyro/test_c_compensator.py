@@ -39,4 +39,4 @@ def test_header_of_a_compensator_says_units_and_how_inputs_are_made(tmp_path):
     assert "compensated rate: take it in the place of the raw rate" in text
     assert "subtract" not in text
     assert "[0] rate, in deg/s" in text
-    assert "at most: an arcsine, " in text
+    assert "Largest cost of an evaluation: an arcsine, " in text

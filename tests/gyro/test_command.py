@@ -184,7 +184,7 @@ def test_progress_and_summary(tmp_path, log, say, monkeypatch):
     code, out, err = say("l*.csv", "--inputs", "temperature", "output", "--limits", *limits)
     # All is written, and a limit is not kept.
     assert code == 6
-    assert "specification  1 of 2 limits are kept; not kept: residual rms" in out
+    assert "specification  1 of 2 limits kept; not kept: residual rms" in out
     assert (tmp_path / "log-compensator" / "report.html").exists()
     for text in ("reading", "270 rows, 3 runs", "fold 3 of 3", "done"):
         assert text in err
@@ -210,15 +210,20 @@ def test_physics_and_policy(tmp_path, log, run):
     assert (hot["status"] == 1 + 8).all()
 
 
-def test_targets_are_written_or_refused_by_name(tmp_path, log, run):
+def test_targets_are_written_or_refused_by_name(tmp_path, log, run, monkeypatch):
     typed, out = f"{SMALL} --quiet --write line", tmp_path / "out"
-    both = "--inputs temperature output --terms 1,1 --physics --write rules"
-    code, told, _ = run(log, f"{both} --target rate-table --target px4:x --target table")
-    assert code == 5
+    both = "--inputs temperature output --terms 1,1 --physics --write rules --target rate-table"
+    code, told, err = run(log, f"{both} px4:x")
+    # Before the calibration.
+    assert (code, "checking" in err) == (2, False)
+    assert "--target px4:x needs --inputs temperature; the model would have temperature, out" in err
+    code, told, _ = run(log, both)
+    assert code == 0
     assert "target         rate-table: it differs from the model by " in told
-    for name in ("px4:x", "table"):
-        assert f"REFUSED        {name}: the model needs temperature and output, and this" in told
     assert names_in(out) == sorted([*FILES, "gyro_rate_table.c", "gyro_rate_table.h"])
+    monkeypatch.setattr("skanfis.gyro.targets.write._MOST_TIMES", 0.5)
+    code, told, _ = run(log, f"{both} --force")
+    assert (code, "REFUSED        rate-table: it leaves " in told) == (5, True)
     # What an earlier run has written goes with it, what is not the command's stays.
     for name in ("compensator.c", "px4.params", "notes.txt"):
         (out / name).write_text("old")
@@ -243,7 +248,7 @@ def largest_number(log):
 @pytest.mark.parametrize(
     ("spoil", "typed", "message"),
     [
-        (groups_apart, f"{SMALL} --groups run", "every row lies outside the range"),
+        (groups_apart, f"{SMALL} --groups run", "lies outside the range of the other"),
         (
             largest_number,
             "--units output=counts",
@@ -263,7 +268,7 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
 @pytest.mark.parametrize(
     ("typed", "message"),
     [
-        ("--columns time", "'time' must be of the form PART=..."),
+        ("--columns time", "'time' must be of the form PART=NAME."),
         ("--columns speed=v", "columns: there is no 'speed'"),
         ("--columns time=a time=b", "time is given twice"),
         ("--units time=year", "time has no unit 'year'"),
@@ -277,16 +282,16 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
             "--write law-line: the arcsine law needs the output",
         ),
         ("--inputs rate", "invalid choice: 'rate'"),
-        ("--terms 99999999,1,1,1", "99999999,1,1,1 makes 99,999,999 rules; at most 500"),
+        ("--terms 99999999,1,1,1", "'99999999,1,1,1' makes 99,999,999 rules; give at most 500"),
         (f"--terms {'9' * 9000}", "must be search, or numbers"),
         ("--inputs time time", "--inputs: time is given twice"),
-        ("--scale-factor 131", "is for a raw signal at one rate"),
-        ("--target px4", "'px4' must be one of: in C table"),
-        ("--target ardupilot:x:0", "(1 to 3)"),
+        ("--scale-factor 131", "is only for a raw signal at one rate"),
+        ("--target px4", "'px4' must be one of: table[:TYPE], in C"),
+        ("--target ardupilot:x:0", "from 1 to 3"),
         ("--target table table:q15", "--target: table is given twice"),
         ("--limits bias=5", "bias takes deg/s or deg/h; found ''"),
-        ("--apply m --terms 1 --write law", "--terms, --write: of no use with --apply."),
-        ("--apply m --scale-factor 3", "--scale-factor: of no use with --apply."),
+        ("--apply m --terms 1 --write law", "--terms, --write: for a calibration only."),
+        ("--apply m --scale-factor 3", "--scale-factor: for a calibration only."),
     ],
 )
 def test_options_that_make_no_sense(tmp_path, log, typed, message, run):
@@ -301,7 +306,7 @@ def test_help_names_every_option(say):
     assert code == 0
     for text in ("exit codes", "--apply MODEL", *make_parser()._option_string_actions):
         assert text in told
-    codes = (command.REFUSED, command.EXISTS, command.INCOMPLETE, command.NOT_KEPT)
+    codes = (command.REFUSED, command.EXISTS, command.INCOMPLETE, command.NOT_KEPT, command.CLOSED)
     assert all(f"\n  {code}  " in told or f"    {code}  " in told for code in codes)
 
 
@@ -340,6 +345,39 @@ def test_a_failure_at_the_end_leaves_nothing_behind(tmp_path, log, monkeypatch, 
     (out / "report.html").write_text("old")
     assert run(log, f"{SMALL} --force", out)[0] == 1
     assert [(p.name, p.read_text()) for p in out.iterdir()] == [("report.html", "old")]
+
+
+def test_a_failure_while_files_are_moved_leaves_those_of_before(
+    tmp_path, log, calibrated, monkeypatch, run
+):
+    out, typed = tmp_path / "out", f"{SMALL} --quiet --force --write line"
+    assert run(log, f"{typed} --c c99")[0] == 0
+    before = {path.name: path.read_bytes() for path in out.iterdir()}
+    move, moves = os.replace, []
+
+    def fail(*places):
+        moves.append(places)
+        if len(moves) == 6:
+            raise OSError(28, "No space left on device")
+        move(*places)
+
+    monkeypatch.setattr(os, "replace", fail)
+    assert run(log, typed)[0] == 1
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == before
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there a closed pipe is another error")
+def test_a_reader_that_goes_away_ends_it_quietly(calibrated, tmp_path, monkeypatch):
+    reader, writer = os.pipe()
+    os.close(reader)
+    model, rates = calibrated / "out" / "compensator.json", tmp_path / "rates.csv"
+    typed = f"{calibrated / 'raw.csv'} --apply {model} {RAW} --columns rate=table --output {rates}"
+    with open(writer, "w") as out, open(tmp_path / "err", "w", 1) as err:
+        monkeypatch.setattr(sys, "stdout", out)
+        monkeypatch.setattr(sys, "stderr", err)
+        assert main(typed.split()) == command.CLOSED
+    assert (tmp_path / "err").read_text().endswith(("done\n", f"writing {rates}\n"))
+    assert rates.exists()
 
 
 def test_a_backend_that_does_not_exist(fresh_process):
@@ -436,9 +474,9 @@ def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_p
     code, said, _ = run(log, "--terms 3,1 --scale-factor 131")
     assert code == 0
     assert "pieces of the legs" in said
-    assert "whether a cycle repeats, so few cannot show" in said
+    assert "so few cycles cannot show whether they repeat" in said
     # What is safe is written, and pieces have one number.
-    assert "One cycle cannot tell whether this repeats; until then a constant is safe" in said
+    assert "Use a constant: one thermal cycle cannot show whether more would repeat" in said
     assert "record two more" in said
     assert "2 legs, 5 pieces of each" in said
     assert "written is     a constant, as recommended" in said

@@ -55,7 +55,7 @@ def test_runs_of_two_devices_are_told_apart(tmp_path, device, run, labels):
         ("temperature,output,rate\n1,2,inf\n", {}, r"line 2, column 'rate': .* infinite"),
         ("temperature,output,rate\n1,2,3\n\n1,2,3,4,5\n", {}, "line 4: has . values"),
         ('temperature,output,rate\n1,2,"3\n', {}, "is no table"),
-        ("temperature,output,rate,run\n1,2,3,\n", {}, "line 2, column 'run': no label"),
+        ("temperature,output,rate,run\n1,2,3,\n", {}, "line 2, column 'run': the label is missing"),
         ("temperature,output,rate\n1,2,3\n", {"columns": {"rate": "output"}}, "'output' cannot"),
         ("temperature,output,rate\n1,2,3\n", {"columns": {"time": "t"}}, "'t' for the time"),
         ("temperature,output,rate,rate\n1,2,3,4\n", {}, "header has 'rate' and 'rate'; which"),
@@ -153,7 +153,7 @@ def scaled(part, factor):
         (scaled("time", 1e6), "time", None, "smaller unit than s"),
         (scaled("time", 1e-4), "time", None, "larger unit than s"),
         (lambda log: log[log["run"] == 0], "temperature", None, "at least 10 degC"),
-        (lambda log: log.iloc[:3], None, None, "3 rows are too few"),
+        (lambda log: log.iloc[:3], None, None, "has 3 rows; it takes 20"),
         (lambda log: log.assign(rate=0.0), "rate", None, "leave output out"),
         (lambda log: log.assign(rate=5.0), "rate", None, r"Log at several rates\.$"),
         (
@@ -162,7 +162,7 @@ def scaled(part, factor):
             36,
             "saturated",
         ),
-        (lambda log: log.assign(output=log["rate"]), "output", None, "wrong one"),
+        (lambda log: log.assign(output=log["rate"]), "output", None, "one of them is not that"),
         (lambda log: log.assign(output=log["temperature"]), "output", None, "does not follow"),
         (scaled("output", -1), "output", None, "sign is reversed"),
         (scaled("output", TO_RADIANS), "output", None, "is the output in rad/s"),
@@ -194,6 +194,26 @@ def test_a_log_without_an_input_or_beyond_any_converter_is_refused(log):
     for factor in (1e-40, 1e40):
         with pytest.raises(LogError, match="counts are not plausible"):
             check_log(scaled("output", factor)(log), units={"output": "counts"})
+
+
+def test_a_gyro_at_rest_that_is_stuck_is_told_from_one_of_a_coarse_output():
+    rng, n_rows = np.random.default_rng(0), 6000
+    temperature = 20.0 + 40.0 * np.sin(np.arange(n_rows) / 600.0)
+    log = pd.DataFrame({"time": np.arange(n_rows), "temperature": temperature})
+    noise, bias = rng.normal(size=n_rows), 0.05 * temperature
+    stuck = bias + noise
+    stuck[2000:2200] = 7.0
+    for decimals in (9, 0):
+        with pytest.raises(LogError, match="in 200 rows on end, and has noise") as caught:
+            check_log(log.assign(output=stuck.round(decimals)), inputs=["temperature"])
+        assert (caught.value.column, caught.value.row) == ("output", 2000)
+    for size in (0.0, 0.1, 0.3, 0.5, 1.0):
+        # Rounded values, and a counter of pulses, which are of the angle: in 200 rows on end both
+        # may be equal.
+        coarse = (bias + size * noise).round()
+        pulses = np.diff(np.floor(np.cumsum(bias + size * noise)), prepend=0.0)
+        for output in (coarse, pulses):
+            check_log(log.assign(output=output), inputs=["temperature"])
 
 
 def test_a_log_at_rest_is_told_from_one_that_moves(log):

@@ -85,7 +85,7 @@ def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth
     with pytest.raises(LogError, match="line 212, column 'time': the value is missing"):
         found(tmp_path / "log.csv", guess=False)
     table.loc[100:, "rate"] = ""
-    with pytest.raises(LogError, match=r"rows lack a value .* too many to go on"):
+    with pytest.raises(LogError, match=r"rows lack a value .* too many to leave out"):
         found_in(tmp_path, table)
 
 
@@ -190,7 +190,7 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
     [
         (b"", "is empty"),
         (b"\n\n  \n", "is empty"),
-        (b"1,2,3\n4,5,6\n", "line 1: has numbers where the names of the columns are due"),
+        (b"1,2,3\n4,5,6\n", "line 1: has numbers where names of columns are due"),
         (bytes(range(256)), "is not text .* or unpack it"),
         (b"temp,gyro\n20,1\n21,\x81\n", "is not text"),
         (b"time,temp,gyro\n10:00:00,20,2\nnoon,21,2\n10:00:02,22,3\n", "line 3, column 'time': 'n"),
@@ -243,6 +243,30 @@ def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
     assert "time = 'Time' on 'Date'; " in "; ".join(reading.notes)
 
 
+@pytest.mark.parametrize(
+    ("start", "form", "told"),
+    [
+        # What ends before the 13th leaves it open; a midnight at the end may tell it.
+        ("2024-06-01", "%d/%m/%Y", "the form %m/%d/%Y %H:%M:%S"),
+        ("2024-06-12", "%d/%m/%Y", "the form %d/%m/%Y %H:%M:%S"),
+        ("2024-06-12", "%m/%d/%y", "the form %m/%d/%y %H:%M:%S"),
+        ("2024-06-13", "%d/%m/%y", "the form %d/%m/%y %H:%M:%S"),
+    ],
+)
+def test_whether_month_or_day_comes_first_is_told(tmp_path, truth, start, form, told):
+    clock = np.arange(300) + (0.0 if start == "2024-06-01" else 86_400 - 250)
+    moment = pd.Timestamp(start) + pd.to_timedelta(clock, unit="s")
+    table = truth[["temperature", "output", "rate"]].assign(
+        Time=moment.strftime(f"{form} %H:%M:%S")
+    )
+    table.to_csv(tmp_path / "log.csv", index=False)
+    reading = found(tmp_path / "log.csv")
+    assert (np.diff(reading.log["time"]) == 1.0).all()
+    notes = "; ".join(reading.notes)
+    assert told in notes
+    assert ("dates are read month first" in notes) == ("%m/%d" in told)
+
+
 LVM = """LabVIEW Measurement\t
 Writer_Version\t2
 Separator\tTab
@@ -271,7 +295,7 @@ def test_a_file_of_labview(tmp_path, truth):
     reading = found(tmp_path / "log.lvm")
     same(reading, truth)
     np.testing.assert_allclose(reading.log["time"], truth["clock"])
-    assert "the header is line 17; 16 lines above it are passed over" in reading.notes
+    assert "the header is line 17; what is above it is skipped" in reading.notes
     assert reading.units["time"] == "s"
     assert "time" not in reading.assumed
 
@@ -312,7 +336,7 @@ def test_a_file_of_matlab(tmp_path, truth, how):
     reading = found(path)
     same(reading, truth)
     np.testing.assert_allclose(reading.log["time"], truth["clock"])
-    assert "variables of another length are passed over: fs, other" in "; ".join(reading.notes)
+    assert "variables of another length are skipped: fs, other" in "; ".join(reading.notes)
     assert reading.name_row(3).endswith("row 3")
 
 
@@ -331,7 +355,7 @@ def test_a_file_of_excel_with_lines_above_the_header(tmp_path, truth):
     np.testing.assert_allclose(np.diff(reading.log["time"]), np.diff(truth["clock"]), atol=1e-5)
     assert reading.name_row(0).endswith("row 4")
     assert reading.assumed == {}
-    for told in ("of 2 sheets 'data' is read", "2 rows above the header are passed over"):
+    for told in ("of 2 sheets 'data' is read", "the header is row 3; what is above it is skipped"):
         assert told in reading.notes
 
 

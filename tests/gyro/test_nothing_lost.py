@@ -39,7 +39,7 @@ def test_apply_never_replaces_what_it_reads(files, tmp_path, target, say):
     target = target.format(here=tmp_path.name)
     for force in ([], ["--force"]):
         code, _, err = say("--apply", "model.json", "log.csv", "--output", target, *force)
-        assert (code, "is what is read; --force does not replace it" in err) == (4, True)
+        assert (code, "is read, and never replaced" in err) == (4, True)
     assert [(tmp_path / name).read_bytes() for name in ("log.csv", "model.json")] == before
     (tmp_path / "log-compensated.csv").write_text("old")
     assert say("--apply", "model.json", "log.csv", "--force")[0] == 0
@@ -51,7 +51,7 @@ def test_a_calibration_never_replaces_its_log(files, tmp_path, name, say):
     (tmp_path / "out").mkdir()
     (tmp_path / "log.csv").rename(tmp_path / "out" / name)
     code, _, err = say(f"out/{name}", "--output", "out", "--force")
-    assert (code, f"{name} is what is read" in err) == (4, True)
+    assert (code, f"{name} is read, and never replaced" in err) == (4, True)
 
 
 class RunsCode:

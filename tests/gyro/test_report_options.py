@@ -28,7 +28,7 @@ def test_what_may_be_typed(text, value, unit):
     ("text", "message"),
     [
         ("bias", "'' must be a number"),
-        ("drift=5deg/h", "must be FIGURE=VALUE, with a figure of merit of: residual_rms"),
+        ("drift=5deg/h", "must be FIGURE=VALUE; figures: residual_rms"),
         ("bias=5", "bias takes deg/s or deg/h; found ''"),
         ("bias=-2:5deg/h", "must be a number, not negative, and a unit, as in bias=5deg/h"),
         ("reduction_factor=10ppm", "reduction_factor takes no unit; found 'ppm'"),

@@ -132,9 +132,9 @@ def test_asked_for_or_for_a_compensator_that_does_not_see_the_output(levels_and_
 @pytest.mark.parametrize(
     ("kind", "message"),
     [
-        ("device", "cannot hold out by device: the log has no column"),
-        ("run", r"cannot hold out by run: the log has 2 runs; at least 3"),
-        ("level", "cannot hold out by level: the log has no rate levels"),
+        ("device", "--groups device: the log has no column"),
+        ("run", r"--groups run: the log has 2 runs; to hold one out takes 3"),
+        ("level", "--groups level: the log has no rate levels"),
         ("auto", r"could not be checked: the log has 2 runs, 0 rate levels"),
         ("auto", r"No column of the time was found, .* --columns time=NAME"),
     ],
@@ -231,17 +231,17 @@ def test_temperatures_far_from_all_others_are_told(soaks, most, rng):
     temperature[0] = 85.0  # a glitch is no soak
     split = choose_split(pd.DataFrame({"temperature": temperature, "rate": rate, "run": run}))
     assert split.most == most
-    assert [told[:25] for told in split.cautions] == ["no temperature is between"] * bool(most)
+    assert [told[:26] for told in split.cautions] == ["the log has no temperature"] * bool(most)
 
 
 @pytest.mark.parametrize(
     ("rates", "n_devices", "expected", "most"),
     [
         ([-50, 50], 1, [], ""),
-        ([-50, 0, 50], 1, ["the table stood still at 2 rates alone"], "line"),
-        ([-30, 0, 80, 100], 1, ["the table stood still at 4 rates alone"], "law-line"),
+        ([-50, 0, 50], 1, ["the table stood at only 2 rates"], "line"),
+        ([-30, 0, 80, 100], 1, ["the table stood at only 4 rates"], "law-line"),
         (LEVELS, 1, [], ""),
-        (LEVELS, 2, ["2 devices share one compensator"], ""),
+        (LEVELS, 2, ["2 devices share a compensator"], ""),
         (LEVELS, 3, [], ""),
     ],
 )

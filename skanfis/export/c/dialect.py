@@ -170,9 +170,8 @@ def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_N
     is_identifier = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
     if not is_identifier or len(name) > longest_name:
         raise ValueError(
-            f"name={name!r} must be a letter, then letters, digits and single underscores; with "
-            f"{longest_name} or fewer characters, all identifiers differ in the 31 that a C "
-            "compiler must look at."
+            f"name={name!r} must be a letter, then letters, digits and single underscores, at most "
+            f"{longest_name} in all: a C compiler may look at 31 characters of an identifier only."
         )
     return stem or name, name
 

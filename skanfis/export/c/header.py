@@ -23,9 +23,9 @@ $facts
  * Constant tables, no heap, no state: safe to call from several threads and from interrupts.
  * Compile without -ffast-math, which takes away the check of the inputs.
  *
- * MISRA C:2012, by cppcheck: required rules are kept, but not 10.1: the status is an int, and bits
- * of it are set. Of the advisory ones Dir 4.6 and 4.9 (plain types, macros like functions), 2.5,
- * 8.7, 8.9, 12.1, 12.3, 15.5 and 18.4 are not kept. No one has certified it.
+ * MISRA C:2012, checked by cppcheck: all required rules are kept but 10.1, since the status is an
+ * int whose bits are set. These advisory ones are not kept: Dir 4.6 (plain types), Dir 4.9 (macros
+ * like functions), 2.5, 8.7, 8.9, 12.1, 12.3, 15.5 and 18.4. No one has certified it.
  */
 #ifndef $NAME_H
 #define $NAME_H
@@ -63,7 +63,7 @@ def header(source, units, notes):
     lowest, highest = np.clip(model.output_limits, *asked)
     lines = [
         *map(remark, [notes] if isinstance(notes, str) else notes),
-        f"{model.n_rules} rules, order {model.order}; {dialect.std.upper()}, {dialect.real}.",
+        f"Rules: {model.n_rules}, of order {model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(source.cost),
         "",
         *input_lines(model.input_names, numbers.low, numbers.high, units),
@@ -72,9 +72,9 @@ def header(source, units, notes):
     ]
     lines += _precision_lines(numbers)
     lines += ["", policy_line(model, "Outside this range")]
-    lines.append("A row that is not finite gets no output either way.")
+    lines.append("A row with an input that is not finite gets no output.")
     if source.min_coverage is not None:
-        lines.append(f"A row is uncovered where its coverage is below {source.min_coverage:g}.")
+        lines.append(f"A row is flagged as uncovered below a coverage of {source.min_coverage:g}.")
     title = "A Takagi-Sugeno-Kang fuzzy model"
     return header_of(title, lines, dialect, model.n_inputs, model.n_outputs)
 
@@ -82,7 +82,7 @@ def header(source, units, notes):
 def cost_lines(cost, besides=""):
     """Lines on the largest cost of an evaluation, and on memory; ``besides`` comes first."""
     yield (
-        f"Per evaluation, whatever the row, at most: {besides}{cost.exponentials} exponentials, "
+        f"Largest cost of an evaluation: {besides}{cost.exponentials} exponentials, "
         f"{cost.logarithms} logarithms, {cost.square_roots} square roots, "
         f"{cost.multiply_adds} multiply-adds, {cost.divisions} divisions."
     )
@@ -124,10 +124,10 @@ def _precision_lines(numbers):
 
 def header_of(title, lines, dialect, n_inputs, n_outputs, include=""):
     """A header whose first comment has these lines; ``include`` is a line of code."""
-    facts = [part for line in lines for part in textwrap.wrap(line, 95) or [""]]
+    wrapped = (textwrap.wrap(line, 95, break_on_hyphens=False) or [""] for line in lines)
     return dialect.write(
         _CODE.replace("$status_lines", status_lines()),
-        facts="\n".join(f" * {line}".rstrip() for line in facts),
+        facts="\n".join(f" * {line}".rstrip() for parts in wrapped for line in parts),
         title=title,
         n_inputs=n_inputs,
         n_outputs=n_outputs,

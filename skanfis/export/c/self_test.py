@@ -23,7 +23,7 @@ $y;
 static const unsigned char $name_test_status[$n] =
 $status;
 
-/* As much as an output may be off. */
+/* By how much an output may differ. */
 static const $real $name_test_tolerance[$NAME_N_OUTPUTS] =
 $tolerance;
 

@@ -288,7 +288,7 @@ class RulesPart(Source):
         sizes = {"N_INPUTS": self.model.n_inputs, "N_OUTPUTS": self.model.n_outputs}
         macros = [f"#define {prefix}_{key} {value}\n" for key, value in sizes.items()]
         macros += [f"#define {prefix}_{key} {self._outer}_{key}\n" for key in STATUS]
-        return f"\n/* Of the rules. */\n{''.join(macros)}\n{self.body()}"
+        return f"\n/* The rules. */\n{''.join(macros)}\n{self.body()}"
 
 
 class _Number:

@@ -27,7 +27,7 @@ static int $name_reject($real *y, int status)
 # The head of a loop over the inputs.
 FINITE_INPUT = """
     for (i = 0; i < $NAME_N_INPUTS; ++i) {
-        /* Not (a and b): NaN fails every comparison. */
+        /* Also true for NaN, which fails every comparison. */
         if (!(x[i] >= -$MAX && x[i] <= $MAX)) {
             return $NAME_REJECT(y, $NAME_NOT_FINITE);
         }
@@ -124,7 +124,7 @@ static void $name_normalise($real *l, $int n)
 # Near the foot of the only active term, its derivative is huge and almost equal to the mean, so
 # that their difference would lose all digits. So the strongest term's is subtracted first.
 _CENTRE = """
-/* Subtracts from n derivatives their mean by the n shares. */
+/* Subtracts from n derivatives their mean, weighted by the n shares. */
 static void $name_centre($real *s, const $real *share, $int n)
 {
     $int i, top = 0;
@@ -145,7 +145,7 @@ static void $name_centre($real *s, const $real *share, $int n)
 }
 """
 _NEAR = """
-/* Of a rule in coverage: its share, falling with the distance from its data. */
+/* What a rule adds to the coverage: its share, which falls with the distance from its data. */
 static $real $name_near(const $real *z, const $real *p)
 {
     const $real *centre = p + 2, *factor = p + 2 + $NAME_N_INPUTS;
@@ -166,7 +166,7 @@ static $real $name_near(const $real *z, const $real *p)
 }
 """
 _COVERAGE = """
-/* The coverage in the box, or a part of it that is enough. */
+/* The coverage in the box; once the sum is enough, no more rules are added. */
 static $real $name_coverage(const $real *z, const $real *w, $real enough)
 {
     $real covered = 0.0R;
@@ -183,9 +183,9 @@ static $real $name_coverage(const $real *z, const $real *w, $real enough)
 HELPERS = {"normalise": _NORMALISE, "centre": _CENTRE, "near": _NEAR, "coverage": _COVERAGE}
 
 TANGENT = """
-plain       |/* Adds the derivative of every sum along e. */
-moves       |/* Adds the derivative along the way of inputs of group g, where others but
-moves       |   the first are held elsewhere. */
+plain       |/* Adds the derivative of every output along e. */
+moves       |/* Adds the derivative of every output along the way of the inputs of group g.
+moves       |   Inputs of other groups than 0 and g are held at $name_tangent_at. */
 plain       |static void $name_tangent($given, const $real *e, $real *change)
 moves       |static void $name_tangent(const $real *at, const $real *way, $int g, $real *change)
             |{
@@ -220,7 +220,7 @@ slopes      |            }
 PREDICT = """
       |$linkageint $name_predict(const $real x[$NAME_N_INPUTS], $real y[$NAME_N_OUTPUTS])
       |{
-      |    /* z: the input, held in the box, about the reference. */
+      |    /* z: the inputs, held in the box, minus the reference. */
       |    $real z[$NAME_N_INPUTS], sum[$NAME_N_OUTPUTS], w[$n_strengths];
 table |    $real l[$n_logarithms];
 beyond|    $real e[$NAME_N_INPUTS];
@@ -280,9 +280,9 @@ linear|                e[i] = -$name_reach[i];
 linear|            }
 linear|            scale += (e[i] < 0.0R ? -e[i] : e[i]) * $name_inverse_spread[i];
 beyond|        }
-fades |        /* The coverage falls with the distance: more of it is asked for. */
+fades |        /* The coverage falls with the distance from the box: so more is asked for in it. */
 fades |        enough = $limit * $EXP(0.5R * distance);
-linear|        /* First along a part of the way, since products could overflow. */
+linear|        /* Along a part of the way, scaled back below: else products could overflow. */
 linear|        for (i = 0; i < $NAME_N_INPUTS; ++i) {
 linear|            e[i] /= scale;
 linear|        }
@@ -301,10 +301,10 @@ covers|    if (top * $name_near(z, $name_support[best]) < enough
 covers|        && $name_coverage(z, w, enough) < enough) {
 covers|        status |= $NAME_UNCOVERED;
 covers|    }
-      |    /* Last, so that y may be x. */
+      |    /* y is written last, so that it may be the same array as x. */
       |    for (o = 0; o < $NAME_N_OUTPUTS; ++o) {
       |        y[o] = $name_offset[o] + sum[o];
-asked |        /* Not (y < low): NaN, of a fault, fails every comparison. */
+asked |        /* Also true for NaN, which only a fault can give. */
 asked |        if (!(y[o] >= $name_output_low[o])) {
 told  |        if (y[o] < $name_output_low[o]) {
 held  |            y[o] = $name_output_low[o];

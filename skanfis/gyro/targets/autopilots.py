@@ -72,7 +72,8 @@ class Cubic:
             return "\n".join([*lines, ""])
         gyro, whole = f"TC_G{instance}_", {"TC_G_ENABLE": 1}
         if device_id is None:
-            lines.append(f"# 1\t1\t{gyro}ID\t?\t6: missing, and without it nothing is compensated.")
+            given = f"--target px4:{axis}:{instance}:DEVICE_ID"
+            lines.append(f"# {gyro}ID is missing, and PX4 compensates nothing. Give {given}.")
         else:
             whole[f"{gyro}ID"] = device_id
         found = {f"{gyro}TREF": self.reference, f"{gyro}TMIN": self.low, f"{gyro}TMAX": self.high}

@@ -23,7 +23,7 @@ NAMES, _N_CELLS = {1: "gyro_table", 2: "gyro_rate_table"}, {1: 64, 2: 24}
 _MARGIN = 1.001  # of a fixed-point scale, for rounding
 
 _CODE = """
-      |/* The value between two. */
+      |/* The value between two neighbours. */
       |static $wide $name_between($wide a, $wide b, $wide part)
       |{
       |    return a + (b - a) * part$per_one;
@@ -160,27 +160,27 @@ class Table:
         lines = [
             *map(remark, notes),
             f"{' x '.join(map(str, self.counts))} cells; C99, {dialect.real}.",
-            f"Whatever the inputs: {n_products + (2 * d if bits else d)} multiplications, "
+            f"Cost of any evaluation: {n_products + (2 * d if bits else d)} multiplications, "
             f"{(n_products if bits else 0) + 2 * d} divisions. Memory: {n_bytes} bytes of tables.",
             "",
             *input_lines(self.names, self.low * self.scale, self.high * self.scale, units),
             "Outputs y:",
             "  [0] error [deg/s]",
             "",
-            "An input beyond its range is held at the end of it.",
+            "An input beyond its range is held at its end, and the row is flagged.",
         ]
         if bits:
             pairs = enumerate(zip(self.names, self.scale, strict=True))
             inputs = ", ".join(f"x[{k}] is {name} / {_shown(scale)}" for k, (name, scale) in pairs)
             lines.append(
-                f"Fixed point: {inputs}, rounded by the caller, who saturates it to {-2 * one} and "
+                f"Fixed point: {inputs}, rounded by the caller and held within {-2 * one} and "
                 f"{2 * one - 1}. The error is y[0] * {_shown(self.unit)} deg/s. No sum or product "
                 "overflows: nothing else is saturated."
             )
         else:
-            lines.append("A row that is not finite gets no output.")
+            lines.append("A row with an input that is not finite gets no output.")
         include = "#include <stdint.h>" if bits else ""
-        header = header_of("The error of a gyro", lines, dialect, d, 1, include)
+        header = header_of("A table of the error of a gyro", lines, dialect, d, 1, include)
         return SimpleNamespace(name=dialect.name, header=header, source="\n".join(source))
 
     def _answers(self):

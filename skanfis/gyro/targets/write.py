@@ -23,8 +23,16 @@ _MOST_TIMES = 1.5
 _N_CALIBRATION_TEMPERATURES = 200
 
 
+def axes_of(text):
+    """The inputs that a target such as "px4:x:0" has."""
+    return ("temperature", "output") if text.startswith("rate-table") else ("temperature",)
+
+
 def write_targets(calibration, texts, folder):
-    """Write targets such as "px4:x:0"; yield each, a sentence, and whether it was written."""
+    """Write targets such as "px4:x:0"; yield each, a sentence, and whether it was written.
+
+    The inputs of the calibration must be those of every target.
+    """
     for text in texts:
         yield text, *_write(calibration, text, folder)
 
@@ -33,13 +41,6 @@ def _write(calibration, text, folder):
     """A sentence on a target's accuracy, or on why it was refused; and whether it is written."""
     name, *details = text.split(":")
     compensator, X = calibration.compensator, calibration.X
-    axes = ("temperature", "output") if name == "rate-table" else ("temperature",)
-    if set(X) != set(axes):
-        return (
-            f"the model needs {' and '.join(X)}, and this target says what follows from "
-            f"{' and '.join(axes)}. Calibrate again with --inputs {' '.join(axes)}, or ask for "
-            "another target."
-        ), False
     make: Any = partial(Cubic, autopilot=name)
     is_code = name not in NOTES
     if is_code:
@@ -52,12 +53,12 @@ def _write(calibration, text, folder):
     largest = high - low if is_relative else max(-low, high)
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if not np.isfinite(largest):
-        return "no bound of its difference from the model could be proven.", False
+        return "its difference from the model could not be bounded.", False
     left = _held_out_rms(calibration, make, is_relative)
     if left > _MOST_TIMES * model_rms:
         return (
-            f"it leaves {left:.4g} deg/s RMS on rows held out, and the model {model_rms:.4g}; more "
-            f"than {_MOST_TIMES:g} times as much is not written."
+            f"it leaves {left:.4g} deg/s RMS on rows held out, more than {_MOST_TIMES:g} times as "
+            f"much as the model, {model_rms:.4g}."
         ), False
     of = "model(T) - model(T_cal), for the worst T_cal," if is_relative else "the model"
     worth = (
@@ -67,8 +68,8 @@ def _write(calibration, text, folder):
     if name == "px4":
         edges = spread(made.piecewise.ends).T
         steepest = np.abs(made.piecewise.ranges(edges[:, :-1], edges[:, 1:])[1]).max()
-        worth += f"; PX4, which holds it for up to 1 degC, adds {steepest:.4g} deg/s at most"
-    notes = [f"In the place of the model in compensator.json: {worth}.", *notes_on(compensator)[1:]]
+        worth += f"; PX4, which updates it every 1 degC, adds {steepest:.4g} deg/s at most"
+    notes = [f"This replaces the model in compensator.json: {worth}.", *notes_on(compensator)[1:]]
     if is_code:
         use = f"{SUBTRACT} {raw_rate_of(compensator)}"
         write_files(

@@ -92,7 +92,7 @@ def test_the_header_says_what_goes_in_and_comes_out():
         "[0] temperature [degC]: -20 to 60",
         "[1] output [counts]: -2500 to 2500",
         "x[0] is temperature / 2^-9 (0.00195312), x[1] is output / 2^-3 (0.125), rounded by the "
-        "caller, who saturates it to -32768 and 32767.",
+        "caller and held within -32768 and 32767.",
         "No sum or product overflows",
     ):
         assert text in told
