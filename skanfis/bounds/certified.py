@@ -289,7 +289,7 @@ def read_box(box, model: TSKModel):
         found = np.empty(0)
     if found.shape != (model.n_inputs, 2):
         raise ValueError(
-            f"box must have one (low, high) for each of the {model.n_inputs} inputs ("
+            "box must have one (low, high) for each input ("
             f"{', '.join(map(repr, model.input_names))}), or be a dict from their names to (low, "
             f"high); got {box!r}."
         )

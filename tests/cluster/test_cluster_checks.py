@@ -46,11 +46,11 @@ def test_errors_name_the_row_and_the_column(clusterer, rng):
     ("clusterer", "message"),
     [
         (FuzzyCMeans(m=1.0), "'m' parameter"),
-        (FuzzyCMeans(init=np.zeros((2, 2))), r"init has shape \(2, 2\), but n_clusters=3"),
+        (FuzzyCMeans(init=np.zeros((2, 2))), r"init has shape \(2, 2\), not \(3, 2\)"),
         (FuzzyCMeans(init=np.full((3, 2), np.nan)), "init contains NaN"),
         (FuzzyCMeans(11), "n_clusters=11 needs as many distinct rows .* but there are 10"),
         (SubtractiveClustering(0.0), "'radius' parameter"),
-        (SubtractiveClustering([0.5]), r"radius has shape \(1,\), but X has 2 columns"),
+        (SubtractiveClustering([0.5]), r"radius has shape \(1,\), not \(2,\)"),
         (SubtractiveClustering([0.5, -1.0]), "must be positive and finite"),
         (SubtractiveClustering(accept=0.1), "reject=0.15 must not exceed accept=0.1"),
     ],
