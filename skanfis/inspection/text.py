@@ -10,7 +10,14 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, told_apart
+from ..digits import (
+    MOST_DIGITS,
+    in_digits,
+    limits_in_digits,
+    plain,
+    range_in_digits,
+    told_apart,
+)
 from ..export import fold
 from ..export.columns import categories, columns_of
 from ..learning.data import never_changes
@@ -344,7 +351,7 @@ def _legend(said, found, precision):
         lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         if np.isfinite([low, high]).any():
-            limits = range_in_digits(low, high, precision + 1)
+            limits = limits_in_digits(low, high, precision + 1)
             lines.append(_wrapped(f"No prediction leaves these limits: {name}, {limits}."))
     functions = {term["function"] for term in named}
     written = [name for name in compress(model.term_names, said.says_where) if "±" in name]

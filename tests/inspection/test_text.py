@@ -50,6 +50,17 @@ def test_noise_is_told_in_the_units_of_the_target(rng):
     assert "about the rules" not in export_text(replace(model.fit(X, y).model_, posterior=None))
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def test_limits_hold_as_they_are_written(rng):
+    X = rng.uniform(-1, 1, size=(60, 2))
+    for shift in (0.0, 0.0017, 0.0044):
+        model = ANFISRegressor(n_mfs=[2, 1]).fit(X, np.sin(3 * X[:, 0]) * X[:, 1] + shift)
+        low, high = read_text(export_text(model)).limits["y"]
+        held = model.model_.output_limits[:, 0]
+        assert low <= held[0] < held[1] <= high
+        assert [low, high] == pytest.approx(held, abs=0.01)
+
+
 def test_a_target_that_rounding_alone_changes_does_not_vary(rng):
     X, y = rng.normal(size=(60, 2)), np.where(np.arange(60) % 2, 0.3, 0.1 + 0.2)
     assert "\ny varies by 0," in export_text(ANFISRegressor(max_rules=2).fit(X, y))
