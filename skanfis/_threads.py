@@ -3,10 +3,20 @@
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from numbers import Integral
 from threading import Lock
 
 from joblib import Parallel, delayed, effective_n_jobs
 from threadpoolctl import ThreadpoolController
+
+from ._sklearn import Interval
+
+# What ``n_jobs`` may be, for ``_parameter_constraints``: joblib has no meaning for zero.
+N_JOBS = [
+    Interval(Integral, None, -1, closed="right"),
+    Interval(Integral, 1, None, closed="left"),
+    None,
+]
 
 # The process's thread pools, kept because finding them takes as long as a small fit.
 _thread_pools = lru_cache(maxsize=1)(ThreadpoolController)

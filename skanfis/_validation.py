@@ -93,6 +93,8 @@ def _check_kind(table, what, takes_categories):
     is_frame = hasattr(table, "columns") and hasattr(table, "dtypes")
     names = list(table.columns) if is_frame else [getattr(table, "name", None)]
     dtypes = list(table.dtypes) if is_frame else [getattr(table, "dtype", None)]
+    if is_frame and not names:
+        raise ValueError(f"{what} has no columns: give a table with at least one.")
     is_sparse_frame = is_frame and dtypes and all(hasattr(one, "fill_value") for one in dtypes)
     if issparse(table) or is_sparse_frame:
         dense = f"{what}.sparse.to_dense()" if is_frame else f"{what}.toarray()"
@@ -194,7 +196,8 @@ def group_numbers(groups, n_rows):
         )
     if len(groups) != n_rows:
         raise ValueError(
-            f"groups has {len(groups)} entries for {n_rows} rows of X: give every row its label."
+            f"groups must have one entry per row; X has the length {n_rows}, groups {len(groups)}: "
+            "give every row its label."
         )
     missing = [i for i, group in enumerate(groups) if is_missing(group)]
     if missing:
@@ -257,7 +260,8 @@ def feature_indices(given, names, parameter):
     if entries and all(isinstance(entry, bool | np.bool_) for entry in entries):
         if len(entries) != len(names):
             raise ValueError(
-                f"{parameter} is a mask of {len(entries)} entries, but X has {len(names)} columns."
+                f"{parameter} is a mask of the length {len(entries)}: give one entry for each "
+                f"column of X, {len(names)} in all."
             )
         entries = np.flatnonzero(entries).tolist()
     found = [position_of(entry, names) for entry in entries]

@@ -4,6 +4,8 @@ import numpy as np
 
 # 17 significant digits identify every double; more add nothing.
 MOST_DIGITS = 17
+# Part of a unit of the last digit that counts as a rounding error.
+_ROUNDING = 1e-6
 
 
 def rounded(values, unit, digits):
@@ -28,6 +30,15 @@ def range_in_digits(low, high, digits):
     if 0.0 < (width := float(high) - float(low)) < np.inf:
         return " to ".join(map(plain, rounded([low, high], width, digits)))
     return " to ".join(in_digits(end, digits) for end in (low, high))
+
+
+def limits_in_digits(low, high, digits):
+    """Write a range as ``range_in_digits`` does, but rounded outwards, so that it still holds."""
+    if not 0.0 < (width := float(high) - float(low)) < np.inf:
+        return f"{plain(low)} to {plain(high)}"
+    # Less than half a unit of the last digit: ends of no more digits stay as they are.
+    room = (0.5 - _ROUNDING) * 10.0 ** (np.floor(np.log10(width)) - digits + 1)
+    return " to ".join(map(plain, rounded([low - room, high + room], width, digits)))
 
 
 def told_apart(values, fewest):

@@ -24,7 +24,7 @@ from ._sklearn import (
     check_parameters,
     fit_context,
 )
-from ._threads import one_blas_thread
+from ._threads import N_JOBS, one_blas_thread
 from ._validation import check_finite, named_refusals, unchanged_by_failure
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
 from .inspection import rules_html
@@ -230,7 +230,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         "out_of_bounds": [StrOptions(set(OUT_OF_BOUNDS)), LinearExtrapolation],
         "verbose": ["verbose"],
         "random_state": ["random_state"],
-        "n_jobs": [Integral, None],
+        "n_jobs": N_JOBS,
     }
 
     def __init__(
@@ -519,7 +519,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         sample_weight : array-like of shape (n_samples,), default=None
             Weights, zero or positive, relative to those of all other calls.
         forgetting : float, default=1.0
-            Factor above 0 and at most 1. Every row with non-zero weight multiplies the weights of
+            Factor from 1e-12 to 1. Every row with non-zero weight multiplies the weights of
             all rows before it by this. 1 forgets nothing; at 0.999 about the last 1,000 rows count.
             The range of the training data and the row counts of ``coverage`` do not forget.
 

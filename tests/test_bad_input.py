@@ -106,7 +106,7 @@ REFUSED = {
     "one row": ({"X": X[:1], "y": Y[:1]}, ["1 sample(s)", "minimum of 2", "ANFISRegressor"]),
     "3D y": ({"y": Y[:, None, None]}, ["Found array with dim 3", "ANFISRegressor"]),
     "lengths": ({"y": Y[:-1]}, ["inconsistent numbers of samples", "60", "59"]),
-    "other groups": ({"groups": [1, 2]}, ["groups has 2 entries for 60 rows", "every row"]),
+    "other groups": ({"groups": [1, 2]}, ["one entry per row", "length 60, groups 2", "every row"]),
     "kinds of groups": ({"groups": [1, "a"] * 30}, ["groups holds int and str", "text alone"]),
     "pairs": ({"groups": [(1, 2)] * N_ROWS}, ["groups must have one entry per row", "(60, 2)"]),
     "name of groups": ({"groups": "run"}, ["groups must have one entry per row", "shape ()"]),
@@ -119,7 +119,8 @@ REFUSED = {
         ["y holds values of type int in column 'error', first at row 59", "too large"],
     ),
     "missing group": ({"groups": [None] * N_ROWS}, ["groups has no value for 60 of 60 rows"]),
-    "workers": ({"n_jobs": 0}, ["n_jobs == 0"]),
+    "no columns": ({"X": FRAME[[]]}, ["X has no columns", "at least one"]),
+    "no columns of y": ({"y": FRAME[[]]}, ["y has no columns"]),
     "MATLAB": ({"mf": "gbellmf"}, ["'gbellmf' is MATLAB's name", "mf='bell'"]),
     "weights": (
         {"partition": AgglomerativeClustering(n_clusters=2), "sample_weight": np.ones(N_ROWS)},
@@ -398,7 +399,8 @@ def test_more_rules_than_memory(n_inputs, settings, said, rng):
         ("early_stopping", 0.1, "'skanfis.options.EarlyStopping'"),
         ("max_iter", -1, "[0, inf)"),
         ("random_state", "lucky", "RandomState"),
-        ("n_jobs", 1.5, "'int'"),
+        ("n_jobs", 1.5, "int"),
+        ("n_jobs", 0, "[1, inf)"),
     ],
 )
 def test_parameter_of_the_wrong_type_or_range(parameter, value, allowed):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skanfis.digits import in_digits, range_in_digits, told_apart
+from skanfis.digits import in_digits, limits_in_digits, range_in_digits, told_apart
 
 
 @pytest.mark.parametrize(
@@ -38,6 +38,22 @@ def test_number_has_so_many_digits(value, digits, text):
 )
 def test_range_has_digits_that_mean_something(low, high, text):
     assert range_in_digits(low, high, 6) == text
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "text"),
+    [
+        (-2.3812, 2.0013, "-2.39 to 2.01"),
+        (0.0, 1.0, "0 to 1"),
+        (-120.0, 0.1 + 0.2, "-120 to 1"),
+        (1e-12, 1.2345e-11, "1e-12 to 1.24e-11"),
+        (1e12 + 0.123, 1e12 + 7.777, "1000000000000.12 to 1000000000007.78"),
+        (-np.inf, 1.23456, "-inf to 1.23456"),
+        (20.25, 20.25, "20.25 to 20.25"),
+    ],
+)
+def test_limits_are_rounded_outwards(low, high, text):
+    assert limits_in_digits(low, high, 3) == text
 
 
 def test_numbers_are_told_apart():

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
 from .._validation import check_count, feature_indices
+from ..digits import limits_in_digits
 from ..export import fold
 from ..membership import FAMILIES
 from ..model import TSKModel
@@ -74,9 +75,10 @@ class Bounds:
             return np.where(gap > 0.0, gap / np.maximum(self.highest - self.lowest, 0.0), 0.0)
 
     def __repr__(self):
+        ends = zip(self.output_names, self.lower, self.upper, strict=True)
         parts = [
-            f"{name} in [{low:.6g}, {high:.6g}]"
-            for name, low, high in zip(self.output_names, self.lower, self.upper, strict=True)
+            f"{name} in [{limits_in_digits(low, high, 6).replace(' to ', ', ')}]"
+            for name, low, high in ends
         ]
         return f"Bounds({'; '.join(parts)})"
 
@@ -289,7 +291,7 @@ def read_box(box, model: TSKModel):
         found = np.empty(0)
     if found.shape != (model.n_inputs, 2):
         raise ValueError(
-            f"box must have one (low, high) for each of the {model.n_inputs} inputs ("
+            "box must have one (low, high) for each input ("
             f"{', '.join(map(repr, model.input_names))}), or be a dict from their names to (low, "
             f"high); got {box!r}."
         )

@@ -176,8 +176,8 @@ def _signs(given, input_names, n_outputs):
     signs = np.zeros(n_inputs) if given is None else _numbers(given, told)
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):
         raise ValueError(
-            f"monotonic_cst has shape {signs.shape}, but X has {n_inputs} columns and y "
-            f"{n_outputs}: give one number per column of X, or one row of such numbers per output."
+            f"monotonic_cst has shape {signs.shape}, not {(n_inputs,)} or {(n_outputs, n_inputs)}: "
+            "give one number per column of X, or one row of such numbers per output."
         )
     if not np.isin(signs, (-1, 0, 1)).all():
         raise ValueError(f"{told} must hold only -1 (falling), 0 (free) and 1 (rising).")
@@ -192,10 +192,10 @@ def _numbers(given, what):
 
 
 def _per_output(given, nothing, what, n_outputs):
-    values = _numbers(nothing if given is None else given, f"{what} in constraints={given!r}")
+    values = _numbers(nothing if given is None else given, f"{what}={given!r} in constraints")
     if values.ndim > 1 or values.size not in (1, n_outputs) or np.isnan(values).any():
         raise ValueError(
-            f"{what}={given!r} must be a number, or one for each of the {n_outputs} outputs."
+            f"{what}={given!r} must be a number, or one per output of the model ({n_outputs})."
         )
     return np.broadcast_to(values, (n_outputs,))
 

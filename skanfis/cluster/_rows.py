@@ -12,7 +12,7 @@ from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .._sklearn import check_sample_weight, fit_context
-from .._validation import check_finite, check_not_negative
+from .._validation import check_finite, check_not_negative, named_refusals
 from ..blocks import row_blocks
 
 # Number of distances in a block: a few arrays of this size stay in the cache.
@@ -21,7 +21,8 @@ _BLOCK_SIZE = 32_768
 
 def check_rows(estimator, X, reset=False) -> np.ndarray:
     """X as a finite array of float64, or ValueError that names the column."""
-    X = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
+    with named_refusals(X=X):
+        X = validate_data(estimator, X, reset=reset, dtype=np.float64, ensure_all_finite=False)
     names = getattr(estimator, "feature_names_in_", [f"x{j}" for j in range(X.shape[1])])
     check_finite(X, "X", names)
     return X
@@ -29,7 +30,8 @@ def check_rows(estimator, X, reset=False) -> np.ndarray:
 
 def distinct_rows(X, sample_weight):
     """Distinct rows of positive weight, in lexicographic order, and the weight of each."""
-    weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+    with named_refusals(sample_weight=sample_weight):
+        weight = check_sample_weight(sample_weight, X, dtype=np.float64)
     check_not_negative(weight)
     keep = weight > 0
     if not keep.any():

@@ -229,9 +229,8 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
             centers = check_array(self.init, dtype=np.float64, input_name="init")
             if centers.shape != (self.n_clusters, points.shape[1]):
                 raise ValueError(
-                    f"init has shape {centers.shape}, but n_clusters={self.n_clusters} and X has "
-                    f"{points.shape[1]} columns: give one row per cluster, with one number per "
-                    "column of X."
+                    f"init has shape {centers.shape}, not {(self.n_clusters, points.shape[1])}: "
+                    "give one row per cluster, with one number per column of X."
                 )
             return [(centers - mean) / scale]
         random_state = check_random_state(self.random_state)

@@ -126,8 +126,8 @@ class SubtractiveClustering(Clusterer):
         radius = np.asarray(self.radius, dtype=np.float64)
         if radius.ndim and radius.shape != (self.n_features_in_,):
             raise ValueError(
-                f"radius has shape {radius.shape}, but X has {self.n_features_in_} columns: give "
-                "one number, or one per column."
+                f"radius has shape {radius.shape}, not {(self.n_features_in_,)}: give one number, "
+                "or one per column of X."
             )
         if not (np.isfinite(radius) & (radius > 0)).all():
             raise ValueError(f"radius={self.radius!r} must be positive and finite.")

@@ -102,7 +102,7 @@ class DaskANFISRegressor(ANFISRegressor):
         import pandas as pd
 
         if X.ndim != 2:
-            raise ValueError(f"X has {X.ndim} dimensions, and a table has two: rows and columns.")
+            raise ValueError(f"X has ndim={X.ndim}, and that of a table is 2: rows and columns.")
         columns = getattr(X, "columns", None)
         empty = np.empty((0, X.shape[1])) if columns is None else pd.DataFrame(columns=columns)
         validate_data(self, empty, reset=reset, skip_check_array=True)

@@ -45,7 +45,7 @@ class Layout:
                     "X and y as dask arrays or DataFrames, or compute() the others."
                 )
             if one.ndim not in dimensions:
-                raise ValueError(f"{what} has {one.ndim} dimensions: X must have 2, y 1 or 2.")
+                raise ValueError(f"{what} has ndim={one.ndim}: that of X must be 2, of y 1 or 2.")
         n_inputs, n_outputs = X.shape[1], 1 if y.ndim == 1 else y.shape[1]
         is_named = hasattr(y, "divisions") and getattr(y, "name", None) is not None
         names = getattr(y, "columns", [y.name] if is_named else None)
@@ -90,8 +90,8 @@ class Partitions:
             parts = [None] * len(first) if one is None else _delayed(one, what)
             if len(parts) != len(first):
                 raise ValueError(
-                    f"{what} has {len(parts)} partitions, X has {len(first)}: they must be cut at "
-                    "the same rows. Take them from one frame, or use repartition or rechunk."
+                    f"{what} has npartitions={len(parts)}, X {len(first)}: they must be cut at the "
+                    "same rows. Take them from one frame, or use repartition or rechunk."
                 )
             pieces.append(parts)
         return cls(list(zip(*pieces, strict=True)), layout)
@@ -209,7 +209,7 @@ def _numbers(table, what, names, n_columns):
     array = as_numbers(table, what, takes_categories=False)
     array = array[:, None] if array.ndim == 1 else array
     if array.shape[1] != n_columns:
-        raise ValueError(f"{what} has the shape {array.shape}; {n_columns} columns are expected.")
+        raise ValueError(f"{what} has the shape {array.shape}, not {(len(array), n_columns)}.")
     return array
 
 

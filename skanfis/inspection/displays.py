@@ -29,7 +29,7 @@ _MOST_NAMED = 7
 # Characters of a legend, or of a note below, that a panel has room for.
 _LEGEND_WIDTH = 42
 # Contours that can still be told apart by colour; relative range that counts as rounding errors.
-_LEVELS, _FLAT = 15, 1e-11
+_LEVELS, _FLAT = 15, 1e-12
 # Below this coverage a prediction counts as extrapolated: it does not set the colours.
 _COVERED = 0.5
 
@@ -269,7 +269,7 @@ def panels_or_new(ax, count, note):
     if ax is not None:
         axes = np.ravel(ax)
         if axes.size != count:
-            raise ValueError(f"ax has {axes.size} axes; {count} are needed, one per panel.")
+            raise ValueError(f"ax holds {axes.size} Axes, not {count}: give one per panel.")
         return axes
     columns = min(3, count)
     rows = -(-count // columns)

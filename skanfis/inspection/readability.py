@@ -233,8 +233,8 @@ def readability(
         target = target.reshape(-1, 1) if target.ndim == 1 else target
         if target.shape[1] != model.n_outputs:
             raise ValueError(
-                f"y has {target.shape[1]} columns; the model has {model.n_outputs} outputs: "
-                f"{', '.join(map(repr, model.output_names))}."
+                f"y must have a column for each output of the model, "
+                f"{', '.join(map(repr, model.output_names))}; it has {target.shape[1]}."
             )
         check_finite(target, "y", model.output_names)
     if sample_weight is not None:

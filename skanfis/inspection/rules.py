@@ -94,7 +94,10 @@ def rename(model, feature_names, output_names):
             raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
         count = len(getattr(model, kind))
         if len(names) != count or len(set(names)) != count:
-            raise ValueError(f"{parameter}={list(names)!r} must be {count} names, all different.")
+            own = ", ".join(map(repr, getattr(model, kind)))
+            raise ValueError(
+                f"{parameter}={list(names)!r} must hold one name for each of {own}, all different."
+            )
         model = replace(model, **{kind: tuple(names)})
     return model
 

@@ -10,7 +10,14 @@ import numpy as np
 import pandas as pd
 
 from .._validation import check_count
-from ..digits import MOST_DIGITS, in_digits, plain, range_in_digits, told_apart
+from ..digits import (
+    MOST_DIGITS,
+    in_digits,
+    limits_in_digits,
+    plain,
+    range_in_digits,
+    told_apart,
+)
 from ..export import fold
 from ..export.columns import categories, columns_of
 from ..learning.data import never_changes
@@ -122,7 +129,7 @@ def export_text(
     said, found = _said(estimator, precision, feature_names, output_names)
     model, chosen = said.model, shown_rules(said.model, max_shown)
     counts = f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."
-    parts = ["\n".join([counts, *_deviations(model, found, precision)])]
+    parts = ["\n".join([counts, *map(_wrapped, _deviations(model, found, precision))])]
     common = _common_lines(said)
     parts += [_wrapped(f"Common to the rules, {line}.") for line in common]
     if common:
@@ -326,7 +333,7 @@ def _legend(said, found, precision):
             listed.append(j)
             continue
         range_of = range_in_digits(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
-        lines.append(f"  {name}: {range_of}")
+        lines.append(_wrapped(f"{name}: {range_of}", "  ", 6 * " "))
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
     lists = categories(model, listed)
@@ -344,8 +351,8 @@ def _legend(said, found, precision):
         lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         if np.isfinite([low, high]).any():
-            limits = range_in_digits(low, high, precision + 1)
-            lines.append(f"No prediction leaves these limits: {name}, {limits}.")
+            limits = limits_in_digits(low, high, precision + 1)
+            lines.append(_wrapped(f"No prediction leaves these limits: {name}, {limits}."))
     functions = {term["function"] for term in named}
     written = [name for name in compress(model.term_names, said.says_where) if "±" in name]
     signs = {name.split()[0] for name in written}

@@ -21,7 +21,13 @@ from sklearn.utils.metadata_routing import process_routing
 from sklearn.utils.validation import has_fit_parameter
 
 from .._sklearn import check_sample_weight, safe_indexing
-from .._validation import as_numbers, check_finite, group_numbers, positive_weights
+from .._validation import (
+    as_numbers,
+    check_finite,
+    group_numbers,
+    named_refusals,
+    positive_weights,
+)
 from ..exceptions import OutOfBoundsWarning
 from ..export.folding import final_step
 from ..naming import default_output_names
@@ -57,10 +63,13 @@ def checked_targets(y, sample_weight, groups):
     if y is None:
         raise ValueError("ConformalRegressor requires y to be passed, but the target y is None.")
     targets = as_numbers(y, "y")
+    if not targets.size:
+        raise ValueError("y has no rows: at least 2 are needed, one of them to be held out.")
     by_output = targets.reshape(len(targets), -1)
     check_finite(by_output, "y", default_output_names(by_output.shape[1]))
     if sample_weight is not None:
-        sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
+        with named_refusals(sample_weight=sample_weight):
+            sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
         positive_weights(sample_weight, len(targets))
     numbers = None if groups is None else group_numbers(groups, len(targets))
     has_weight = slice(None) if sample_weight is None else sample_weight > 0.0

@@ -81,8 +81,8 @@ def membership_families(mf, input_names) -> list[type[Membership]]:
     given = [mf] * len(input_names) if isinstance(mf, str | type) else list(mf)
     if len(given) != len(input_names):
         raise ValueError(
-            f"mf={mf!r} has {len(given)} entries, but X has {len(input_names)} columns "
-            f"({', '.join(input_names)}): give one family for all inputs, or one for each."
+            f"mf={mf!r} has the length {len(given)}, and the columns of X are "
+            f"{', '.join(input_names)}: give one family for all of them, or one for each."
         )
     families = []
     for entry in given:

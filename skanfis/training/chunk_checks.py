@@ -13,6 +13,8 @@ from ..model import TSKModel
 _STRUCTURE = ("n_mfs", "mf", "order", "premise_features", "consequent_features")
 # Between this and its inverse, sums of squares of weights and of standardised rows stay finite.
 _SMALLEST_WEIGHT = 1.0 / LARGEST_NUMBER
+# With less, what is left of the rows before the latest is lost in rounding.
+_LEAST_FORGETTING = 1e-12
 # Tolerance for equal parameters, relative: a file may round the last digits.
 _ROUNDING = 1e-12
 
@@ -20,10 +22,10 @@ _ROUNDING = 1e-12
 def check_forgetting(forgetting):
     """Raise ValueError where a forgetting factor is out of range."""
     is_number = isinstance(forgetting, Real) and not isinstance(forgetting, bool)
-    if not is_number or not 0.0 < float(forgetting) <= 1.0:
+    if not is_number or not _LEAST_FORGETTING <= float(forgetting) <= 1.0:
         raise ValueError(
-            f"forgetting={forgetting!r} must be a number above 0 and at most 1: every new row "
-            "multiplies the weights of all earlier rows by it; 1 forgets nothing."
+            f"forgetting={forgetting!r} must be a number from {_LEAST_FORGETTING:.0e} to 1: every "
+            "new row multiplies the weights of all earlier rows by it; 1 forgets nothing."
         )
 
 
@@ -86,8 +88,8 @@ def check_outputs(base: TSKModel, names):
     before = base.output_names
     if len(names) != len(before):
         raise ValueError(
-            f"y has {len(names)} outputs, but earlier chunks had {len(before)} "
-            f"({', '.join(before)}): give every chunk the same outputs."
+            f"Earlier chunks had the outputs {', '.join(before)}, and y has {len(names)}: give "
+            "every chunk the same outputs."
         )
     if any(name != old and name in before for name, old in zip(names, before, strict=True)):
         raise ValueError(

@@ -77,7 +77,8 @@ def as_given(estimator, data, model) -> Fitted:
     """The imported model itself, with its error on the data."""
     if model.n_outputs != data.y.shape[1]:
         raise ValueError(
-            f"partition is a model of {model.n_outputs} outputs, but y has {data.y.shape[1]}. "
+            f"partition is a model of {', '.join(model.output_names)}, but y has "
+            f"{', '.join(data.output_names)}. "
             "max_iter=0 keeps the model as it is: give y the same outputs, or use solver='lse'."
         )
     model = replace(

@@ -47,7 +47,7 @@ def huber_weights(problem, evaluation, epsilon, own):
     scale = _weighted_median(sizes, own) / _NORMAL_MEDIAN
     if scale == 0.0:
         # At least half of the rows are met exactly. The others then count next to nothing.
-        return np.where(sizes == 0.0, 1.0, np.finfo(float).eps)
+        return np.where(sizes == 0.0, 1.0, np.finfo(float).eps / np.maximum(sizes, 1.0))
     return np.minimum(1.0, epsilon * scale / np.maximum(sizes, np.finfo(float).tiny))
 
 
@@ -59,17 +59,17 @@ def robust_start(rows):
     if lines is None:
         return rows, weights
     sizes = np.empty(rows.n_rows)
-    for part, Z, target, _ in rows.blocks():
+    for part, Z, _, _ in rows.blocks():
         squares = [
             ((values - center) / spread - line.predict(Z.T)) ** 2
-            for values, (center, spread, line) in zip(target, lines, strict=True)
+            for values, (center, spread, line) in zip(rows.y[part].T, lines, strict=True)
         ]
         sizes[part] = np.sqrt(np.mean(squares, axis=0))
     scale = _weighted_median(sizes, rows.weights) / _NORMAL_MEDIAN
     if scale == 0.0:
         return rows, weights
     weights = np.minimum(1.0, _FAR * scale / np.maximum(sizes, np.finfo(float).tiny))
-    weights = np.maximum(np.round(weights, _DIGITS), 10.0**-_DIGITS)
+    weights = 10.0 ** np.round(np.log10(weights), _DIGITS)
     if (weights == 1.0).all():
         return rows, weights
     # With the weight squared, no row adds more than one at ten deviations would.
@@ -79,9 +79,10 @@ def robust_start(rows):
 
 def _robust_lines(rows):
     """Centre, spread and robust line of every output; None if one output has none."""
-    Z, target, _ = rows.read(slice(None))
+    Z, _, _ = rows.read(slice(None))
     lines = []
-    for values in target:
+    # In the user's units: on the scale of an outlier, all other targets may be one number.
+    for values in rows.y.T:
         center = _weighted_median(values, rows.weights)
         spread = _weighted_median(np.abs(values - center), rows.weights)
         if spread == 0.0:
@@ -116,4 +117,4 @@ def without_outliers(rows, weights):
 
 def silenced(weights):
     """The weights, but next to nothing for rows that keep less than half of theirs."""
-    return np.where(weights < _OUTLIER, np.finfo(float).eps, weights)
+    return np.where(weights < _OUTLIER, np.finfo(float).eps * weights, weights)

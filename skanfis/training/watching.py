@@ -92,18 +92,19 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
         # By the inputs alone, in any order of columns.
         groups = rows.numbers(lambda Z, _: place_in_sample(Z, Z[:0]))
     else:
-        what += f" in {np.unique(groups).size} groups"
+        n_groups = np.unique(groups).size
+        what += f" in {n_groups} groups" if n_groups > 1 else " in 1 group"
     splitter = GroupShuffleSplit(1, test_size=validation_fraction, random_state=seed)
     try:
         training, validation = next(splitter.split(np.empty((rows.n_rows, 0)), groups=groups))
     except ValueError:
-        training = validation = np.empty(0, dtype=int)
+        training, validation = np.arange(0), np.arange(rows.n_rows)
     if min(training.size, validation.size) < 2:
         raise ValueError(
-            f"early_stopping with validation_fraction={validation_fraction} leaves "
-            f"{training.size} rows to train on and {validation.size} to hold out, of {what}: "
-            "at least 2 of each are needed. Use EarlyStopping(validation_fraction=...), more rows "
-            "or groups, or early_stopping=False."
+            f"early_stopping with validation_fraction={validation_fraction} leaves, of {what}, "
+            f"{training.size} to train on and {validation.size} to hold out: at least 2 of each "
+            "are needed. Use EarlyStopping(validation_fraction=...), more rows or groups, or "
+            "early_stopping=False."
         )
     return training, validation
 

@@ -1,6 +1,7 @@
 """What both clusterers have to do, whatever the order of the rows, and what they refuse."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_array_equal
 from sklearn.base import clone
@@ -36,6 +37,13 @@ def test_errors_name_the_row_and_the_column(clusterer, rng):
     for method in (clone(clusterer).fit, fitted.predict):
         with pytest.raises(ValueError, match="X contains NaN in column 'x1', first at row 3"):
             method(bad)
+    frame = pd.DataFrame(X, columns=["a", "b"])
+    with pytest.raises(ValueError, match="X holds text in column 'b', first at row 0"):
+        clone(clusterer).fit(frame.assign(b="warm"))
+    with pytest.raises(ValueError, match="X has no columns"):
+        clone(clusterer).fit(frame[[]])
+    with pytest.raises(ValueError, match="Input sample_weight holds text, first at row 0"):
+        clone(clusterer).fit(X, sample_weight=["heavy"] * 10)
     with pytest.raises(ValueError, match="Negative values in sample_weight: -2 at row 1"):
         clone(clusterer).fit(X, sample_weight=[1, -2, *[1] * 8])
     with pytest.raises(ValueError, match=r"weight.*zero"):
@@ -46,11 +54,11 @@ def test_errors_name_the_row_and_the_column(clusterer, rng):
     ("clusterer", "message"),
     [
         (FuzzyCMeans(m=1.0), "'m' parameter"),
-        (FuzzyCMeans(init=np.zeros((2, 2))), r"init has shape \(2, 2\), but n_clusters=3"),
+        (FuzzyCMeans(init=np.zeros((2, 2))), r"init has shape \(2, 2\), not \(3, 2\)"),
         (FuzzyCMeans(init=np.full((3, 2), np.nan)), "init contains NaN"),
         (FuzzyCMeans(11), "n_clusters=11 needs as many distinct rows .* but there are 10"),
         (SubtractiveClustering(0.0), "'radius' parameter"),
-        (SubtractiveClustering([0.5]), r"radius has shape \(1,\), but X has 2 columns"),
+        (SubtractiveClustering([0.5]), r"radius has shape \(1,\), not \(2,\)"),
         (SubtractiveClustering([0.5, -1.0]), "must be positive and finite"),
         (SubtractiveClustering(accept=0.1), "reject=0.15 must not exceed accept=0.1"),
     ],

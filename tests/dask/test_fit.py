@@ -266,7 +266,7 @@ def weighted(weight):
         (with_text, ValueError, r"Partition 1: .*holds text in column 'rate'"),
         (with_unknown_chunks, ValueError, r"Partition \d: X has 100 rows and y \d+"),
         (lambda: cut(100, data(300)[0], data(299)[1]), ValueError, "Partition 2: .*100 .* y 99"),
-        (of_other_partitions, ValueError, "y has 2 partitions, X has 3"),
+        (of_other_partitions, ValueError, "y has npartitions=2, X 3"),
         (
             lambda: (cut(100, data(300)[0])[0], data(300)[1]),
             TypeError,
@@ -315,9 +315,9 @@ def test_prediction_wants_the_columns_of_training():
         fitted_on_a_frame().predict(dd.from_pandas(frame(300)[NAMES[::-1]], npartitions=2))
     with pytest.raises(ValueError, match="expecting 2 features"):
         fitted().predict(da.zeros((10, 3)))
-    with pytest.raises(ValueError, match="X has 1 dimensions, and a table has two"):
+    with pytest.raises(ValueError, match="X has ndim=1, and that of a table is 2"):
         fitted().predict(da.zeros(10))
-    with pytest.raises(ValueError, match="X has 1 dimensions: X must have 2, y 1 or 2"):
+    with pytest.raises(ValueError, match="X has ndim=1: that of X must be 2"):
         DaskANFISRegressor().fit(da.zeros(10), da.zeros(10))
 
 

@@ -71,13 +71,20 @@ class TestSurface:
     @pytest.mark.parametrize("value", [-7.0, 0.0, 2249.7])
     def test_what_is_flat_but_for_rounding_is_drawn_flat(self, value):
         xx0, xx1 = np.meshgrid(np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 7))
-        response = value * (1.0 + 1e-13 * np.random.default_rng(0).normal(size=xx0.shape))
+        response = value * (1.0 + 3e-14 * np.random.default_rng(0).normal(size=xx0.shape))
         shown = {"xx0": xx0, "xx1": xx1, "response": response, "coverage": np.ones(xx0.shape)}
         names = {"input_names": ("a", "b"), "output_name": "y", "held": {}}
         display = drawn(ResponseSurfaceDisplay(**shown, **names).plot())
         *_, bar = display.figure_.axes
         assert bar.yaxis.get_major_formatter().get_offset() == ""
         assert np.ptp(display.surface_.levels) >= 0.1 * abs(value)
+
+    def test_a_small_change_of_a_large_target_is_drawn(self):
+        xx0, xx1 = np.meshgrid(np.linspace(0.0, 1.0, 7), np.linspace(0.0, 1.0, 7))
+        shown = {"xx0": xx0, "xx1": xx1, "response": 1e12 + xx0 + xx1, "coverage": xx0 + 1.0}
+        names = {"input_names": ("a", "b"), "output_name": "y", "held": {}}
+        display = drawn(ResponseSurfaceDisplay(**shown, **names).plot())
+        assert np.ptp(display.surface_.levels) < 3.0
 
     def test_of_a_pipeline_over_its_data(self, fitted):
         pipe, X = fitted
@@ -125,7 +132,7 @@ def test_panels_are_drawn_on_given_axes(display, count):
     X = rows_of(A_GRID, 1.0, 9)
     axes = plt.subplots(count)[1]
     assert_array_equal(display.from_estimator(A_GRID, X, ax=axes).axes_, axes)
-    with pytest.raises(ValueError, match=f"ax has 2 axes; {count} are needed"):
+    with pytest.raises(ValueError, match=f"ax holds 2 Axes, not {count}"):
         display.from_estimator(A_GRID, X, ax=axes[:2])
 
 

@@ -135,7 +135,7 @@ def test_errors_name_the_row_and_the_column(monkeypatch):
         readability(A_GRID, bad)
     with pytest.raises(ValueError, match=r"X has the shape \(\d+, 2\): the estimator"):
         readability(A_GRID, X[:, :2])
-    with pytest.raises(ValueError, match=r"y has 2 columns; the model has 1 outputs: 'y'"):
+    with pytest.raises(ValueError, match=r"for each output of the model, 'y'; it has 2"):
         readability(A_GRID, X, np.ones((40, 2)))
     with pytest.raises(ValueError, match="Input y contains NaN in column 'y', first at row 3"):
         readability(A_GRID, X, np.where(np.arange(40) == 3, np.nan, 1.0))

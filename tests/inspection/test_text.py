@@ -50,6 +50,17 @@ def test_noise_is_told_in_the_units_of_the_target(rng):
     assert "about the rules" not in export_text(replace(model.fit(X, y).model_, posterior=None))
 
 
+@pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
+def test_limits_hold_as_they_are_written(rng):
+    X = rng.uniform(-1, 1, size=(60, 2))
+    for shift in (0.0, 0.0017, 0.0044):
+        model = ANFISRegressor(n_mfs=[2, 1]).fit(X, np.sin(3 * X[:, 0]) * X[:, 1] + shift)
+        low, high = read_text(export_text(model), ["x0", "x1"]).limits["y"]
+        held = model.model_.output_limits[:, 0]
+        assert low <= held[0] < held[1] <= high
+        assert [low, high] == pytest.approx(held, abs=0.01)
+
+
 def test_a_target_that_rounding_alone_changes_does_not_vary(rng):
     X, y = rng.normal(size=(60, 2)), np.where(np.arange(60) % 2, 0.3, 0.1 + 0.2)
     assert "\ny varies by 0," in export_text(ANFISRegressor(max_rules=2).fit(X, y))
@@ -401,10 +412,18 @@ def test_slopes_that_move_no_digit_are_said_to_be_too_small():
     [
         ({"precision": 0}, ValueError, "precision=0 must be a whole number from 1 to 17"),
         ({"max_shown": 0}, ValueError, "max_shown=0 must be a whole number of 1 or more"),
-        ({"feature_names": ["a"]}, ValueError, "must be 3 names, all different"),
+        ({"feature_names": ["a"]}, ValueError, "one name for each of .*, all different"),
         ({"feature_names": "abc"}, TypeError, "feature_names must be a sequence of str"),
-        ({"feature_names": list("aba")}, ValueError, "feature_names=.* 3 names, all different"),
-        ({"output_names": list("ab")}, ValueError, "output_names=.* must be 1 names"),
+        (
+            {"feature_names": list("aba")},
+            ValueError,
+            "feature_names=.* one name for each of .*, all different",
+        ),
+        (
+            {"output_names": list("ab")},
+            ValueError,
+            "output_names=.* must hold one name for each of 'y'",
+        ),
     ],
 )
 def test_parameters_are_checked(settings, error, message):
@@ -487,6 +506,14 @@ def test_there_is_a_line_per_rule(model):
     for t in np.unique(terms[terms >= 0]):
         assert Sentences.of(model).model.term_names[t] in page.text
     assert f"{model.n_rules} rule" in page.text
+
+
+def test_names_of_several_lines_or_many_letters_keep_to_the_lines():
+    long = " ".join(["a name out of a spreadsheet"] * 5)
+    names = {"feature_names": ["two\nlines", long, "c"], "output_names": ["drift\n(°/h)"]}
+    lines = export_text(A_GRID, **names).splitlines()
+    assert max(len(line) for line in lines if not line.startswith("    ")) <= 96
+    assert any("two lines: " in line for line in lines)
 
 
 def test_names_are_text_whatever_they_contain():

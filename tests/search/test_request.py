@@ -109,7 +109,7 @@ class TestImported:
 
     def test_outputs_must_be_as_many_where_nothing_is_learnt(self, data, known):
         X, y = data
-        with pytest.raises(ValueError, match="a model of 1 outputs, but y has 2"):
+        with pytest.raises(ValueError, match="a model of y, but y has y0, y1"):
             ANFISRegressor(partition=known, max_iter=0).fit(X, np.column_stack([y, y]))
 
 
@@ -138,14 +138,14 @@ TOO_MANY = ", more than max_rules=5.*fewer, or leave max_rules at None"
         ),
         ({"max_rules": 0}, "'max_rules' parameter"),
         ({"simplicity": -1}, "'simplicity' parameter"),
-        ({"mf": ["bell"]}, "has 1 entries, but X has 3 columns"),
+        ({"mf": ["bell"]}, "has the length 1, and the columns of X"),
         ({"mf": ["bell", "bell", "square"]}, "mf holds 'square': it must be one of 'gaussian'"),
         ({"mf": int}, "mf holds <class 'int'>"),
         ({"premise_features": ["speed"]}, "'speed', which is no column of X; .*'time'"),
         ({"premise_features": [3]}, "premise_features names 3, which is no column"),
         ({"premise_features": [0, 0]}, "names a column twice"),
         ({"premise_features": []}, "names no column"),
-        ({"premise_features": [True, False]}, "a mask of 2 entries, but X has 3"),
+        ({"premise_features": [True, False]}, "a mask of the length 2: give one entry .* 3 in all"),
         ({"consequent_features": [0], "order": 0}, "has no effect with order=0"),
         ({"n_mfs": [2, 1, 1], "premise_features": ["rate"]}, "'time', which is not in premise"),
     ],

@@ -271,10 +271,17 @@ def test_rows_of_before_a_jump_stay_covered(premises):
     assert model.coverage(jumped) == pytest.approx(once.coverage(jumped), abs=1e-3)
 
 
-@pytest.mark.parametrize("forgetting", [0.0, 1.01, np.nan, "0.9", True, None])
+@pytest.mark.parametrize("forgetting", [0.0, 1e-13, 1.01, np.nan, "0.9", True, None])
 def test_forgetting_out_of_range(premises, forgetting):
-    with pytest.raises(ValueError, match=r"forgetting=.*above 0 and at most 1"):
+    with pytest.raises(ValueError, match=r"forgetting=.*a number from 1e-12 to 1"):
         chunk(premises).partial_fit(*surface(), forgetting=forgetting)
+
+
+def test_forgetting_as_fast_as_it_may_leaves_the_latest_row(premises):
+    model = chunk(premises).partial_fit(X[:100], Y[:100])
+    for i in range(100, 150):
+        model.partial_fit(X[[i]], Y[[i]], forgetting=1e-12)
+    assert model.predict(X[[149]]) == pytest.approx(Y[[149]], abs=1e-9)
 
 
 BAD_CHUNKS = {
@@ -319,7 +326,7 @@ def test_what_chunks_cannot_be_asked(premises):
     with pytest.raises(ValueError, match="no row with a positive weight"):
         chunk(premises).partial_fit(X, one, np.zeros(60))
     model = chunk(premises).partial_fit(X, pd.DataFrame(y, columns=["u", "v"]))
-    with pytest.raises(ValueError, match="y has 1 outputs, but earlier chunks had 2"):
+    with pytest.raises(ValueError, match="Earlier chunks had the outputs u, v, and y has 1"):
         model.partial_fit(X, one)
     for names in (["v", "u"], ["v", "w"], ["w", "u"]):
         with pytest.raises(ValueError, match=f"columns of y are {', '.join(names)}, but .* u, v:"):

@@ -118,6 +118,18 @@ def test_outliers_do_not_decide_on_the_start(settings, size, rng):
     assert np.sqrt(np.mean(errors[~is_outlier] ** 2)) < 0.02
 
 
+@pytest.mark.parametrize("size", [1e9, 1e18, 1e99])
+def test_an_outlier_of_any_size_leaves_the_other_rows_their_digits(size, rng):
+    """On its scale they would be one number; none of its weights may be rounded up."""
+    X = rng.uniform(-1, 1, (90, 2))
+    truth = np.sin(3 * X[:, 0]) + 0.3 * X[:, 1]
+    y = truth + 0.05 * rng.normal(size=90)
+    y[5] = size
+    model = ANFISRegressor(n_mfs=[3, 1], loss="huber").fit(X, y)
+    assert np.sqrt(np.mean((model.predict(X) - truth) ** 2)) < 0.05
+    assert 0.03 < model.noise_std_ < 0.1
+
+
 @pytest.mark.parametrize("seed", [1, 5])
 def test_rows_of_weight_are_rows_repeated_where_outliers_are_many(seed):
     """Which rows are most is said by their weight: here those that are fewer.
