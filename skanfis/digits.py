@@ -48,3 +48,8 @@ def told_apart(values, fewest):
         if len(set(texts)) == len(set(values)):
             break
     return texts
+
+
+def counted(number_of, what):
+    """Say "1 rule", "12 rules"."""
+    return f"{number_of} {what}" + ("" if str(number_of) == "1" else "s")

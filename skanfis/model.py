@@ -29,7 +29,6 @@ from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import outputs_of_rules, rule_outputs
 from .naming import default_output_names, default_term_names
 from .policies import (
-    FARTHEST,
     FARTHEST_ROW,
     MAX_EXTRAPOLATION,
     TargetRange,
@@ -365,22 +364,12 @@ class TSKModel:
         limit = self.max_extrapolation if max_extrapolation is None else max_extrapolation
         check_policy(policy, limit)
         if limit == "auto":
-            limit = self._supported_extrapolation
+            limit = MAX_EXTRAPOLATION
+            if self.target is not None and self.posterior is not None:
+                limit = self.target.supported_extrapolation(self.posterior.noise)
         if policy == self.out_of_bounds and limit == self.max_extrapolation:
             return self
         return replace(self, out_of_bounds=policy, max_extrapolation=float(limit))
-
-    @cached_property
-    def _supported_extrapolation(self):
-        """The L of "auto": the target's deviation over that of the noise, the least of all outputs.
-
-        This assumes that over one deviation of an input, the target bends by at most the noise.
-        """
-        target, posterior = self.target, self.posterior
-        if target is None or posterior is None:
-            return MAX_EXTRAPOLATION
-        of_noise = target.spread / np.maximum(posterior.noise, target.spread / FARTHEST)
-        return float(f"{of_noise.min():.3g}")
 
     def _by_block(self, X, of_block, n_columns, n_more=0):
         """Apply a function of Z (n_inputs, n_rows) to blocks of rows; (n_rows, n_columns).

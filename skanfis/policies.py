@@ -61,6 +61,15 @@ class TargetRange:
         low, high = self.minimum - margin, self.maximum + margin
         return np.stack([np.maximum(low, self.lower), np.minimum(high, self.upper)])
 
+    def supported_extrapolation(self, noise) -> float:
+        """The target's deviation over that of the noise, the least of all outputs.
+
+        For so many deviations of an input the tangent is followed. This assumes that over one of
+        them, the target bends by at most the noise.
+        """
+        of_noise = self.spread / np.maximum(noise, self.spread / FARTHEST)
+        return float(f"{of_noise.min():.3g}")
+
 
 def policy_in_words(policy: str, max_extrapolation: float) -> str:
     """What the model does outside the range of the training data, as a clause."""

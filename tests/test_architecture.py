@@ -55,7 +55,7 @@ ALSO = {"export": [PUBLIC]}
 # The application takes public names only, but for these.
 ONLY = {
     "gyro": [
-        *(PUBLIC, "exceptions", "blocks", "policies", "options", "naming"),
+        *(PUBLIC, "exceptions", "blocks", "digits", "policies", "options", "naming"),
         *("search", "export", "bounds", "inspection", "datasets"),
     ]
 }

@@ -335,8 +335,8 @@ COUNT = "must be 'auto', a whole number, or one whole number per input"
 @pytest.mark.parametrize(
     ("n_mfs", "error", "said"),
     [
-        ([2, 2], ValueError, ["has 2 entries", "3 columns (time, temperature, rate)"]),
-        ([], ValueError, ["has 0 entries", "3 columns"]),
+        ([2, 2], ValueError, ["has the length 2", "time, temperature, rate"]),
+        ([], ValueError, ["has the length 0", "time, temperature, rate"]),
         (0, ValueError, ["n_mfs=0 must be 1 or more", "1 means"]),
         ([2, 2, -3], ValueError, ["n_mfs=[2, 2, -3] must be 1 or more", "1 means"]),
         (True, TypeError, [COUNT]),

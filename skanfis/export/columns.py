@@ -95,7 +95,7 @@ class Reader:
         if self.is_named and given is not None and list(given) != self.names:
             raise ValueError(
                 f"X must have the columns {known}, in this order; it has "
-                f"{', '.join(map(repr, given))}."
+                f"{', '.join(map(repr, given)) or 'none'}."
             )
         # Columns that do not reach the model need not be numbers.
         X = X if hasattr(X, "shape") else np.asarray(X, dtype=object)

@@ -15,8 +15,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
+from ..digits import counted
 from ..exceptions import OutOfBoundsWarning
-from ..inspection.text import counted
 from ._checks import LARGEST_AT_REST, find_glitches
 from ._columns import RATE_UNITS, SIGNALS, ask
 from ._simpler import NAMES, ROUNDS, Simpler, make_law, simpler_compensations

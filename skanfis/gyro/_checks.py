@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 from scipy.spatial import cKDTree
 
-from ..inspection.text import counted
+from ..digits import counted
 from ._columns import CANONICAL, SIGNALS, convert, convert_back, declared_units, units_of
 from .errors import LogError
 

@@ -4,10 +4,10 @@ import numpy as np
 import pandas as pd
 
 from ..bounds import bounds, gradient_bounds
+from ..digits import counted
 from ..export import fold
 from ..export.c.dialect import STATUS
 from ..inspection import export_text, readability
-from ..inspection.text import counted
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NAMES, NOTHING
 from .c_compensator import input_units

@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 import pandas as pd
 
-from ..inspection.text import counted
+from ..digits import counted
 from ._columns import evenly_chosen, unit_in
 from ._tables import EXCEL, HEAD_ROWS, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
 from .errors import LogError

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 from scipy.signal import find_peaks
 
-from ..inspection.text import counted
+from ..digits import counted
 from ._columns import check_column
 from .errors import LogError
 

@@ -14,8 +14,8 @@ from datetime import datetime
 from itertools import chain
 from pathlib import Path
 
+from ..digits import counted
 from ..inspection.labels import printable
-from ..inspection.text import counted
 from ._calibration import Recipe, calibrate
 from ._checks import LABELS, check_at_rest, check_log, columns_of
 from ._columns import SIGNALS

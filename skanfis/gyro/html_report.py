@@ -10,8 +10,8 @@ import scipy
 import sklearn
 
 from .. import __version__
+from ..digits import counted
 from ..inspection.labels import printable
-from ..inspection.text import counted
 from ..policies import SILENT, policy_in_words
 from ._columns import SIGNALS
 from ._headline import (

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..digits import counted
 from ..export.limits import shown
-from ..inspection.text import counted
 from ..naming import distinct
 from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
 from ._columns import SIGNALS, convert

@@ -11,11 +11,12 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from .._validation import checked_position
+from ..digits import counted
 from ..export import fold_with_rows
 from ..export.columns import categories
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
-from .text import MOST_NAMED, counted
+from .text import MOST_NAMED
 
 # A note tells of shares that differ by more, and of outputs held on a larger part of combinations.
 _DIFFERENT, _HELD = 0.1, 0.01

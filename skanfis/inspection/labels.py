@@ -2,7 +2,7 @@
 
 from textwrap import fill, wrap
 
-from .text import counted
+from ..digits import counted
 
 # Joiners, which some scripts need, and blanks between numbers and units.
 _SHOWN = "\u200c\u200d\u00a0\u202f"

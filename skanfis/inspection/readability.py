@@ -9,13 +9,13 @@ from numpy.typing import ArrayLike
 from sklearn.utils import check_array, check_consistent_length, column_or_1d
 
 from .._validation import as_numbers, check_finite, positive_weights
-from ..digits import in_digits
+from ..digits import counted, in_digits
 from ..export import fold_with_rows
 from ..model import TSKModel
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
 from .sentences import Sentences
-from .text import MOST_NAMED, counted
+from .text import MOST_NAMED
 
 # Largest distance of the strongest rule alone from the model, in deviations of the target: that of
 # a model from a target of which it explains three quarters of the variance.

@@ -12,6 +12,7 @@ import pandas as pd
 from .._validation import check_count
 from ..digits import (
     MOST_DIGITS,
+    counted,
     in_digits,
     limits_in_digits,
     plain,
@@ -389,8 +390,3 @@ def _wrapped(text, first="", later=""):
 
 def _signed(value):
     return f"{'-' if value < 0.0 else '+'}{plain(abs(value))}"
-
-
-def counted(number_of, what):
-    """Say "1 rule", "12 rules"."""
-    return f"{number_of} {what}" + ("" if str(number_of) == "1" else "s")

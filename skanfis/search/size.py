@@ -87,8 +87,8 @@ def term_counts(n_mfs, names):
         )
     if len(given) != len(names):
         raise ValueError(
-            f"n_mfs={n_mfs!r} has {len(given)} entries, but X has {len(names)} columns "
-            f"({', '.join(names)}): give one number of terms per column."
+            f"n_mfs={n_mfs!r} has the length {len(given)}, and the columns of X are "
+            f"{', '.join(names)}: give one number of terms per column."
         )
     if not all(isinstance(count, Integral) and not isinstance(count, bool) for count in given):
         raise TypeError(f"n_mfs={n_mfs!r} must hold whole numbers only.")

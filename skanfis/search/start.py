@@ -133,8 +133,8 @@ def check_inputs(model: TSKModel, names, what):
     """Raise ValueError where a model has other inputs than the data; default names match any."""
     if model.n_inputs != len(names):
         raise ValueError(
-            f"{what} has rules on {model.n_inputs} inputs ({', '.join(model.input_names)}), but X "
-            f"has {len(names)} columns ({', '.join(names)}): give X the inputs of the rules."
+            f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
+            f"are {', '.join(names)}: give X the inputs of the rules."
         )
     own, given = tuple(model.input_names), tuple(names)
     if own != given and tuple(f"x{j}" for j in range(len(names))) not in (own, given):

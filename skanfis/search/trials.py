@@ -227,7 +227,9 @@ class Trials:
         if held is not None:
             antecedent, coefficients = held(tuned.problem, tuned.solved)
         n_inputs, targets = seen.X.shape[1], unit_scale(seen.y)
+        target = TargetRange(targets.minimum, targets.maximum, targets.scale)
         inputs, order = tuned.problem.consequent_inputs, self.plan.order
+        noise = np.sqrt(tuned.posterior.noise_variance)
         model = TSKModel(
             antecedent=antecedent,
             initial_antecedent=antecedent,
@@ -239,6 +241,7 @@ class Trials:
             rule_weights=tuned.evaluation.masses,
             rule_rows=tuned.evaluation.masses,
             input_names=tuple(f"x{j}" for j in range(n_inputs)),
-            target=TargetRange(targets.minimum, targets.maximum, targets.scale),
+            target=target,
+            max_extrapolation=target.supported_extrapolation(noise),
         )
         return np.sum((model.predict(rows.X) - rows.y) ** 2, axis=1)

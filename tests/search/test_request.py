@@ -88,7 +88,7 @@ class TestImported:
     @pytest.mark.parametrize(
         ("settings", "columns", "message"),
         [
-            ({}, ["time", "rate"], r"rules on 3 inputs .* but X has 2 columns"),
+            ({}, ["time", "rate"], "the columns of X are time, rate: give X the inputs"),
             ({}, ["time", "rate", "temperature"], "the same names and in the same order"),
             ({"n_mfs": 3}, slice(None), r"n_mfs=3 .* for the imported rules"),
             ({"premise_features": ["rate"]}, slice(None), "premise_features=.* has no effect on"),

@@ -125,6 +125,16 @@ def test_a_target_that_is_constant_or_exactly_a_line_is_a_rule(rng, n_rows):
     assert_allclose(line.predict(0.5 * X), X[:, 0] + 1.0, atol=2e-2)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_an_exact_plane_is_one_rule_where_judges_lie_beyond_the_target(seed):
+    """Its predictions are not held near the target: one without noise is followed further."""
+    rng = np.random.default_rng(seed)
+    X = np.column_stack([rng.uniform(-1.0, 1.0, 60), rng.normal(size=60)])
+    model = ANFISRegressor(max_rules=2).fit(X, 2.0 * X[:, 0] - X[:, 1])
+    assert model.n_rules_ == 1
+    assert model.structures_[0]["expected_error"] < 1e-9
+
+
 @pytest.mark.floors
 def test_noise_free_data_get_next_to_no_penalty():
     X, y = make_jang_three_input()

@@ -56,7 +56,8 @@ def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order)
     coefficients = dense.coefficients(antecedent.parameters)
     # As predict answers: beyond the range along the tangent, and not far from the target's.
     nearest = np.clip(rest.X, fold.X.min(axis=0), fold.X.max(axis=0))
-    way = np.clip(rest.X - nearest, -0.5, 0.5)
+    limit = float(f"{1.0 / np.sqrt(tuned.posterior.noise_variance):.3g}")
+    way = np.clip(rest.X - nearest, -limit, limit)
 
     def answer(t):
         at = (nearest + t * way).T
