@@ -19,9 +19,10 @@ SILENT = ("nan", "raise")
 MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 # Rows further off, in standard deviations, count as this far, so that nothing overflows.
 FARTHEST_ROW = 1e100
-# How far a prediction may leave the range of the target: a single line by at least this many
-# standard deviations; several rules, which may peak between rows, by this part of the range.
-_LEAST_MARGIN, _PART_OF_RANGE = 0.5, 0.25
+# How far a prediction may leave the range of the target. A single line: by as many standard
+# deviations as the tangent is followed for, and at least so many. Several rules, which may peak
+# between rows: by this part of the range, or by so much of it for each of those deviations.
+_LEAST_MARGIN, _PART_OF_RANGE, _PER_DEVIATION = 0.5, 0.25, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,8 @@ class TargetRange:
         """
         margin = max(max_extrapolation, _LEAST_MARGIN) * self.spread
         if not is_line and np.isfinite(max_extrapolation):
-            margin = _PART_OF_RANGE * (self.maximum - self.minimum)
+            part = max(_PART_OF_RANGE, _PER_DEVIATION * max_extrapolation)
+            margin = part * (self.maximum - self.minimum)
         low, high = self.minimum - margin, self.maximum + margin
         return np.stack([np.maximum(low, self.lower), np.minimum(high, self.upper)])
 

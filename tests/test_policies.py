@@ -23,17 +23,17 @@ def test_policies_in_words():
 
 
 @pytest.mark.parametrize("is_line", [False, True])
-@pytest.mark.parametrize("max_extrapolation", [0.0, 0.5, 0.7, 2.0, np.inf])
+@pytest.mark.parametrize("max_extrapolation", [0.0, 0.5, 0.7, 2.0, 8.0, np.inf])
 @pytest.mark.parametrize(("offset", "scale"), [(0.0, 1.0), (10.0, 2.0), (-1e3, 1e-6)])
 def test_limits_are_the_range_and_a_margin(max_extrapolation, is_line, offset, scale):
     y = np.random.default_rng(0).standard_normal((50, 2)) * [1.0, 5.0]
     own = TargetRange(y.min(axis=0), y.max(axis=0), y.std(axis=0))
     moved = offset + scale * y
     # Of a line as far as inputs are followed, but half a deviation at the least; of rules that
-    # bend, where there is an end to it, a quarter of the range.
+    # bend, where there is an end to it, a quarter of the range, or a twentieth per deviation.
     margin = max(max_extrapolation, 0.5) * moved.std(axis=0)
     if not is_line and max_extrapolation < np.inf:
-        margin = 0.25 * np.ptp(moved, axis=0)
+        margin = (0.4 if max_extrapolation == 8.0 else 0.25) * np.ptp(moved, axis=0)
     found = own.change_units(offset, np.full(2, scale)).limits(max_extrapolation, is_line)
     assert_allclose(found, [moved.min(axis=0) - margin, moved.max(axis=0) + margin], rtol=1e-9)
 

@@ -6,14 +6,15 @@ Terms stand at even steps of
 
 which is where the optimal quantiser has its points (Panter and Dite 1951). Evenly spaced terms
 would be wasted on a range that is mostly empty. The outer terms stand at quantiles, not at the
-outermost rows. Neighbouring gaps differ by a limited factor, because a term has one width, which
-has to reach into both gaps.
+outermost rows. Neighbouring gaps differ by a limited factor (``ordered_terms``), because a term has
+one width, which has to reach into both gaps.
 """
 
 import numpy as np
 
 from ..antecedent import GridAntecedent
 from ..learning.data import StandardisedData
+from ..learning.ordered_terms import LARGEST_RATIO
 from .sample import DIGITS, representative_rows, weighted_quantile
 
 # Neighbouring terms cross at this membership at the start. With the customary 0.5, training on
@@ -22,12 +23,6 @@ OVERLAP = 0.6
 # This part of the rows lies beyond the outermost terms: a term should not stand at an outlier, and
 # a term at the very edge would be half empty.
 _EDGE = 0.02
-# Neighbouring gaps differ by this factor at most; ``ordered_terms`` allows them a little more.
-_RATIO = 1.8
-# A term's width goes with a geometric mean of its distances to both neighbours; this is the weight
-# of the nearer. At even distances, an overlap of 0.6 lies at this part of the way, in logarithms,
-# from the least to the largest width of ``ordered_terms``.
-_NEARER = 1.0 / 6.0
 
 
 class Spacing:
@@ -48,8 +43,8 @@ class Spacing:
         values, levels = self._columns[j]
         places = np.interp(np.linspace(0.0, 1.0, count), levels, values)
         gaps, k = np.diff(places), np.arange(count - 1)
-        # Widen small gaps: a gap k steps from another is at least its size / _RATIO^k.
-        gaps = np.max(gaps / _RATIO ** np.abs(k[:, None] - k), axis=1, initial=0.0)
+        # Widen small gaps: a gap k steps from another is at least its size / LARGEST_RATIO^k.
+        gaps = np.max(gaps / LARGEST_RATIO ** np.abs(k[:, None] - k), axis=1, initial=0.0)
         if not gaps.any():
             return places
         gaps *= (places[-1] - places[0]) / gaps.sum()
@@ -96,9 +91,8 @@ def grid_antecedent(families, counts, spacing: Spacing, known=None):
 
 
 def _distance(gaps):
-    """Each term's distance to its neighbours: mostly the farther one, so that no gap stays open."""
-    sides = np.append(gaps, gaps[-1]), np.append(gaps[0], gaps)
-    return np.maximum(*sides) ** (1.0 - _NEARER) * np.minimum(*sides) ** _NEARER
+    """Each term's mean distance to its neighbours; an outermost term has only one."""
+    return 0.5 * (np.append(gaps, gaps[-1]) + np.append(gaps[0], gaps))
 
 
 def terms_by_input(antecedent):

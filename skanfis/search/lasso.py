@@ -15,10 +15,6 @@ from sklearn.linear_model import Lasso, LassoCV
 from ..learning.data import StandardisedData
 from .judging import FOLDS, folds
 
-# The least penalty tried, relative to the one at which all slopes vanish. Less is hardly ever
-# chosen, and takes most of the time where columns are correlated.
-_LEAST_PENALTY = 0.01
-
 
 def lasso_inputs(rows: StandardisedData, inputs):
     """Those of ``inputs`` that the lasso selects, for any output."""
@@ -29,7 +25,7 @@ def lasso_inputs(rows: StandardisedData, inputs):
     for target in rows.y.T:
         # With hardly any noise, the lasso does not converge at the least penalties.
         with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
-            path = LassoCV(cv=parts, eps=_LEAST_PENALTY).fit(X, target, weight)
+            path = LassoCV(cv=parts).fit(X, target, weight)
             errors = path.mse_path_.mean(axis=1)
             least = int(np.argmin(errors))
             chance = path.mse_path_[least].std() / np.sqrt(len(parts))

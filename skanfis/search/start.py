@@ -22,8 +22,6 @@ from .choice import tolerated
 from .sample import search_sample
 from .trials import FEWEST_SEEN, Plan
 from .tuning import (
-    ARRIVING,
-    FIRST_STEPS,
     MOST_TURNS,
     Tuned,
     cost_of,
@@ -85,8 +83,8 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     low, high = sample.inputs.box
     premise = Premise.of(antecedent, low, high)
-    turns, steps = (MOST_TURNS, FIRST_STEPS) if plan.premises_move and free else (0, ARRIVING)
-    best = tune(problem, premise, free, turns, steps)
+    turns = MOST_TURNS if plan.premises_move and free else 0
+    best = tune(problem, premise, free, turns)
     # With hardly more rows than coefficients, unbounded terms could pass through every row.
     has_rows = sample.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
     is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered

@@ -38,20 +38,17 @@ from ..reading_cost import reading_cost
 
 # In the middle of the weights that the evidence finds for data of every kind.
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
-# Steps of the weights before the premises have moved. Each changes a weight a hundredfold at most,
-# so that five lead from the start to any weight.
-FIRST_STEPS = 5
-# Steps of the weights if no premises move afterwards. Most weights settle within ten.
+# Steps of the weights at given premises. Most weights settle within ten.
 ARRIVING = 50
-# Steps and turns beyond ``MANY_COLUMNS``; grids have as few turns (``trials``).
-_FEW_STEPS, FEW_TURNS = 3, 2
+# Steps and turns beyond ``MANY_COLUMNS``; turns of grids (``trials``), and of raising agreement.
+FEW_TURNS = 2
 # A turn: a few iterations of the premises, then steps of the weights. Neither converges while the
 # other moves; the training that follows does the rest.
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
 # Terms without bounds move far in their first turn.
 _UNBOUNDED_ITERATIONS = 25
-# Trainings and bisection steps that raise the agreement; a smaller rise is not worth a training.
-_MOST_RAISES, _HALVINGS, _LEAST_RAISE = 3, 8, 2.0
+# Bisection steps that raise the agreement; a smaller rise is not worth a training.
+_HALVINGS, _LEAST_RAISE = 8, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +121,7 @@ def tune(
     premise: Premise,
     free,
     turns=MOST_TURNS,
-    first_steps=FIRST_STEPS,
+    first_steps=ARRIVING,
 ) -> Tuned:
     """Find the ``free`` weights, names of ``evidence.FREE``, and the premises that go with them.
 
@@ -133,7 +130,7 @@ def tune(
     """
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
-        first_steps, turns, steps = min(first_steps, _FEW_STEPS), min(turns, FEW_TURNS), 1
+        first_steps, turns, steps = min(first_steps, FEW_TURNS), min(turns, FEW_TURNS), 1
     elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
     start = _improved(Tuned.start(problem, premise, free), first_steps)
@@ -154,7 +151,7 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free) -> Tuned:
     least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
     penalty = replace(problem.penalty, **least)
     start = Tuned.start(problem, premise, free).with_penalty(penalty)
-    first = turned(start, penalty, FIRST_STEPS, _UNBOUNDED_ITERATIONS)
+    first = turned(start, penalty, ARRIVING, _UNBOUNDED_ITERATIONS)
     return _risen(first, MOST_TURNS - 1, _STEPS)
 
 
@@ -230,7 +227,7 @@ def with_most_agreement(tuned: Tuned, room: float) -> Tuned:
     if "agreement" not in tuned.free or not tuned.displacement.size or room <= 1.0 or not is_known:
         return tuned
     most, best, agreement = room * tuned.expected_error, tuned, 0.0
-    for _ in range(_MOST_RAISES):
+    for _ in range(FEW_TURNS):
         agreement = agreement or _most_agreement(best, most)
         if agreement < _LEAST_RAISE * best.penalty.agreement:
             break

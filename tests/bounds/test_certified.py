@@ -68,7 +68,7 @@ def test_the_box_is_held_where_the_policy_holds(rng):
     estimator = ANFISRegressor(n_mfs=3, max_iter=5, solver=VariableProjection(tol=0.1)).fit(X, y)
     without_end = [(-np.inf, np.inf)] * 2
     found = bounds(estimator, without_end)
-    rows = rng.uniform([-200.0, -900.0], [300.0, 900.0], (5000, 2))
+    rows = rng.uniform([-5000.0, -9000.0], [5000.0, 9000.0], (5000, 2))
     predicted = estimator.predict(rows)
     assert found.lower[0] <= predicted.min()
     assert predicted.max() <= found.upper[0]

@@ -259,7 +259,7 @@ def test_what_cannot_be_proven_is_drawn_to_a_line():
 
 def test_there_is_always_a_line(rng):
     """Of triangles, slopes of which jump, with sparse slopes."""
-    held = ANFISRegressor(n_mfs=3, mf="triangular", monotonic_cst=[1, 0])
+    held = ANFISRegressor(n_mfs=4, mf="triangular", monotonic_cst=[1, 0])
     with pytest.warns(ConstraintWarning, match="the rules were moved"):
         held.fit(X, Y)
     assert held.constraints_["certified"]
