@@ -13,6 +13,7 @@ from sklearn.linear_model import LinearRegression
 from sklearn.model_selection import LeaveOneGroupOut
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
+from sklearn.utils.validation import has_fit_parameter
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
@@ -72,11 +73,16 @@ OF_ERROR = {
 
 
 def residual(make_estimator, log, target):
-    """RMS over all rows of the error of models that have not seen their run; seconds of a fit."""
+    """RMS over all rows of the error of models that have not seen their run; seconds of a fit.
+
+    Models that take groups are told which rows belong to one run.
+    """
     X, y, run = log[_INPUTS], log[target].to_numpy(), log["run"].to_numpy()
     left, seconds = np.empty(len(log)), []
     for train, test in LeaveOneGroupOut().split(X, y, run):
-        model, spent = timed(make_estimator().fit, X.iloc[train], y[train])
+        model = make_estimator()
+        told = {"groups": run[train]} if has_fit_parameter(model, "groups") else {}
+        _, spent = timed(model.fit, X.iloc[train], y[train], **told)
         seconds.append(spent)
         left[test] = model.predict(X.iloc[test]) - y[test]
     return rms(left), float(np.mean(seconds))

@@ -4,6 +4,7 @@ import numpy as np
 
 # 17 significant digits identify every double; more add nothing.
 MOST_DIGITS = 17
+_DECIMALS_OF_PERCENT = 9  # further ones are rounding errors
 # Part of a unit of the last digit that counts as a rounding error.
 _ROUNDING = 1e-6
 
@@ -48,6 +49,12 @@ def told_apart(values, fewest):
         if len(set(texts)) == len(set(values)):
             break
     return texts
+
+
+def percent(part):
+    """Write "48 %", "6.5 %", and never "100 %" of a part that is less."""
+    share = round(100.0 * part, _DECIMALS_OF_PERCENT)
+    return f"{told_apart([share, 100.0], 2)[0]} %"
 
 
 def counted(number_of, what):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skanfis.digits import in_digits, limits_in_digits, range_in_digits, told_apart
+from skanfis.digits import in_digits, limits_in_digits, percent, range_in_digits, told_apart
 
 
 @pytest.mark.parametrize(
@@ -59,3 +59,18 @@ def test_limits_are_rounded_outwards(low, high, text):
 def test_numbers_are_told_apart():
     assert told_apart([1e9 + 1, 1e9 + 2], 3) == ["1000000001", "1000000002"]
     assert told_apart([1.0, 1.0, 2.0], 3) == ["1", "1", "2"]
+
+
+@pytest.mark.parametrize(
+    ("part", "told"),
+    [
+        (1.0, "100"),
+        (0.995, "99.5"),
+        (0.99995, "99.995"),
+        (0.994, "99"),
+        (0.48, "48"),
+        (0.065, "6.5"),
+    ],
+)
+def test_what_is_not_all_is_never_100_percent(part, told):
+    assert percent(part) == f"{told} %"

@@ -15,9 +15,9 @@ from ..digits import (
     counted,
     in_digits,
     limits_in_digits,
+    percent,
     plain,
     range_in_digits,
-    told_apart,
 )
 from ..export import fold
 from ..export.columns import categories, columns_of
@@ -39,7 +39,6 @@ _WIDTH, _DIGITS_OF_RANGE = 96, 4
 # A sentence names this many things at most, and counts the others.
 MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
-_DECIMALS_OF_PERCENT = 9  # further ones are rounding errors
 # How to compute a prediction; parts in braces that do not apply are left out.
 _HOW = (
     "A prediction is the mean of what the rules say, weighted by how true their conditions are; "
@@ -291,12 +290,6 @@ def _on_rows(model, found, r):
     return [*share, f"errs by {errors} there"] if errors else share
 
 
-def percent(part):
-    """Write "48 %", "6.5 %", and never "100 %" of a part that is less."""
-    share = round(100.0 * part, _DECIMALS_OF_PERCENT)
-    return f"{told_apart([share, 100.0], 2)[0]} %"
-
-
 def _errors(found, r):
     """The error of a rule alone; empty if it is the strongest on none of the measured rows."""
     if found is None or not found.measures.rule_rows[r]:
@@ -316,10 +309,24 @@ def _last_lines(said, found, precision=PRECISION):
 
 def _legend(said, found, precision):
     """The ranges and terms of the inputs, policy, limits, and how to compute a prediction."""
+    model = said.model
+    named = list(compress(model.memberships(), ~said.says_where))
+    lines, has_ranges = _inputs(said, named)
+    if has_ranges:
+        words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
+        lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
+    for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
+        if np.isfinite([low, high]).any():
+            limits = limits_in_digits(low, high, precision + 1)
+            lines.append(_wrapped(f"No prediction leaves these limits: {name}, {limits}."))
+    return "\n".join([*lines, "", _wrapped(_how(said, named, found is not None))])
+
+
+def _inputs(said, named):
+    """Lines on every input, with its ``named`` terms; and whether any of them has a range."""
     model, lines = said.model, ["Inputs, as they were trained:"]
     families = [group.family for group in model.antecedent.groups]
     at = {one.name for family in families for one in family.parameters if one.kind == "location"}
-    named = list(compress(model.memberships(), ~said.says_where))
     called = columns_of(model)
     has_part = said.is_own.any(axis=(0, 2)) | said.common.any(axis=1)
     has_part[model.antecedent.term_inputs] = True
@@ -347,24 +354,21 @@ def _legend(said, found, precision):
         if alike := [one for one in unnamed if (one in with_slope) == has_slope]:
             names = ", ".join(alike) if len(alike) <= MOST_NAMED else f"{len(alike)} more inputs"
             lines.append(_wrapped(f"  {names}: {told}", later=6 * " "))
-    if with_part - lists.keys():
-        words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
-        lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
-    for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
-        if np.isfinite([low, high]).any():
-            limits = limits_in_digits(low, high, precision + 1)
-            lines.append(_wrapped(f"No prediction leaves these limits: {name}, {limits}."))
-    functions = {term["function"] for term in named}
+    return lines, bool(with_part - lists.keys())
+
+
+def _how(said, named, has_errors):
+    """How to compute a prediction from the rules: the formulas of what they say."""
+    model, functions = said.model, {term["function"] for term in named}
     written = [name for name in compress(model.term_names, said.says_where) if "±" in name]
     signs = {name.split()[0] for name in written}
     terms = [text for sign, text in _WRITTEN.items() if sign in signs]
-    formulas = {family.name: family.formula for family in families}
+    formulas = {group.family.name: group.family.formula for group in model.antecedent.groups}
     terms += [_TERM.format(*one) for one in formulas.items() if one[0] in functions and one[1]]
-    line, errs = _LINE if said.common.any() else "", _ERRS if found else ""
+    line, errs = _LINE if said.common.any() else "", _ERRS if has_errors else ""
     how = _HOW_OF_ONE if model.n_rules == 1 and not model.antecedent.n_terms else _HOW
     slopes = _SLOPES if said.is_own.any() else ""
-    how = how.format(terms="".join(terms), line=line, slopes=slopes, errs=errs)
-    return "\n".join([*lines, "", _wrapped(how)])
+    return how.format(terms="".join(terms), line=line, slopes=slopes, errs=errs)
 
 
 def _term_text(term, locations):

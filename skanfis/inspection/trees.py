@@ -7,14 +7,13 @@ import numpy as np
 
 from .._validation import check_choice, checked_position
 from ..antecedent import TreeAntecedent
-from ..digits import counted, plain, rounded
+from ..digits import counted, percent, plain, rounded
 from ..export import fold
 from ..model import TSKModel
 from .displays import ResponseSurfaceDisplay, axes_or_new, section_over
 from .labels import as_label
 from .rules import condition, parts_led
 from .sentences import Sentences
-from .text import percent
 
 # Inches of a letter, of a leaf, and around the tree.
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3

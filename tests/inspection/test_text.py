@@ -15,11 +15,11 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
+from skanfis.digits import percent
 from skanfis.export import export_json, fold, read_json
 from skanfis.inspection import explain, export_text, readability, rules_html
 from skanfis.inspection.rules import parts_led
 from skanfis.inspection.sentences import Sentences
-from skanfis.inspection.text import percent
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, rows_of
 from ..outline import Outline
@@ -481,21 +481,6 @@ def test_of_rows_on_which_a_rule_is_not_the_strongest_no_error_is_told():
     assert re.findall(r"% of the rows(, errs by 0|:)", text) == [", errs by 0", ":"]
     assert text.endswith("\nErrors are of the rows of the latest partial_fit alone.")
     assert ">nan<" not in rules_html(model)
-
-
-@pytest.mark.parametrize(
-    ("part", "told"),
-    [
-        (1.0, "100"),
-        (0.995, "99.5"),
-        (0.99995, "99.995"),
-        (0.994, "99"),
-        (0.48, "48"),
-        (0.065, "6.5"),
-    ],
-)
-def test_what_is_not_all_is_never_100_percent(part, told):
-    assert percent(part) == f"{told} %"
 
 
 @ALL
