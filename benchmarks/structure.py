@@ -38,6 +38,8 @@ _RIVALS = {
 }
 # Few rows: how many for each column, and in tables of how many columns at least.
 _FEW, _MANY_COLUMNS = (1.5, 3.0, 5.0), 10
+# Bars of the errors over the best rival's, with simplicity=0 and by default.
+_BARS = {"real set": (0.98, 1.03), "table": (1.0, 1.03), "smooth": (1.15, None)}
 # Rows of smooth functions.
 _SMOOTH_ROWS = (250, 1000, 4000, 16000)
 # One row decides.
@@ -273,11 +275,12 @@ def run(options):
     return Results(rows)
 
 
-def _over_the_rivals(some):
+def _over_the_rivals(kind, some):
     """Errors over the best rival's, by simplicity."""
     ratios = ([one[f"{s:g}"]["over the rivals"] for one in some] for s in SIMPLICITIES)
-    names = ("simplicity=0", "default")
-    return [Measure(name, geometric_mean(own)) for name, own in zip(names, ratios, strict=True)]
+    names, bars = ("simplicity=0", "default"), _BARS.get(kind, (None, None))
+    parts = zip(names, ratios, bars, strict=True)
+    return [Measure(name, geometric_mean(own), "", bar) for name, own, bar in parts]
 
 
 def _row(kind, some):
@@ -285,7 +288,7 @@ def _row(kind, some):
     parts = [each for one in zero for each in one["parts"]]
     measures = []
     if kind in ("real set", "table", "formula", "few rows"):
-        measures += _over_the_rivals(some)
+        measures += _over_the_rivals(kind, some)
         costs = [b["cost"] / a["cost"] for a, b in zip(zero, default, strict=True)]
         measures.append(Measure("reading cost, default over 0, median", float(np.median(costs))))
     elif kind == "noise":
@@ -314,4 +317,4 @@ def _smooth(some):
         own = [one for one in some if f", {n_rows} rows" in one["case"]]
         if own:
             work = f"structure: smooth functions, {n_rows:,} rows, over the best rival"
-            yield Row(work, _over_the_rivals(own))
+            yield Row(work, _over_the_rivals("smooth", own))
