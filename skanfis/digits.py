@@ -34,12 +34,12 @@ def range_in_digits(low, high, digits):
 
 
 def limits_in_digits(low, high, digits):
-    """Write a range as ``range_in_digits`` does, but rounded outwards, so that it still holds."""
+    """The ends of a range in ``digits`` digits of its width, rounded outwards: it still holds."""
     if not 0.0 < (width := float(high) - float(low)) < np.inf:
-        return f"{plain(low)} to {plain(high)}"
+        return [plain(low), plain(high)]
     # Less than half a unit of the last digit: ends of no more digits stay as they are.
     room = (0.5 - _ROUNDING) * 10.0 ** (np.floor(np.log10(width)) - digits + 1)
-    return " to ".join(map(plain, rounded([low - room, high + room], width, digits)))
+    return [plain(end) for end in rounded([low - room, high + room], width, digits)]
 
 
 def told_apart(values, fewest):

@@ -53,7 +53,7 @@ def test_range_has_digits_that_mean_something(low, high, text):
     ],
 )
 def test_limits_are_rounded_outwards(low, high, text):
-    assert limits_in_digits(low, high, 3) == text
+    assert " to ".join(limits_in_digits(low, high, 3)) == text
 
 
 def test_numbers_are_told_apart():

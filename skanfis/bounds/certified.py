@@ -77,8 +77,7 @@ class Bounds:
     def __repr__(self):
         ends = zip(self.output_names, self.lower, self.upper, strict=True)
         parts = [
-            f"{name} in [{limits_in_digits(low, high, 6).replace(' to ', ', ')}]"
-            for name, low, high in ends
+            f"{name} in [{', '.join(limits_in_digits(low, high, 6))}]" for name, low, high in ends
         ]
         return f"Bounds({'; '.join(parts)})"
 

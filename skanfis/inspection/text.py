@@ -317,7 +317,7 @@ def _legend(said, found, precision):
         lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         if np.isfinite([low, high]).any():
-            limits = limits_in_digits(low, high, precision + 1)
+            limits = " to ".join(limits_in_digits(low, high, precision + 1))
             lines.append(_wrapped(f"No prediction leaves these limits: {name}, {limits}."))
     return "\n".join([*lines, "", _wrapped(_how(said, named, found is not None))])
 

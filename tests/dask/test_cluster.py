@@ -67,7 +67,8 @@ def test_a_worker_may_die_and_a_closed_cluster_is_said_to_be_so(tmp_path, monkey
         model = DaskANFISRegressor(n_mfs=2).fit(lazy_X, lazy_y)
         # Loaded once for every pass.
         assert flag.stat().st_size == len(passes) > 5
-        assert_allclose(model.model_.coefficients, expected, rtol=0.0, atol=1e-9)
+        # Sums over partitions and over blocks of rows are rounded differently.
+        assert_allclose(model.model_.coefficients, expected, rtol=1e-10, atol=1e-10)
         predicted = model.predict(lazy_X)
         assert_allclose(predicted.compute(), model.predict(X), rtol=1e-12)
         lazy_X, lazy_y = da.from_array(X, chunks=(1000, 2)).persist(), lazy_y.persist()
