@@ -4,7 +4,7 @@ import textwrap
 
 import numpy as np
 
-from ...digits import range_in_digits
+from ...digits import counted, range_in_digits
 from ...policies import policy_in_words
 from .dialect import remark, status_lines
 
@@ -81,11 +81,14 @@ def header(source, units, notes):
 
 def cost_lines(cost, besides=""):
     """Lines on the largest cost of an evaluation, and on memory; ``besides`` comes first."""
-    yield (
-        f"Largest cost of an evaluation: {besides}{cost.exponentials} exponentials, "
-        f"{cost.logarithms} logarithms, {cost.square_roots} square roots, "
-        f"{cost.multiply_adds} multiply-adds, {cost.divisions} divisions."
+    numbers = (
+        counted(cost.exponentials, "exponential"),
+        counted(cost.logarithms, "logarithm"),
+        counted(cost.square_roots, "square root"),
+        counted(cost.multiply_adds, "multiply-add"),
+        counted(cost.divisions, "division"),
     )
+    yield f"Largest cost of an evaluation: {besides}{', '.join(numbers)}."
     yield f"Memory: {cost.table_bytes} bytes of tables, {cost.stack_bytes} of arrays on the stack."
 
 
