@@ -25,7 +25,7 @@ class ConstantInputWarning(UserWarning):
 
 
 class ConstraintWarning(UserWarning):
-    """The data contradict the constraints of ``fit`` by more than noise explains.
+    """The data contradict the constraints of ``fit``, or keeping these makes it much worse.
 
     Look at the data, or at the sign of the constraint.
     """

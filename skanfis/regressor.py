@@ -147,8 +147,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Sobol's total share of each input, as if inputs were independent, divided by their sum: see
         :func:`skanfis.inspection.effects`. Computed on access; not after ``partial_fit``.
     n_iter_, loss_curve_, status_ : int, ndarray of shape (n_iter + 1,), str
-        The last run of the solver: its iterations, its mean squared error on the standardised
-        target from the start on, and why it stopped.
+        The last run of the solver: its iterations, counted as one if there are none, its mean
+        squared error on the standardised target from the start on, and why it stopped.
     agreement_, alpha_, slope_alpha_, stiffness_ : float
         Weights of the penalties. ``slope_alpha_`` penalises the slopes of the rules' common line,
         ``stiffness_`` movements of the premises.
@@ -406,8 +406,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ------
         ValueError
             If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data;
-            or, with ``return_std=True``, if the model has no posterior, because it was read from a
-            .fis file or has more than 2,000 parameters.
+            or, with ``return_std=True``, if the model has no posterior: it was read from a file
+            without one, lost rules, saw a single row, or has more than 2,000 parameters.
 
         Warns
         -----
