@@ -29,7 +29,7 @@ class DaskANFISRegressor(ANFISRegressor):
     rows, up to rounding errors. Give X, y, weights and groups all as dask arrays or frames cut at
     the same rows, or all in memory. On dask collections ``predict`` is lazy, and ``score`` is a
     reduction. The scheduler is dask's current one. Partitions are loaded again for every pass, some
-    eight times, unless they have been persisted (``X.persist()``).
+    ten times, unless they have been persisted (``X.persist()``).
 
     Notes
     -----
