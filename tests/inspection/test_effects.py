@@ -128,6 +128,8 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
         assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
     with pytest.raises(ValueError, match="has the same name as a column that is not in it"):
         effects(fitted, table, groups={fibre: [rate]})
+    # A category is called by its name in a group too.
+    assert list(effects(fitted, table, groups={"both": [rate, fibre]}).table.index) == ["both"]
 
 
 @pytest.fixture(scope="module")
