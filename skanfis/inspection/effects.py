@@ -105,7 +105,9 @@ def effects(
     subsets = [*ones, *study.pairs()]
     columns = {"sobol": study.sobol(subsets)}
     if study.rows is not None:
-        columns["rows"] = _shares(subsets, *anova.covariances(subsets, study.rows))
+        found, variance = anova.covariances(subsets, study.rows)
+        # An output that is the same on all combinations is so on the rows, but for rounding.
+        columns["rows"] = _shares(subsets, found, variance if anova.variance > 0.0 else 0.0)
     table = pd.DataFrame(columns, index=[" and ".join(labels[g] for g in v) for v in subsets])
     # Rounded, so that rounding errors do not change the order of inputs with equal shares.
     shares = table["sobol"].round(9).tolist()
