@@ -13,6 +13,7 @@ from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
+from skanfis.bounds.construction import is_in_order
 from skanfis.exceptions import ConstraintWarning
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
@@ -124,6 +125,17 @@ def test_predictions_rise_beyond_the_range_too(kind):
     after = before + rng.exponential(0.3, (30_000, 1)) * [1.0, 0.0]
     assert (held.predict(before) - held.predict(after)).max() <= 1e-12
     assert (free.predict(before) - free.predict(after)).max() > 1e-3
+
+
+def test_what_is_proven_in_the_range_is_proven_beyond_it():
+    """Also of rules that are not in order, beyond the range of inputs that are free."""
+    rng = np.random.default_rng(5)
+    X = rng.uniform(-1.0, 1.0, (300, 3))
+    y = 2.0 * np.tanh(2.0 * X[:, 0]) + X[:, 1] * X[:, 2] + 0.1 * rng.normal(size=300)
+    held = ANFISRegressor(partition="tree", max_rules=5, monotonic_cst=[1, 0, 0]).fit(X, y)
+    assert not is_in_order(held.model_, 0, np.array([1, 0, 0]))
+    assert_array_equal(monotonicity(held, 0), [1])
+    assert_array_equal(monotonicity(held, 0, [(-9.0, 9.0)] * 3), [1])
 
 
 def test_data_that_contradict_are_told():
