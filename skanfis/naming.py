@@ -85,9 +85,12 @@ def _written(group, own, low, high, fewest):
     # A cut between two values stands in their exact middle: undo its rounding.
     places = np.where(alone, 0.5 * (low + high), places)
     lengths = np.where(alone, 0.5 * (high - low), widths * per_width)
+    most = max(fewest, _MOST_DIGITS_OF_LENGTH)
+    # Terms that no number of digits would tell apart are equal.
+    places = rounded(places, lengths, most)
+    lengths = np.array([float(in_digits(length, most)) for length in lengths])
     terms = list(zip(places, lengths, alone, strict=True))
     names: dict[tuple, str] = {}
-    most = max(fewest, _MOST_DIGITS_OF_LENGTH)
     for digits in range(fewest, most + 1):
         written = {}
         for place, length, is_alone in terms:

@@ -334,7 +334,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ConvergenceWarning
             If ``max_iter`` was reached before convergence.
         ConstraintWarning
-            If the data contradict the constraints, or these make the fit much worse.
+            If the data contradict the constraints, or rules moved to prove them err much more.
         ConstantInputWarning
             If an input is constant in the training data; it gets no terms and no slope.
         UnderdeterminedWarning

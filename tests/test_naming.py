@@ -135,6 +135,9 @@ def test_cuts_that_differ_are_told_apart_and_equal_ones_are_not():
     assert names[:3] == ("> 1.001 ± 0.3", "> 2 ± 0.3", "> 1.002 ± 0.3")
     names = default_term_names(model(tree((0, 1.0, 0.3), (1, 2.0, 0.3), (0, 1.0, 0.3))))
     assert names[3:] == ("< 1 ± 0.3", "< 2 ± 0.3", "< 1 ± 0.3")
+    # Terms that differ by rounding are equal.
+    names = default_term_names(model(tree((0, 1 / 3, 1 / 7), (0, 1 / 3 + 1e-13, 1 / 7))))
+    assert names == ("> 0.33 ± 0.14", "> 0.33 ± 0.14", "< 0.33 ± 0.14", "< 0.33 ± 0.14")
 
 
 def test_a_cut_between_two_values_has_no_width():

@@ -209,17 +209,20 @@ def monotonicity(
     (j,) = feature_indices([feature], model.input_names, "feature")
     low, high = varying_part(box, model, of_slopes=True)
     is_in_range = (low >= model.minimum).all() and (high <= model.maximum).all()
-    # If rules in order prove it in the range, they also do beyond it if the value is held there, or
-    # if the tangent does not change with other inputs.
+    # What holds all over the range also holds beyond it if the value is held there, or if the
+    # tangent does not change with other inputs.
     is_steady = model.tangent_at is not None and np.isfinite(model.tangent_at[j])
     is_enough = is_in_range or is_steady or model.out_of_bounds != "linear"
+    boxes = [(low, high)]
+    if is_enough and not is_in_range:
+        boxes.insert(0, varying_part(training_box(model), model, of_slopes=True))
 
     def is_proven(k, sign):
         if is_enough and is_in_order(model, k, sign * (np.arange(model.n_inputs) == j)):
             return True
-        slope = Enclosure(model, k, -float(sign)).evaluate(j)
-        found = largest(slope, low, high, 0.0, max_boxes, training_box(model), until=0.0)
-        return found.bound <= 0.0
+        slope, cuts = Enclosure(model, k, -float(sign)).evaluate(j), training_box(model)
+        found = (largest(slope, *box, 0.0, max_boxes, cuts, until=0.0) for box in boxes)
+        return any(one.bound <= 0.0 for one in found)
 
     outputs = range(model.n_outputs)
     return np.array([next((s for s in (1, -1) if is_proven(k, s)), 0) for k in outputs])

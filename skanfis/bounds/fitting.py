@@ -46,6 +46,8 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         nearer, way = found.nearest_proven(local)
         if found.loss(nearer) < after:
             held, drawn, after = found.model(nearer), way, found.loss(nearer)
+        elif way == 1.0:
+            drawn = way  # no proof was found before the rules in order
     raised = after / max(before, _OF_MARGINS)  # on exact data, the free fit may have no error
     report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
     if rows is not None:

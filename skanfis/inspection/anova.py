@@ -156,7 +156,10 @@ class ProductAnova:
         self.mean = float(self._others(())[1].sum())
         # Count from the mean, so that squares lose no digits.
         self.start[1] -= self.mean
-        self.variance = _but_rounding(self.closed(range(len(blocks))), self.mean)
+        variance = _but_rounding(self.closed(range(len(blocks))), self.mean)
+        # What the rules say may cancel: then only rounding errors of its squares are left.
+        apart = np.abs(self.start[1]).max() + np.abs(slopes).max()
+        self.variance = variance if variance > ROUNDING * apart**2 else 0.0
 
     def _others(self, subset):
         """For every rule, the product of the means of all blocks that are not in the subset."""

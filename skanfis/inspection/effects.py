@@ -61,7 +61,8 @@ def effects(
         Rows whose distributions are taken, input by input. None: those of the training rows, which
         ``fit`` keeps (JSON, ``partial_fit`` and ``merge`` do not).
     groups : dict of str to sequence of str or int, default=None
-        Columns that enter as one, by a name for them. Needs X, for their joint distribution.
+        Columns or categories that enter as one, by a name for them. Needs X, for their joint
+        distribution.
     output : int or str, default=0
         Which output.
 
@@ -104,7 +105,9 @@ def effects(
     subsets = [*ones, *study.pairs()]
     columns = {"sobol": study.sobol(subsets)}
     if study.rows is not None:
-        columns["rows"] = _shares(subsets, *anova.covariances(subsets, study.rows))
+        found, variance = anova.covariances(subsets, study.rows)
+        # An output that is the same on all combinations is so on the rows, but for rounding.
+        columns["rows"] = _shares(subsets, found, variance if anova.variance > 0.0 else 0.0)
     table = pd.DataFrame(columns, index=[" and ".join(labels[g] for g in v) for v in subsets])
     # Rounded, so that rounding errors do not change the order of inputs with equal shares.
     shares = table["sobol"].round(9).tolist()
@@ -229,14 +232,19 @@ class Study:
             raise ValueError("groups needs X: fit does not store how the inputs vary together.")
         if not isinstance(groups, Mapping | None):
             raise ValueError(f"groups={groups!r} must be a dict from names to lists of columns.")
-        found, levels = {}, {}
-        for name, one in categories(model).items():
+        found, levels, lists = {}, {}, categories(model)
+        for name, one in lists.items():
             found[name] = tuple(one.inputs)
             levels[name] = one.levels + ([" or ".join(one.others)] if one.others else [])
         for label, columns in (groups or {}).items():
             if isinstance(columns, str) or not len(columns):
                 raise ValueError(f"groups[{label!r}]={columns!r} must list one or more columns.")
-            own = {checked_position(column, model.input_names) for column in columns}
+            own = set()
+            for column in columns:
+                if isinstance(column, str) and column in lists:
+                    own.update(lists[column].inputs)
+                else:
+                    own.add(checked_position(column, model.input_names))
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
                 if not own >= set(found.pop(other)):
                     raise ValueError(

@@ -113,11 +113,11 @@ def rules_table(estimator: Any) -> Any:
     Returns
     -------
     table : DataFrame
-        One row per rule, by its number, with two levels of columns. ``"if"``: the term on each
-        input, missing if the rule has none. ``"data"``: "weight", the part of the training data on
-        which it fires, and "rows", the number of rows on which it is the strongest. ``"at"``: its
-        centre, the mean of the rows weighted by its strength, or a place near it. ``"then y"``, per
-        output: the rule's "value" there, and its slope by each input.
+        One row per rule, by its number, with two levels of columns. ``"if"``: the condition of the
+        text on each input, missing if there is none. ``"data"``: "weight", the part of the training
+        data on which it fires, and "rows", the number of rows on which it is the strongest.
+        ``"at"``: its centre, the mean of the rows weighted by its strength, or a place near it.
+        ``"then y"``, per output: the rule's "value" there, and its slope by each input.
 
     Raises
     ------
@@ -137,7 +137,7 @@ def rules_table(estimator: Any) -> Any:
     """
     model = fold(estimator)
     said, names = Sentences.of(model, MOST_DIGITS), list(model.input_names)
-    asked = pd.DataFrame(conditions(model)).sort_index(axis=1)
+    asked = pd.DataFrame(conditions(Sentences.of(model).model)).sort_index(axis=1)
     parts = {
         "if": asked.rename(columns=dict(enumerate(names))),
         "data": pd.DataFrame({"weight": model.rule_weights, "rows": model.rule_rows}),
@@ -163,11 +163,11 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     -------
     table : DataFrame
         One line per row, output and rule, the strongest rule first: "row", the position in X;
-        "output"; "rule", its number; "if", its terms; "strength", its normalised strength; "value",
-        its value there; "contribution", strength times value. **The sum of the contributions is the
-        prediction**. Lines without a rule are "beyond x", the change along the tangent from the
-        nearest point of the range, and "held", the change by the limits of outputs. With
-        ``out_of_bounds="nan"`` rows outside have missing values.
+        "output"; "rule", its number; "if", its conditions; "strength", its normalised strength;
+        "value", its value there; "contribution", strength times value. **The sum of the
+        contributions is the prediction**. Lines without a rule are "beyond x", the change along the
+        tangent from the nearest point of the range, and "held", the change by the limits of
+        outputs. With ``out_of_bounds="nan"`` rows outside have missing values.
 
     Raises
     ------
@@ -216,7 +216,7 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
     row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
     source = order[row, place]
     beyond_names = [f"beyond {name}" for name in model.input_names]
-    texts = [*premise_texts(model), *beyond_names, "held"]
+    texts = [*premise_texts(Sentences.of(model).model), *beyond_names, "held"]
     return pd.DataFrame(
         {
             "row": row,

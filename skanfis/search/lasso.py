@@ -12,14 +12,19 @@ import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Lasso, LassoCV
 
-from ..learning.data import StandardisedData
+from ..learning.data import StandardisedData, fingerprint
 from .judging import FOLDS, folds
+from .sample import DIGITS
 
 
 def lasso_inputs(rows: StandardisedData, inputs):
     """Those of ``inputs`` that the lasso selects, for any output."""
     if rows.n_rows < FOLDS or not inputs.size:
         return inputs
+    # Between columns that are equal, or opposite, rounding errors would divide the slope: the first
+    # stands for all.
+    numbers = np.abs(fingerprint(np.round(rows.X[:, inputs], DIGITS)))
+    inputs = inputs[np.sort(np.unique(numbers, return_index=True)[1])]
     X, weight, has_slope = rows.X[:, inputs], rows.weights, np.zeros(inputs.size, dtype=bool)
     parts = folds(rows)
     for target in rows.y.T:

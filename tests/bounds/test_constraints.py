@@ -9,9 +9,11 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import lsq_linear
+from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
+from skanfis.bounds.construction import is_in_order
 from skanfis.exceptions import ConstraintWarning
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
@@ -123,6 +125,17 @@ def test_predictions_rise_beyond_the_range_too(kind):
     after = before + rng.exponential(0.3, (30_000, 1)) * [1.0, 0.0]
     assert (held.predict(before) - held.predict(after)).max() <= 1e-12
     assert (free.predict(before) - free.predict(after)).max() > 1e-3
+
+
+def test_what_is_proven_in_the_range_is_proven_beyond_it():
+    """Also of rules that are not in order, beyond the range of inputs that are free."""
+    rng = np.random.default_rng(5)
+    X = rng.uniform(-1.0, 1.0, (300, 3))
+    y = 2.0 * np.tanh(2.0 * X[:, 0]) + X[:, 1] * X[:, 2] + 0.1 * rng.normal(size=300)
+    held = ANFISRegressor(partition="tree", max_rules=5, monotonic_cst=[1, 0, 0]).fit(X, y)
+    assert not is_in_order(held.model_, 0, np.array([1, 0, 0]))
+    assert_array_equal(monotonicity(held, 0), [1])
+    assert_array_equal(monotonicity(held, 0, [(-9.0, 9.0)] * 3), [1])
 
 
 def test_data_that_contradict_are_told():
@@ -255,6 +268,20 @@ def test_what_cannot_be_proven_is_drawn_to_a_line():
     # Not the line of least squares, for the penalty: but next to it.
     line = np.linalg.lstsq(np.column_stack([np.ones(len(Y)), X]), Y, rcond=None)[0]
     assert_allclose(held.consequents_[0], line, atol=0.1)
+
+
+def test_rules_drawn_all_the_way_are_said_to_be():
+    """Clusters that share no places are far from any order, and no proof is found in between."""
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1.0, 1.0, (200, 3))
+    y = 2.0 * np.tanh(3.0 * X[:, 0]) + X[:, 1] + X[:, 2] ** 2 + 0.1 * rng.normal(size=200)
+    clusters = KMeans(6, n_init=1, random_state=0)
+    params = QUICK | {"n_mfs": "auto", "partition": clusters, "monotonic_cst": [1, 1, 0]}
+    moved = "moved 100% of the way to rules that provably keep this.*Use partition='tree'"
+    with pytest.warns(ConstraintWarning, match=moved):
+        held = ANFISRegressor(**params).fit(X, y)
+    assert held.constraints_["drawn"] == 1.0
+    assert len(np.unique(held.consequents_, axis=0)) > 1
 
 
 def test_there_is_always_a_line(rng):

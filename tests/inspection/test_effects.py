@@ -128,6 +128,8 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
         assert set(found.index) <= {rate, fibre, f"{rate} and {fibre}"}
     with pytest.raises(ValueError, match="has the same name as a column that is not in it"):
         effects(fitted, table, groups={fibre: [rate]})
+    # A category is called by its name in a group too.
+    assert list(effects(fitted, table, groups={"both": [rate, fibre]}).table.index) == ["both"]
 
 
 @pytest.fixture(scope="module")
@@ -230,6 +232,18 @@ def test_a_constant_output_has_no_shares():
     model = quick(n_mfs=2).fit(X, np.full(30, 3.0))
     assert_allclose(effects(model, X).table, 0.0)
     assert_allclose(model.feature_importances_, 0.0)
+
+
+@pytest.mark.parametrize(
+    "settings", [{"n_mfs": [3, 2]}, {"n_mfs": 1}, {"partition": "tree"}], ids=str
+)
+def test_rows_that_are_all_the_same_have_no_shares(settings):
+    X = np.random.default_rng(5).uniform(-1.0, 1.0, (60, 2))
+    model = quick(**settings).fit(X, 1e5 + np.sin(3.0 * X[:, 0]) * X[:, 1])
+    for row in X[:10]:
+        found = effects(model, np.tile(row, (7, 1)))
+        assert_allclose(found.table, 0.0)
+        assert not found.notes
 
 
 def test_of_draws_what_no_rule_names_has_no_share_at_all(rng):

@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.inspection import explain, readability, rules_table
+from skanfis import ANFISRegressor
+from skanfis.inspection import explain, export_text, readability, rules_table
 
 from ..export.every_model import FEWEST
 from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, rows_of
@@ -94,3 +95,14 @@ def test_rules_of_a_category_are_explained_in_its_words(rng):
     assert any("fibre is PM" in premise for premise in asked)
     assert any("fibre is SM" in premise for premise in asked)
     assert set(readability(pipe, X, y).rules["if"]) == asked
+
+
+def test_conditions_are_those_of_the_text():
+    """Which leaves out those that others of the rule imply."""
+    X = np.linspace(-3.0, 3.0, 300)[:, None]
+    model = ANFISRegressor(partition="tree", max_rules=6).fit(X, np.sin(3.0 * X[:, 0]))
+    lines = export_text(model).splitlines()
+    asked = {line.removeprefix("  IF ") for line in lines if line.startswith("  IF ")}
+    assert len(asked) == model.n_rules_
+    assert set(explain(model, X[:1])["if"]) == asked
+    assert set("x0 " + rules_table(model)["if", "x0"]) == asked

@@ -45,6 +45,16 @@ def test_the_penalty_is_the_largest_within_one_standard_error(seed):
     assert_array_equal(lasso_inputs(rows, np.arange(12)), kept)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_of_equal_columns_the_first_is_kept(seed):
+    """In other units, or the other way round, they are equal too."""
+    rng = np.random.default_rng(seed)
+    first, other = rng.standard_normal((2, 60))
+    X = np.column_stack([first, other, -first, 2.0 * first + 1.0, other])
+    rows = rows_of(X, first + other + rng.standard_normal(60))
+    assert_array_equal(lasso_inputs(rows, np.arange(5)), [0, 1])
+
+
 def test_runs_are_left_out_whole(rng):
     """What moves with the run alone tells nothing of another run."""
     run = np.repeat(np.arange(10), 12)
