@@ -105,7 +105,7 @@ class EffectsDisplay:
         # One scale for all, so that a flat curve looks flat.
         mean, sd = (np.hstack([one[key] for one in self.curves]) for key in ("mean", "deviation"))
         low, high = np.min(mean - 2.0 * sd), np.max(mean + 2.0 * sd)
-        room = _ROOM * (high - low or 1.0)
+        room = _ROOM * (high - low or max(-low, high) or 1.0)
         for axes, curve in zip(self.axes_, self.curves, strict=False):
             _draw_curve(axes, curve)
             axes.set(ylim=(low - room, high + room), ylabel=on_axis(self.output_name))

@@ -21,6 +21,7 @@ import numpy as np
 from ..antecedent.tree import CRISP
 from ..digits import MOST_DIGITS, rounded
 from ..export.columns import categories, columns_of
+from ..learning.data import never_changes
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..reading_cost import UNSAID
@@ -131,14 +132,18 @@ def _from_a_level(model, slopes, places, is_common, is_told):
 
 def _resolution(model, slopes):
     """Deviations of every output, and of its noise, (n_outputs,) each; positive."""
-    if model.target is None:
+    target, finest = model.target, np.full(model.n_outputs, _FINEST)
+    if target is None:
         change = np.abs(slopes) * (model.maximum - model.minimum)[:, None]
         scale = np.ptp(model.coefficients[:, 0], axis=0) + change.max(axis=(0, 1))
     else:
-        scale = model.target.spread
+        # An output that never changes has digits of its value, and asks for none of the terms.
+        is_constant = never_changes(target.minimum, target.maximum)
+        scale = np.where(is_constant, _FINEST * np.abs(target.maximum), target.spread)
+        finest[is_constant] = 1.0
     scale = np.where(scale > 0.0, scale, 1.0)
     noise = 0.0 * scale if model.posterior is None else model.posterior.noise
-    return scale, np.clip(noise, _FINEST * scale, scale)
+    return scale, np.clip(noise, finest * scale, scale)
 
 
 def _written_terms(model, digits):

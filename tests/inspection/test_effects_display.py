@@ -120,3 +120,12 @@ def test_labels_of_many_levels_stand_apart(rng):
     for labels in sides:
         boxes = [one.get_window_extent() for one in labels]
         assert not any(one.overlaps(next_one) for one, next_one in pairwise(boxes))
+
+
+@pytest.mark.parametrize("value", [-3e-12, 0.0, 4e9])
+def test_a_flat_curve_is_seen_at_its_value(rng, value):
+    X = rng.uniform(size=(60, 2))
+    display = EffectsDisplay.from_estimator(quick().fit(X, np.full(60, value)))
+    low, high = display.axes_[0].get_ylim()
+    assert low < value < high
+    assert high - low <= abs(value) or not value
