@@ -114,10 +114,16 @@ def _from_a_level(model, slopes, places, is_common, is_told):
 
     If every row has one of the levels, their slopes are known up to a constant, so that one level
     needs none: the commonest of the rule. If one of two levels has a shared slope, the other needs
-    none, and the difference replaces the shared slope. It must not add to the numbers.
+    none, and the difference replaces the shared slope. It must not add to the numbers. If both have
+    one, the difference is shared.
     """
     slopes, places, is_common = slopes.copy(), places.copy(), is_common.copy()
     whole = [one.inputs for one in categories(model).values() if not one.others]
+    for one, other in (own for own in whole if len(own) == 2):
+        if (has_both := is_common[:, one] & is_common[:, other]).any():
+            slopes[:, one] -= slopes[:, other]
+            slopes[:, other], places[:, other] = 0.0, 1.0 - places[:, one]
+            is_common[:, one], is_common[:, other] = has_both, False
     for own, (r, center) in product(map(np.array, whole), enumerate(model.rule_centers)):
         free = own[~is_common[:, own].any(axis=0)]
         if free.size < own.size and (own.size > 2 or not is_told[r, free].any()):

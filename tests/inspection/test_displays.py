@@ -53,6 +53,13 @@ class TestMemberships:
                     assert_allclose(curve, expected, rtol=1e-9)
             assert not np.allclose(one.before, one.after)
 
+    def test_equal_terms_are_drawn_once(self):
+        tree = MODELS["tree, order 1, 1 outputs"]
+        alike = replace(tree, term_names=("1",) * tree.antecedent.n_terms)
+        drawn_of = [MembershipDisplay.from_estimator(model).inputs for model in (tree, alike)]
+        assert max(len(one.term_names) for one in drawn_of[0]) > 1
+        assert [one.term_names for one in drawn_of[1]] == [("1",)] * len(drawn_of[0])
+
 
 class TestSurface:
     @EACH

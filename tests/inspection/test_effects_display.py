@@ -104,8 +104,14 @@ def test_a_category_is_drawn_by_its_levels(drop, levels):
         assert [one.get_text() for one in axes.get_xticklabels()] == list(levels)
 
 
-def test_labels_of_many_levels_stand_apart(rng):
-    levels = ["minivan", "subcompact", "pickup", "2seater", "suv", "midsize"]
+@pytest.mark.parametrize(
+    "levels",
+    [
+        ["minivan", "subcompact", "pickup", "2seater", "suv", "midsize"],
+        ["suv", *(f"a class of number {k}" for k in range(60))],
+    ],
+)
+def test_labels_of_many_levels_stand_apart(levels, rng):
     X = pd.DataFrame({"class": rng.choice(levels, 200), "power": rng.normal(size=200)})
     y = X["power"] * (X["class"] == "suv") + 0.1 * rng.normal(size=200)
     model = encoded(["class"], quick(partition="tree", max_rules=2)).fit(X, y)

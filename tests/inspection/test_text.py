@@ -336,10 +336,16 @@ def test_a_value_is_that_of_a_level_and_others_are_told_from_it(handle_unknown, 
 
 
 @pytest.mark.parametrize(
-    ("slopes_of_rule", "handle_unknown"), [((4.0, 2.0), "error"), ((0.0, 5.0), "ignore")]
+    ("slopes_of_rule", "common", "handle_unknown"),
+    [
+        ((4.0, 2.0), (0.0, 2.0), "error"),
+        ((0.0, 5.0), (0.0, 2.0), "ignore"),
+        ((4.0, 2.0), (-1.5, 0.5), "error"),
+        ((4.0, 0.5), (-1.5, 0.5), "ignore"),
+    ],
 )
 def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(
-    slopes_of_rule, handle_unknown, rng
+    slopes_of_rule, common, handle_unknown, rng
 ):
     levels = rng.choice(["n", "y"], 300, p=[0.3, 0.7])
     X = pd.DataFrame({"rate": rng.normal(size=300), "on": levels})
@@ -347,13 +353,14 @@ def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(
     y = np.where(X["rate"] > 0.7, 9.0, np.where(X["rate"] < -0.7, -9.0, 0.0))
     pipe = encoded(["on"], model, handle_unknown=handle_unknown)
     pipe.fit(X, y + 0.1 * rng.normal(size=300))
-    # By one indicator two rules have a common slope; the third has its own by either.
+    # By one indicator or by both, two rules have a common slope; the third has its own.
     coefficients = np.zeros((3, 4, 1))
-    coefficients[:, 0, 0], coefficients[1:, 2, 0] = [1.0, 5.0, 9.0], 2.0
+    coefficients[:, 0, 0], coefficients[1:, 1:3, 0] = [1.0, 5.0, 9.0], common
     coefficients[0, 1:3, 0] = slopes_of_rule
     pipe[-1].model_ = replace(pipe[-1].model_, coefficients=coefficients)
     text = export_text(pipe)
     line = re.search(r"Common to the rules, y: (.*)\.", text)[1]
+    assert line.count(" if on ") == 1
     told = re.findall(r"Rule (\d)[\s\S]*?THEN y is about (\S+)(?:, of it (\S+) .*)?(: .*)?\n", text)
     assert {r: slopes.count(" if on ") for r, *_, slopes in told if slopes} == {"0": 1}
     # What a rule says itself is said in place of the line.
