@@ -48,7 +48,7 @@ def on_axis(name):
 
 def title_of(held, *notes):
     """The title of a picture: the first inputs that are held with their values, then notes."""
-    told = {k: as_label(v) if isinstance(v, str) else f"{v:.12g}" for k, v in held.items()}
+    told = {k: as_label(v) if isinstance(v, str) else f"{v + 0.0:.12g}" for k, v in held.items()}
     values = [f"{as_label(name)} = {value}" for name, value in told.items()]
     more = len(values) - _MOST_HELD
     others = [f"{counted(more, 'more input')} held"] if more > 0 else []

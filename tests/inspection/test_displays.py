@@ -11,7 +11,7 @@ from sklearn.preprocessing import MinMaxScaler
 
 from skanfis.export import fold
 from skanfis.inspection import EffectsDisplay, MembershipDisplay, ResponseSurfaceDisplay
-from skanfis.inspection.labels import as_label, on_axis, printable
+from skanfis.inspection.labels import as_label, on_axis, printable, title_of
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
@@ -175,6 +175,10 @@ def test_a_model_without_data_is_not_said_to_lack_them():
 )
 def test_what_no_reader_sees_is_escaped(text, shown):
     assert printable(text) == shown
+
+
+def test_a_title_has_no_negative_zero():
+    assert title_of({"rate": -0.0, "load": -2.5}) == "rate = 0; load = -2.5"
 
 
 def test_a_long_name_leaves_room_for_the_picture():
