@@ -27,7 +27,8 @@ from ._validation import rows_by_name
 from .antecedent import Antecedent, RuleTableAntecedent, by_group, strongest_rules
 from .blocks import BLOCK_BYTES, FEWEST_ROWS
 from .consequent import outputs_of_rules, rule_outputs
-from .naming import default_output_names, default_term_names
+from .digits import counted
+from .naming import default_output_names, default_term_names, listed
 from .policies import (
     FARTHEST_ROW,
     MAX_EXTRAPOLATION,
@@ -109,8 +110,8 @@ class TSKModel:
             object.__setattr__(self, "output_names", default_output_names(self.n_outputs))
 
     def __repr__(self):
-        inputs, outputs = ", ".join(self.input_names), ", ".join(self.output_names)
-        return f"TSKModel({self.n_rules} rules, {inputs} -> {outputs})"
+        inputs, outputs = listed(self.input_names, "input"), listed(self.output_names, "output")
+        return f"TSKModel({counted(self.n_rules, 'rule')}, {inputs} -> {outputs})"
 
     @property
     def n_rules(self) -> int:

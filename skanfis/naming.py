@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from .antecedent.tree import CRISP
-from .digits import in_digits, plain, rounded, told_apart
+from .digits import counted, in_digits, plain, rounded, told_apart
 from .membership import Gaussian, SigmoidFalling, SigmoidRising
 
 # Six names as in the founding paper, negative large to positive large; seven add zero.
@@ -36,6 +36,7 @@ WRITTEN = {
 _DIGITS_OF_LENGTH, _MOST_DIGITS_OF_LENGTH = 2, 9
 # Relative to the range: rounding error of a cut between two values; distance of equal places.
 _ROUNDING, _ALIKE = 1e-6, 1e-9
+_MOST_LISTED = 10  # names in a line
 
 
 def default_term_names(model, digits=_DIGITS_OF_LENGTH):
@@ -165,6 +166,11 @@ def _near(places, size):
     if 0.0 < size < np.inf:
         places = _ALIKE * size * np.round(places / (_ALIKE * size)) + 0.0
     return distinct(f"near {text}" for text in told_apart(places, 3))
+
+
+def listed(names, what):
+    """Say "'speed', 'load'" or, of more names than a line has room for, "60 inputs"."""
+    return ", ".join(map(repr, names)) if len(names) <= _MOST_LISTED else counted(len(names), what)
 
 
 def distinct(names, numbered="{} ({})"):

@@ -56,7 +56,9 @@ class TargetRange:
 
         If the tangent is followed without end, only the user's limits count.
         """
-        margin = max(max_extrapolation, _LEAST_MARGIN) * self.spread
+        # No deviation is more than half of the range: that of a constant, stored as one, is zero.
+        spread = np.minimum(self.spread, 0.5 * (self.maximum - self.minimum))
+        margin = max(max_extrapolation, _LEAST_MARGIN) * spread
         if not is_line and np.isfinite(max_extrapolation):
             part = max(_PART_OF_RANGE, _PER_DEVIATION * max_extrapolation)
             margin = part * (self.maximum - self.minimum)

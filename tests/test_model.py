@@ -72,6 +72,14 @@ def test_prediction_is_the_textbook_formula(frozen, rng):
     assert_allclose(frozen.predict(X), naive(frozen, X), rtol=1e-10, atol=1e-10)
 
 
+def test_the_short_form_counts_many_names():
+    model = rule_bases.build(rule_bases.a_tree(), n_outputs=11)
+    inputs = ", ".join(map(repr, model.input_names))
+    assert repr(model) == f"TSKModel({model.n_rules} rules, {inputs} -> 11 outputs)"
+    one = ANFISRegressor(n_mfs=1, alpha=0.1).fit([[0.0], [1.0]], [0.0, 1.0])
+    assert repr(one.model_) == "TSKModel(1 rule, 'x0' -> 'y')"
+
+
 def test_model_about_its_reference_keeps_the_digits_that_the_textbook_form_loses():
     # Everything moved by 2^30, which is exact for these rows: so must the prediction be.
     near = build(scattered())

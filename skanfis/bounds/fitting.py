@@ -13,6 +13,7 @@ import numpy as np
 from .._validation import warn_user
 from ..antecedent import TreeAntecedent
 from ..consequent import NormalFactor
+from ..digits import percent
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..model import TSKModel
 from ..policies import SILENT
@@ -60,9 +61,9 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
         end = "a single line that keeps" if is_line else "rules that provably keep"
         warn_user(
-            f"To guarantee {names}, the rules were moved {drawn:.0%} of the way to {end} this. "
-            f"That raises the training error by {np.sqrt(raised) - 1.0:.0%}. Use {remedy}, or drop "
-            "a constraint.",
+            f"To guarantee {names}, the rules were moved {percent(drawn)} of the way to {end} "
+            f"this. That raises the training error by {percent(np.sqrt(raised) - 1.0)}. Use "
+            f"{remedy}, or drop a constraint.",
             ConstraintWarning,
         )
     points = constraints.points

@@ -240,8 +240,10 @@ def _encoded(label, encoder, columns):
     found = []
     for place, (column, name) in enumerate(zip(*of_each, strict=True)):
         level = name.removeprefix(f"{column}_")
-        others = tuple(other for other in map(str, known.get(column, ())) if other != level)
-        told = Level(column, level, others)
+        others = [other for other in map(str, known.get(column, ())) if other != level]
+        # A blank level is told in quotes: no reader sees it otherwise.
+        level, *others = (one if one.strip() else repr(one) for one in (level, *others))
+        told = Level(column, level, tuple(others))
         found.append(Column(sources[column], name, place=place, level=told))
     return found
 

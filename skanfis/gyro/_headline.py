@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 
 from ..bounds import bounds, gradient_bounds
-from ..digits import counted
+from ..digits import counted, percent
 from ..export import fold
 from ..export.c.dialect import STATUS
 from ..inspection import export_text, readability
@@ -105,7 +105,8 @@ def flagged_text(calibration):
             "That is much: the figures say nothing of these rows. Log groups that overlap more, "
             "above all at both ends of the range."
         )
-    return f"{n_flagged:,} of {n_rows:,} held-out rows ({share:.1%}) were flagged{named}. {advice}"
+    flagged = f"{n_flagged:,} of {n_rows:,} held-out rows ({percent(share)})"
+    return f"{flagged} were flagged{named}. {advice}"
 
 
 def beyond(parts):

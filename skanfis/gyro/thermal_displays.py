@@ -5,6 +5,7 @@ from typing import Any, Self
 import numpy as np
 import pandas as pd
 
+from ..digits import percent
 from ._columns import ask, check_column, evenly_chosen
 from .displays import SIDES, GyroDisplay, bins_of, dress, mark_decades, signs, three_digits
 from .metrics import HYSTERESIS_BINS, biases_of_branches
@@ -173,7 +174,7 @@ class ResidualSurfaceDisplay(GyroDisplay):
         title = f"{residual.name}: largest {three_digits(residual.abs().max())}"
         dress(axes[0], "temperature [degC]", "true rate [deg/s]", title)
         empty = np.mean(counts == 0)
-        dress(axes[1], "temperature [degC]", title=f"data: {empty:.0%} of the cells empty")
+        dress(axes[1], "temperature [degC]", title=f"data: {percent(empty)} of the cells empty")
 
 
 class CoverageDisplay(GyroDisplay):
@@ -267,7 +268,7 @@ class CoverageDisplay(GyroDisplay):
         if np.nanmin(flagged, initial=np.inf) < self.min_coverage:
             style = {"colors": "0.15", "linestyles": ":", "linewidths": 1.2}
             panel.contour(x, y, flagged, levels=[self.min_coverage], **style)
-        title = f"{np.mean(cells['rows'] == 0):.0%} of the cells in range are empty (hatched)"
+        title = f"{percent(np.mean(cells['rows'] == 0))} of the cells in range are empty (hatched)"
         dress(panel, labels[0], labels[1], title)
         panel.grid(False)
 

@@ -107,6 +107,9 @@ def _terms_on(model, j, rows):
     if isinstance(model.antecedent, TreeAntecedent):
         # Draw only the side above a cut; the side below is one minus that.
         own = own[own < model.antecedent.n_nodes]
+    # Equal terms of several rules or cuts share a name.
+    _, first = np.unique([model.term_names[t] for t in own], return_index=True)
+    own = own[np.sort(first)]
     Z = np.zeros((model.n_inputs, _N_POINTS))
     Z[j] = grid
     names = tuple(model.term_names[t] for t in own)

@@ -1,7 +1,7 @@
 """The effects of every input, and every pair of inputs: their shares of the output's variance."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations, compress
 from operator import itemgetter
 from typing import Any
@@ -16,6 +16,7 @@ from ..export import fold_with_rows
 from ..export.columns import categories
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
+from .labels import in_one_line
 from .text import MOST_NAMED
 
 # A note tells of shares that differ by more, and of outputs held on a larger part of combinations.
@@ -24,19 +25,20 @@ _N_HELD = 10_000  # combinations drawn to find this part
 _DIGITS = 3  # of printed shares
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Effects:
     """The result of :func:`effects`; it prints as the table and the notes on it."""
 
     table: pd.DataFrame
     held: float
     notes: list[str]
-    _printed: pd.DataFrame = field(repr=False)
+    _printed: pd.DataFrame
 
-    def __str__(self):
+    def __repr__(self):
+        # As a notebook shows it.
         table = self._printed.round(_DIGITS) + 0.0
         table = table.to_string(float_format=f"{{:.{_DIGITS}f}}".format)
-        return "\n".join([table, *self.notes])
+        return "\n".join([table, *map(in_one_line, self.notes)])
 
 
 def effects(

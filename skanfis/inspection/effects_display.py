@@ -105,7 +105,7 @@ class EffectsDisplay:
         # One scale for all, so that a flat curve looks flat.
         mean, sd = (np.hstack([one[key] for one in self.curves]) for key in ("mean", "deviation"))
         low, high = np.min(mean - 2.0 * sd), np.max(mean + 2.0 * sd)
-        room = _ROOM * (high - low or 1.0)
+        room = _ROOM * (high - low or max(-low, high) or 1.0)
         for axes, curve in zip(self.axes_, self.curves, strict=False):
             _draw_curve(axes, curve)
             axes.set(ylim=(low - room, high + room), ylabel=on_axis(self.output_name))
@@ -206,7 +206,9 @@ def _draw_pair(axes, pair):
 def _name(side, name, points, levels):
     side.set_label_text(on_axis(name))
     if levels is not None:
-        side.set_ticks(points, [on_axis(level) for level in levels])
+        # Of more levels than there is room for, only some are named.
+        step = -(-len(levels) // _MOST_LETTERS)
+        side.set_ticks(points[::step], [on_axis(level) for level in levels[::step]])
         if len(levels) * max(map(len, levels)) > _MOST_LETTERS:
             turned = 90.0 if side.axis_name == "x" else 0.0
             side.set_tick_params(rotation=turned, labelsize="x-small")

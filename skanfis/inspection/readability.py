@@ -12,6 +12,7 @@ from .._validation import as_numbers, check_finite, positive_weights
 from ..digits import counted, in_digits
 from ..export import fold_with_rows
 from ..model import TSKModel
+from .labels import in_one_line
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
 from .sentences import Sentences
@@ -182,7 +183,8 @@ class Readability:
     def __str__(self):
         nothing = "Nothing measured here speaks against reading the rules one by one."
         of_chunk = ["Errors are of the rows of the latest partial_fit alone."] * self.is_of_chunk
-        return "\n".join([f"{self.line}.", *(self.findings or [nothing]), *of_chunk])
+        lines = [f"{self.line}.", *(self.findings or [nothing]), *of_chunk]
+        return "\n".join(map(in_one_line, lines))
 
 
 def readability(

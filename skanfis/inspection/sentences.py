@@ -21,6 +21,7 @@ import numpy as np
 from ..antecedent.tree import CRISP
 from ..digits import MOST_DIGITS, rounded
 from ..export.columns import categories, columns_of
+from ..learning.data import never_changes
 from ..model import TSKModel
 from ..naming import WRITTEN, default_term_names, parameters_written
 from ..reading_cost import UNSAID
@@ -113,10 +114,16 @@ def _from_a_level(model, slopes, places, is_common, is_told):
 
     If every row has one of the levels, their slopes are known up to a constant, so that one level
     needs none: the commonest of the rule. If one of two levels has a shared slope, the other needs
-    none, and the difference replaces the shared slope. It must not add to the numbers.
+    none, and the difference replaces the shared slope. It must not add to the numbers. If both have
+    one, the difference is shared.
     """
     slopes, places, is_common = slopes.copy(), places.copy(), is_common.copy()
     whole = [one.inputs for one in categories(model).values() if not one.others]
+    for one, other in (own for own in whole if len(own) == 2):
+        if (has_both := is_common[:, one] & is_common[:, other]).any():
+            slopes[:, one] -= slopes[:, other]
+            slopes[:, other], places[:, other] = 0.0, 1.0 - places[:, one]
+            is_common[:, one], is_common[:, other] = has_both, False
     for own, (r, center) in product(map(np.array, whole), enumerate(model.rule_centers)):
         free = own[~is_common[:, own].any(axis=0)]
         if free.size < own.size and (own.size > 2 or not is_told[r, free].any()):
@@ -131,14 +138,18 @@ def _from_a_level(model, slopes, places, is_common, is_told):
 
 def _resolution(model, slopes):
     """Deviations of every output, and of its noise, (n_outputs,) each; positive."""
-    if model.target is None:
+    target, finest = model.target, np.full(model.n_outputs, _FINEST)
+    if target is None:
         change = np.abs(slopes) * (model.maximum - model.minimum)[:, None]
         scale = np.ptp(model.coefficients[:, 0], axis=0) + change.max(axis=(0, 1))
     else:
-        scale = model.target.spread
+        # An output that never changes has digits of its value, and asks for none of the terms.
+        is_constant = never_changes(target.minimum, target.maximum)
+        scale = np.where(is_constant, _FINEST * np.abs(target.maximum), target.spread)
+        finest[is_constant] = 1.0
     scale = np.where(scale > 0.0, scale, 1.0)
     noise = 0.0 * scale if model.posterior is None else model.posterior.noise
-    return scale, np.clip(noise, _FINEST * scale, scale)
+    return scale, np.clip(noise, finest * scale, scale)
 
 
 def _written_terms(model, digits):

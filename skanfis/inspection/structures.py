@@ -101,11 +101,13 @@ class StructureDisplay:
         ax.axhline(self.tolerance, linestyle="--", color="0.5", linewidth=1, label=label)
         errors = [one["expected_error"] for one in structures]
         ax.set_xlabel("reading cost, numerals in the rules")
-        ax.set_ylabel("error expected of new rows, sd of the target")
+        ax.set_ylabel("error expected of new rows,\nsd of the target")
         _on_logarithms(ax.set_xscale, ax.xaxis)
         if 0.0 < _FAR_APART * min(errors) < max(errors):
             _on_logarithms(ax.set_yscale, ax.yaxis)
-        ax.legend(fontsize="small", frameon=False)
+        # Above the picture, where it hides no candidate.
+        place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.1}
+        ax.legend(ncols=2, fontsize="small", frameon=False, **place)
         return self
 
 

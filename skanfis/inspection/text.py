@@ -31,6 +31,7 @@ from .rules import (
     readability_in_training,
     rename,
     shown_rules,
+    with_names_in_one_line,
 )
 from .sentences import PRECISION, Sentences
 
@@ -140,7 +141,8 @@ def export_text(
         lines = [f"IF {premises[r]}"]
         for k, name in enumerate(model.output_names):
             lines.append(f"{' AND' if k else 'THEN'} {name} is {_conclusion(said, r, k)}")
-        parts.append("\n".join([f"{heading}:", *(_wrapped(one, "  ", 7 * " ") for one in lines)]))
+        said_of = [_wrapped(one, "  ", 7 * " ") for one in lines]
+        parts.append("\n".join([_wrapped(f"{heading}:"), *said_of]))
     if len(chosen) < model.n_rules:
         parts.append(f"Left out: {_left_out(model, chosen)}.")
     if show_terms:
@@ -210,7 +212,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
 def _said(estimator, precision=PRECISION, feature_names=None, output_names=None):
     """The sentences of the rules, and the readability that the fit has found, or None."""
     check_count("precision", precision, 1, MOST_DIGITS)
-    model = rename(fold(estimator), feature_names, output_names)
+    model = with_names_in_one_line(rename(fold(estimator), feature_names, output_names))
     return Sentences.of(model, precision), readability_in_training(estimator, model)
 
 

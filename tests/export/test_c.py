@@ -142,6 +142,11 @@ def test_tangents_of_far_inputs_are_found_at_their_medians(tmp_path):
     assert np.abs(found - wanted).max() < 1e-5 * full_scale(wanted)
 
 
+def test_the_short_form_leaves_the_files_out():
+    code = export_c(quick(n_mfs=2, solver="lse").fit(X, Y), name="m")
+    assert repr(code) == f"CCode(name='m', cost={code.cost!r})"
+
+
 @pytest.mark.theory
 @needs_compiler
 def test_row_that_is_not_finite_gets_no_answer(tmp_path):

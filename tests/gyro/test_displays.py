@@ -192,7 +192,9 @@ def test_surface_counts_and_averages():
     assert corners.index.tolist() == [0, 24 * 23, 24 * 24 - 1]
     assert corners["rows"].tolist() == [2, 1, 1]
     np.testing.assert_allclose(corners["mean error after [deg/s]"], [0.2, 0.5, 0.7])
-    assert "99% of the cells empty" in display.axes_[1].get_title(loc="left")
+    assert "99 % of the cells empty" in display.axes_[1].get_title(loc="left")
+    alone = ResidualSurfaceDisplay.from_predictions(*np.full((3, 1), 5.0), temperature=[20.0])
+    assert "99.8 % of the cells empty" in alone.axes_[1].get_title(loc="left")
 
 
 def test_groups_are_sorted_by_what_is_left_and_only_the_worst_are_drawn(log):

@@ -11,7 +11,7 @@ from sklearn.preprocessing import MinMaxScaler
 
 from skanfis.export import fold
 from skanfis.inspection import EffectsDisplay, MembershipDisplay, ResponseSurfaceDisplay
-from skanfis.inspection.labels import as_label, printable
+from skanfis.inspection.labels import as_label, on_axis, printable, title_of
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, rows_of
 from ..quick import quick
@@ -52,6 +52,13 @@ class TestMemberships:
                     expected = 1 / (1 + np.exp((term["center"] - one.grid) / term["width"]))
                     assert_allclose(curve, expected, rtol=1e-9)
             assert not np.allclose(one.before, one.after)
+
+    def test_equal_terms_are_drawn_once(self):
+        tree = MODELS["tree, order 1, 1 outputs"]
+        alike = replace(tree, term_names=("1",) * tree.antecedent.n_terms)
+        drawn_of = [MembershipDisplay.from_estimator(model).inputs for model in (tree, alike)]
+        assert max(len(one.term_names) for one in drawn_of[0]) > 1
+        assert [one.term_names for one in drawn_of[1]] == [("1",)] * len(drawn_of[0])
 
 
 class TestSurface:
@@ -168,6 +175,23 @@ def test_a_model_without_data_is_not_said_to_lack_them():
 )
 def test_what_no_reader_sees_is_escaped(text, shown):
     assert printable(text) == shown
+
+
+def test_a_title_has_no_negative_zero():
+    assert title_of({"rate": -0.0, "load": -2.5}) == "rate = 0; load = -2.5"
+
+
+def test_a_long_name_leaves_room_for_the_picture():
+    first, second = (f"{'a' * 50}{k}{'b' * 50}{end}" for k, end in ((0, "x"), (1, "y")))
+    assert as_label("a" * 60) == "a" * 60
+    assert as_label(first).endswith("bbbx")
+    assert as_label(first) != as_label(second)
+    assert len(as_label(f"{'a' * 50}$")) <= 60
+    assert len(as_label(first)) == 60
+    assert on_axis(first).count("\n") == 2
+    assert on_axis("sensor_000_temperature") == "sensor_000_\ntemperature"
+    assert on_axis("mean air temperature") == "mean air temperature"
+    assert on_axis("air temperature at noon") == "air temperature at\nnoon"
 
 
 # Those that cannot be drawn as they are: no picture has forgotten to ask for a label.

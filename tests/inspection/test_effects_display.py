@@ -104,8 +104,14 @@ def test_a_category_is_drawn_by_its_levels(drop, levels):
         assert [one.get_text() for one in axes.get_xticklabels()] == list(levels)
 
 
-def test_labels_of_many_levels_stand_apart(rng):
-    levels = ["minivan", "subcompact", "pickup", "2seater", "suv", "midsize"]
+@pytest.mark.parametrize(
+    "levels",
+    [
+        ["minivan", "subcompact", "pickup", "2seater", "suv", "midsize"],
+        ["suv", *(f"a class of number {k}" for k in range(60))],
+    ],
+)
+def test_labels_of_many_levels_stand_apart(levels, rng):
     X = pd.DataFrame({"class": rng.choice(levels, 200), "power": rng.normal(size=200)})
     y = X["power"] * (X["class"] == "suv") + 0.1 * rng.normal(size=200)
     model = encoded(["class"], quick(partition="tree", max_rules=2)).fit(X, y)
@@ -120,3 +126,12 @@ def test_labels_of_many_levels_stand_apart(rng):
     for labels in sides:
         boxes = [one.get_window_extent() for one in labels]
         assert not any(one.overlaps(next_one) for one, next_one in pairwise(boxes))
+
+
+@pytest.mark.parametrize("value", [-3e-12, 0.0, 4e9])
+def test_a_flat_curve_is_seen_at_its_value(rng, value):
+    X = rng.uniform(size=(60, 2))
+    display = EffectsDisplay.from_estimator(quick().fit(X, np.full(60, value)))
+    low, high = display.axes_[0].get_ylim()
+    assert low < value < high
+    assert high - low <= abs(value) or not value

@@ -101,3 +101,10 @@ def test_what_has_compared_nothing_has_no_picture(line):
             shown(line, structures)
     with pytest.raises(ValueError, match="Fit one with n_mfs='auto'"):
         StructureDisplay.from_estimator(line.model_)
+
+
+def test_the_legend_hides_no_candidate(line):
+    display = StructureDisplay.from_estimator(line)
+    display.figure_.draw_without_rendering()
+    legend = display.ax_.get_legend().get_window_extent()
+    assert legend.y0 >= display.ax_.get_window_extent().y1

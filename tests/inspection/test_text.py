@@ -23,6 +23,7 @@ from skanfis.inspection.sentences import Sentences
 
 from ..export.rule_bases import EVERY_PAIR, MODELS, NAMES, rows_of
 from ..outline import Outline
+from ..quick import quick
 from .encoded import encoded
 from .reader import read_text
 
@@ -48,6 +49,50 @@ def test_noise_is_told_in_the_units_of_the_target(rng):
     assert float(told[1]) == pytest.approx(300.0, rel=4.0 / np.sqrt(2 * 2000))
     # A model that was taken as it was given knows of none.
     assert "about the rules" not in export_text(replace(model.fit(X, y).model_, posterior=None))
+
+
+def test_every_name_stands_in_one_line():
+    model, keys = MODELS["grid, order 1, 2 outputs"], ("input_names", "output_names", "term_names")
+    signs, shown = ("\n", "\x85", "\u2028", "\r\n", "\x1b"), (" ", " ", " ", " ", r"\x1b")
+    named = [
+        replace(
+            model,
+            **{
+                key: tuple(f"a{k}{of[k % 5]}b" for k in range(len(getattr(model, key))))
+                for key in keys
+            },
+        )
+        for of in (signs, shown)
+    ]
+    assert export_text(named[0]) == export_text(named[1])
+    assert rules_html(named[0]) == rules_html(named[1])
+    found = readability(named[0], rows_of(model, 1.0))
+    assert len(str(found).splitlines()) == 1 + max(len(found.findings), 1)
+    terms = re.compile("    a")
+    assert all(len(line) <= 96 or terms.match(line) for line in export_text(named[1]).splitlines())
+
+
+def test_a_blank_level_is_told_in_quotes(rng):
+    X = pd.DataFrame({"kind": rng.choice(["", "B", "C"], 90), "x": rng.uniform(size=90)})
+    model = encoded(["kind"], quick(1)).fit(X, 2.0 * (X["kind"] == "") + X["x"])
+    assert "if kind is ''" in export_text(model)
+
+
+@pytest.mark.parametrize("value", [3.0, 1e-12, -0.015625, 2.5e12])
+def test_a_constant_output_is_told_in_its_own_digits(rng, value):
+    X = rng.uniform(-1, 1, size=(60, 2))
+    found = read_text(export_text(quick(1).fit(X, np.full(60, value))), ["x0", "x1"])
+    assert found.limits["y"] == (value, value)
+    assert_allclose(found.predict({"x0": 0.3, "x1": -0.2}), value, rtol=1e-4)
+
+
+def test_a_constant_output_asks_for_no_digits_of_the_terms(rng):
+    X = rng.uniform(-1, 1, size=(60, 2))
+    y = np.sin(3 * X[:, 0]) + 0.1 * rng.standard_normal(60)
+    constant = np.full(60, 3.0)
+    alone, both = (quick([2, 1]).fit(X, one) for one in (y, np.column_stack([y, constant])))
+    alone, both = (re.findall("center .*, width .*", export_text(one)) for one in (alone, both))
+    assert both == alone
 
 
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
@@ -291,10 +336,16 @@ def test_a_value_is_that_of_a_level_and_others_are_told_from_it(handle_unknown, 
 
 
 @pytest.mark.parametrize(
-    ("slopes_of_rule", "handle_unknown"), [((4.0, 2.0), "error"), ((0.0, 5.0), "ignore")]
+    ("slopes_of_rule", "common", "handle_unknown"),
+    [
+        ((4.0, 2.0), (0.0, 2.0), "error"),
+        ((0.0, 5.0), (0.0, 2.0), "ignore"),
+        ((4.0, 2.0), (-1.5, 0.5), "error"),
+        ((4.0, 0.5), (-1.5, 0.5), "ignore"),
+    ],
 )
 def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(
-    slopes_of_rule, handle_unknown, rng
+    slopes_of_rule, common, handle_unknown, rng
 ):
     levels = rng.choice(["n", "y"], 300, p=[0.3, 0.7])
     X = pd.DataFrame({"rate": rng.normal(size=300), "on": levels})
@@ -302,13 +353,14 @@ def test_of_two_levels_a_slope_of_a_rule_replaces_the_common_one(
     y = np.where(X["rate"] > 0.7, 9.0, np.where(X["rate"] < -0.7, -9.0, 0.0))
     pipe = encoded(["on"], model, handle_unknown=handle_unknown)
     pipe.fit(X, y + 0.1 * rng.normal(size=300))
-    # By one indicator two rules have a common slope; the third has its own by either.
+    # By one indicator or by both, two rules have a common slope; the third has its own.
     coefficients = np.zeros((3, 4, 1))
-    coefficients[:, 0, 0], coefficients[1:, 2, 0] = [1.0, 5.0, 9.0], 2.0
+    coefficients[:, 0, 0], coefficients[1:, 1:3, 0] = [1.0, 5.0, 9.0], common
     coefficients[0, 1:3, 0] = slopes_of_rule
     pipe[-1].model_ = replace(pipe[-1].model_, coefficients=coefficients)
     text = export_text(pipe)
     line = re.search(r"Common to the rules, y: (.*)\.", text)[1]
+    assert line.count(" if on ") == 1
     told = re.findall(r"Rule (\d)[\s\S]*?THEN y is about (\S+)(?:, of it (\S+) .*)?(: .*)?\n", text)
     assert {r: slopes.count(" if on ") for r, *_, slopes in told if slopes} == {"0": 1}
     # What a rule says itself is said in place of the line.

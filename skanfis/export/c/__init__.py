@@ -7,7 +7,7 @@ and ``header`` complete the files.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
 
@@ -43,8 +43,8 @@ class CCode:
     """
 
     name: str
-    header: str
-    source: str
+    header: str = field(repr=False)
+    source: str = field(repr=False)
     cost: CCost
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..._validation import warn_user
+from ...digits import percent
 from ...naming import distinct
 from ..folding import fold
 from .functions import function_of
@@ -230,5 +231,5 @@ def _warn_of_differences(model):
     is_held = (model.predict(X) != replace(model, target=None).predict(X)).any(axis=1)
     for is_there, what in ((~fires, _GAP), (is_held, _HELD)):
         if is_there.any():
-            where = f"{np.mean(is_there):.1%} of {_N_POINTS} points within the training range"
+            where = f"{percent(np.mean(is_there))} of {_N_POINTS} points within the training range"
             warn_user(f"At {where} {what}", UserWarning)
