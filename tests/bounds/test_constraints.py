@@ -277,7 +277,7 @@ def test_rules_drawn_all_the_way_are_said_to_be():
     y = 2.0 * np.tanh(3.0 * X[:, 0]) + X[:, 1] + X[:, 2] ** 2 + 0.1 * rng.normal(size=200)
     clusters = KMeans(6, n_init=1, random_state=0)
     params = QUICK | {"n_mfs": "auto", "partition": clusters, "monotonic_cst": [1, 1, 0]}
-    moved = "moved 100% of the way to rules that provably keep this.*Use partition='tree'"
+    moved = "moved 100 % of the way to rules that provably keep this.*Use partition='tree'"
     with pytest.warns(ConstraintWarning, match=moved):
         held = ANFISRegressor(**params).fit(X, y)
     assert held.constraints_["drawn"] == 1.0
