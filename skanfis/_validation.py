@@ -1,5 +1,6 @@
 """Checks of data and parameters, beside scikit-learn's own; their messages name the column."""
 
+import sys
 import warnings
 from collections import Counter
 from contextlib import contextmanager
@@ -16,6 +17,8 @@ from .blocks import LARGE_BLOCK_ROWS, row_blocks
 # Weights are rescaled only beyond this exponent of two: below it, sums of products of two weights
 # stay below 2^1023, for any possible number of rows.
 _LARGEST_EXPONENT = 400
+# This package, and what may stand between it and the user's line.
+_PACKAGES = (__name__.split(".")[0], "sklearn", "joblib")
 _SECONDS = "Give the time since some moment, such as the power-on, as a number of seconds."
 _IMPUTE = "Drop these rows, or impute them in a Pipeline before (sklearn.impute)."
 
@@ -341,8 +344,11 @@ def bearable_weights(sample_weight):
 
 
 def warn_user(message, category):
-    """Warn at the line that called the caller of this function."""
-    warnings.warn(message, category, stacklevel=3)
+    """Warn at the user's line: the first outside this package and those that call it."""
+    frame, level = sys._getframe(1), 2
+    while frame.f_globals.get("__name__", "").split(".")[0] in _PACKAGES and frame.f_back:
+        frame, level = frame.f_back, level + 1
+    warnings.warn(message, category, stacklevel=level)
 
 
 def check_choice(parameter, value, choices):

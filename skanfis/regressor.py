@@ -1,6 +1,5 @@
 """ANFISRegressor, the scikit-learn estimator: parameters, fit, predict, learning from chunks."""
 
-import warnings
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
@@ -25,7 +24,7 @@ from ._sklearn import (
     fit_context,
 )
 from ._threads import N_JOBS, one_blas_thread
-from ._validation import check_finite, named_refusals, unchanged_by_failure
+from ._validation import check_finite, named_refusals, unchanged_by_failure, warn_user
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
 from .inspection import rules_html
 from .inspection.effects import importances
@@ -419,7 +418,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         inside = model.in_bounds(X)
         if model.out_of_bounds == "linear" and not inside.all():
             message = f"{model.describe_out_of_bounds(X)} Policy: {model.policy}."
-            warnings.warn(message, OutOfBoundsWarning, stacklevel=2)
+            warn_user(message, OutOfBoundsWarning)
         if not return_std:
             outputs = model.predict(X, inside)
             return outputs[:, 0] if self._single_output else outputs
@@ -589,13 +588,12 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             own = inputs_with_slopes(self.model_, own)
         elif after_fit:
             chunk_checks.check_outputs(self.model_, data.output_names)
-            warnings.warn(
+            warn_user(
                 "partial_fit after fit: the premises stay, but fit keeps no sums over its "
                 f"{self.model_.rule_rows.sum():.0f} rows that others could be added to, and the "
                 "consequents are learnt from the new rows alone. To have all rows count, give them "
                 "all to partial_fit, whose first call is a fit.",
                 ForgottenRowsWarning,
-                stacklevel=5,
             )
         else:
             self.model_ = chunk_checks.named_premises(request.partition, data)

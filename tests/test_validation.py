@@ -1,12 +1,20 @@
 """The checks alone, where the estimator's tests do not reach: blocks, overflow, switches."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
 from sklearn import config_context
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 from skanfis import _validation
 from skanfis._validation import check_finite, group_numbers
+from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
+
+from .quick import quick
 
 NAMES = ["a", "b"]
 
@@ -54,3 +62,16 @@ def test_a_missing_group_is_named_whatever_stands_for_it(missing):
     with pytest.raises(ValueError, match="no value for 1 of 3 rows, first at row 1"):
         group_numbers([1, missing, 2], 3)
     assert group_numbers([7, 5, 7], 3).tolist() == [1, 0, 1]
+
+
+def test_a_warning_points_at_the_line_of_the_user_however_deep_it_arises():
+    X, y = np.random.default_rng(0).normal(size=(2, 60, 1))
+    X = np.hstack([X, np.ones_like(X)])  # a constant input
+    search = GridSearchCV(
+        make_pipeline(StandardScaler(), quick(n_mfs=2)), {"anfisregressor__n_mfs": [2]}
+    )
+    with pytest.warns(ConstantInputWarning) as told:
+        search.fit(X, y.ravel())
+    with pytest.warns(OutOfBoundsWarning) as outside:
+        search.predict(X + 10.0)
+    assert {Path(one.filename) for one in [*told, *outside]} == {Path(__file__)}

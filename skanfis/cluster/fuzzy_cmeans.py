@@ -4,7 +4,6 @@ Each step finds the best memberships for fixed centres, then the best centres fo
 1981). Distances are relative to that of the nearest centre: as m → 1, their powers would overflow.
 """
 
-import warnings
 from numbers import Integral, Real
 from typing import Any, ClassVar
 
@@ -18,6 +17,7 @@ from sklearn.utils import check_array, check_random_state
 from sklearn.utils.validation import check_is_fitted
 
 from .._sklearn import Interval, StrOptions
+from .._validation import warn_user
 from ._rows import Clusterer, check_rows, distance_blocks
 
 # Centres that differ by less than this part of their clusters' spread coincide.
@@ -185,20 +185,18 @@ class FuzzyCMeans(ClassNamePrefixFeaturesOutMixin, TransformerMixin, Clusterer):
         objective, centers, spread, self.n_iter_, shift = min(runs, key=lambda run: run[0])
         n_distinct = count_distinct(centers, spread)
         if shift > self.tol:
-            warnings.warn(
+            warn_user(
                 f"FuzzyCMeans did not converge within max_iter={self.max_iter}: in the last "
                 f"iteration, a centre moved by {shift:.2g} times the spread of the data, more than "
                 f"tol={self.tol:g}. Increase max_iter or tol.",
                 ConvergenceWarning,
-                stacklevel=4,
             )
         if n_distinct < self.n_clusters:
-            warnings.warn(
+            warn_user(
                 f"Only {n_distinct} of n_clusters={self.n_clusters} centres are distinct. Use "
                 f"fewer clusters, or a smaller m than {self.m_:g} (on these data, centres near the "
                 f"mean coincide from m={largest:.3g} on).",
                 ConvergenceWarning,
-                stacklevel=4,
             )
         self.cluster_centers_ = mean + scale * centers
         self.inertia_ = scale**2 * objective

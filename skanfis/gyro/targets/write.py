@@ -50,7 +50,7 @@ def _write(calibration, text, folder):
     low, high = difference(error, made.piecewise)
     # ArduPilot applies the difference at T minus that at T_cal.
     is_relative = name == "ardupilot"
-    largest = high - low if is_relative else max(-low, high)
+    largest = high - low if is_relative else max(0.0, -low, high)
     model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
     if not np.isfinite(largest):
         return "its difference from the model could not be bounded.", False
