@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .._validation import check_count
+from ..digits import counted
 from .anova import N_SHARED, draw
 from .displays import BINS, BRIGHTEST, panels_or_new, pyplot
 from .effects import Study
@@ -40,6 +41,8 @@ class EffectsDisplay:
     pairs : list of dict
         "inputs", "points", "levels" of both, "share", and "effect" (n_points up, n_points across).
     output_name : str
+    n_more : int, default=0
+        Inputs, and groups of several columns, that have no curve.
 
     Examples
     --------
@@ -54,6 +57,7 @@ class EffectsDisplay:
     curves: list[dict[str, Any]]
     pairs: list[dict[str, Any]]
     output_name: str
+    n_more: int = 0
 
     @classmethod
     def from_estimator(
@@ -94,12 +98,14 @@ class EffectsDisplay:
             curves=[_curve(study, *one) | {"share": share[one]} for one in ones],
             pairs=[_pair(study, *v) | {"share": share[v]} for v in pairs],
             output_name=study.model.output_names[study.output],
+            n_more=len(study.labels) - len(ones),
         ).plot(ax=ax)
 
     def plot(self, *, ax: Any = None) -> Self:
         """Draw the effects on ``ax``, as of :meth:`from_estimator`."""
         note = "curve: mean over all other inputs, ± 2 sd; shaded: terms; grey: data"
         note += "; colours: beyond what both do alone" if self.pairs else ""
+        note += f"; without a curve: {counted(self.n_more, 'more input')}" if self.n_more else ""
         self.axes_ = panels_or_new(ax, len(self.curves) + len(self.pairs), note)
         self.figure_ = self.axes_[0].figure
         # One scale for all, so that a flat curve looks flat.

@@ -77,6 +77,8 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
         assert_allclose(curve["terms"], expected, atol=1e-9)
     fewer = EffectsDisplay.from_estimator(model, X, max_shown=1)
     assert [one["input"] for one in fewer.curves] == [display.curves[0]["input"]]
+    note = " ".join(fewer.figure_.get_supxlabel().split())
+    assert note.endswith(f"without a curve: {len(display.curves) - 1} more inputs")
     with pytest.raises(ValueError, match="max_shown"):
         EffectsDisplay.from_estimator(model, X, max_shown=0)
     with pytest.raises(ValueError, match="groups holds every column, and groups have no curves"):
