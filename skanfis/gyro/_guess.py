@@ -184,7 +184,8 @@ def _guess(source, request, layout, first):
         layout.others = first.others
     layout.notes.append(_sentence(layout))
     if "time" not in layout.places:
-        named = [one.name for one in columns if one.score("time") > 0.0 and one.numbers.size]
+        others = [one for one in columns if one.place not in taken and one.numbers.size]
+        named = [one.name for one in others if one.score("time") > 0.0]
         layout.notes += [f"{name!r} is not used: no time goes up and down" for name in named[:1]]
 
 

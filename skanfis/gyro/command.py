@@ -49,6 +49,7 @@ def main(arguments=None):
     parser = make_parser()
     options = parser.parse_args(arguments)
     tell = _progress(options.quiet)
+    options.written = None
     try:
         check_kind(parser, options)
         options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
@@ -72,7 +73,8 @@ def main(arguments=None):
         # Arithmetic errors come from odd logs: they too get one sentence.
         return _say_error(error, FAILED)
     except KeyboardInterrupt:
-        return _say_error("interrupted; nothing was written.", INTERRUPTED)
+        told = f"all is written to {options.written}" if options.written else "nothing was written"
+        return _say_error(f"interrupted; {told}.", INTERRUPTED)
 
 
 def _calibrate(options, tell):
@@ -88,6 +90,7 @@ def _calibrate(options, tell):
         targets = list(write_targets(calibration, options.target, written))
         # Before files are moved: until then Ctrl-C and errors leave nothing behind.
         summary = list(errors_and_verdict(calibration, reading.name_row))
+    options.written = folder
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(summary)
@@ -289,6 +292,7 @@ def _apply(options, tell):
         # Twelve digits are more than any gyro resolves, and shorter than the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
         summary = list(of_rates(compensator, log, rates))
+    options.written = target
     _say([f"written        {target}: {n_rows}", *summary])
     _say(f"note           {note}" for note in reading.notes)
     tell("done")

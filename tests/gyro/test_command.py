@@ -366,6 +366,21 @@ def test_a_failure_while_files_are_moved_leaves_those_of_before(
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
+@pytest.mark.parametrize(
+    ("where", "told"),
+    [("rules_text", "nothing was written"), ("_say", "all is written to {}")],
+)
+def test_ctrl_c_says_whether_files_were_written(tmp_path, log, monkeypatch, run, where, told):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, where, interrupt)
+    code, _, err = run(log[log["run"] < 3], f"{SMALL} --quiet")
+    out = tmp_path / "out"
+    assert (code, out.exists()) == (command.INTERRUPTED, where == "_say")
+    assert err.endswith(f"interrupted; {told.format(out)}.\n")
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="there a closed pipe is another error")
 def test_a_reader_that_goes_away_ends_it_quietly(calibrated, tmp_path, monkeypatch):
     reader, writer = os.pipe()

@@ -437,6 +437,13 @@ def test_a_supply_voltage_that_never_changes_is_no_output(tmp_path, truth):
     same(found_in(tmp_path, table.assign(**{"Spannung [V]": 3.3})), truth)
 
 
+def test_a_column_that_is_no_time_is_named_unless_it_is_used(tmp_path, truth):
+    table = truth[PARTS[1:]].rename(columns={"temperature": "T (°C)"})
+    assert "is not used" not in "; ".join(found_in(tmp_path, table).notes)
+    notes = found_in(tmp_path, table.assign(t=truth["output"])).notes
+    assert "'t' is not used: no time goes up and down" in notes
+
+
 def test_of_axes_that_all_feel_the_table_that_along_it_is_taken(tmp_path, truth):
     """No gyro is mounted square: of a degree off the others follow the rate as well."""
     table = truth[[*PARTS, "run"]].rename(columns={"output": "gyro_z"})
