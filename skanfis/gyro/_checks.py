@@ -160,8 +160,9 @@ def _check_time(log, unit, runs):
         row = int(bad[0])
         raise LogError(
             f"time does not increase within a run: {time[row]:.13g} s after {before[row]:.13g} s "
-            f"({bad.size} such rows). Rows must be in the order of time, each with a time of its "
-            "own; if several runs follow each other, say which column tells them apart (run=NAME).",
+            f"({counted(bad.size, 'such row')}). Rows must be in the order of time, each with a "
+            "time of its own; if several runs follow each other, say which column tells them apart "
+            "(run=NAME).",
             "time",
             row,
         )
@@ -231,7 +232,8 @@ def check_values(values, part, allow_missing=False):
         return
     row = int(np.argmax(bad))
     if part in LABELS:
-        raise LogError(f"the label is missing ({bad.sum()} such rows); fill it in.", part, row)
+        rows = counted(bad.sum(), "such row")
+        raise LogError(f"the label is missing ({rows}); fill it in.", part, row)
     kind = "is missing" if missing[row] else "is infinite"
     raise LogError(f"the value {kind} ({bad.sum()} of {bad.size} rows); drop them.", part, row)
 

@@ -55,7 +55,7 @@ def headline(calibration, unit):
         )
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
     if name == NOTHING:
-        title = "Leave the gyro as it is: no compensation that was tried is better"
+        title = "Leave the gyro as it is: none that was tried is better beyond chance"
     if most:
         cannot, advice = _CYCLE if most == "constant" else _FEW
         safe = "Leave the gyro as it is" if name == NOTHING else f"Use {ARTICLES[name]}"

@@ -281,8 +281,9 @@ def _apply(options, tell):
         tell(f"note: {note}")
     log = reading.log
     if "time" in compensator.inputs:
-        start = log["power_on"].iloc[0]
-        reading.notes.append(f"power-on is taken to be where the clock begins, at {start:.10g} s")
+        starts = log["power_on"].unique()
+        first = f"{'' if starts.size == 1 else 'in each run, first '}at {starts[0]:.10g} s"
+        reading.notes.append(f"power-on is taken to be where the clock begins, {first}")
     n_rows = counted(f"{len(log):,}", "row")
     tell(n_rows)
     rates = compensator.apply(log)

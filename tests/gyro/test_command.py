@@ -599,3 +599,17 @@ def test_rows_without_the_true_rate_are_compensated(two_devices, model, tmp_path
         assert say("--apply", model, path, "--output", out, "--quiet")[0] == 0
         answers.append(pd.read_csv(out))
     pd.testing.assert_frame_equal(*answers)
+
+
+def test_each_run_of_one_clock_counts_from_its_own_power_on(two_devices, model, tmp_path, say):
+    table = of_one_device(two_devices)[[*PARTS, "run"]]
+    start = 9000.0 * table["run"].astype(float)
+    found = []
+    for since, told in ((0.0, ", at 0 s"), (start, ", in each run, first at ")):
+        table.assign(time=table["time"] + since).to_csv(tmp_path / "log.csv", index=False)
+        out = tmp_path / "out.csv"
+        code, said, _ = say("--apply", model, tmp_path / "log.csv", "--output", out, "--force")
+        assert code == 0
+        assert f"power-on is taken to be where the clock begins{told}" in said
+        found.append(pd.read_csv(out)["rate_compensated"])
+    np.testing.assert_allclose(*found, rtol=1e-9)
