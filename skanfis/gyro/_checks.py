@@ -103,8 +103,11 @@ def check_log(
     for part in columns_of(inputs):
         if part not in log:
             raise LogError(f"the log has no {part}.")
+    for part in LABELS:
+        if part in log:
+            check_values(log[part], part)
     runs = log["run"] if "run" in log else np.zeros(len(log))
-    check_rows(log, units, pd.factorize(runs, use_na_sentinel=False)[0])
+    check_rows(log, units, pd.factorize(runs)[0])
     n_runs = log["run"].nunique() if "run" in log else 1
     if n_runs * _FEWEST_ROWS_PER_RUN > len(log):
         raise LogError(

@@ -145,6 +145,7 @@ def scaled(part, factor):
     [
         (lambda log: bad(log, "output", 7, np.nan), "output", 7, "missing"),
         (lambda log: bad(log, "rate", 9, np.inf), "rate", 9, "infinite"),
+        (lambda log: log.assign(run=log["run"].where(log.index != 4)), "run", 4, "label is miss"),
         (lambda log: bad(log, "temperature", 5, -999.0), "temperature", 5, "not plausible"),
         (lambda log: log.assign(temperature=270 + log.index), "temperature", 0, "is it in K"),
         (scaled("rate", 3600), "rate", 0, "is it in deg/h"),

@@ -337,7 +337,7 @@ def test_a_file_of_matlab(tmp_path, truth, how):
     same(reading, truth)
     np.testing.assert_allclose(reading.log["time"], truth["clock"])
     assert "variables of another length are skipped: fs, other" in "; ".join(reading.notes)
-    assert reading.name_row(3).endswith("row 3")
+    assert reading.name_row(3).endswith("row 4")
 
 
 def test_a_file_of_excel_with_lines_above_the_header(tmp_path, truth):
