@@ -155,7 +155,7 @@ def _read(options, paths, tell):
 
 
 def _settle_rest(reading, tell):
-    """Find whether the gyro was at rest; if so, set the rate in the log to zero."""
+    """Find whether the gyro was at rest; if so, set a rate in the log that changes to zero."""
     log, layout = reading.log, reading.files[0].layout
     try:
         check_at_rest(log, reading.units["output"])
@@ -167,14 +167,17 @@ def _settle_rest(reading, tell):
             f"found among {', '.join(map(repr, layout.header[:20]))}, and the output "
             f"{error.reason} Say which they are (--columns output=NAME rate=NAME)."
         ) from error
-    what = "there is no column for the rate"
-    if "rate" in log:
+    rate, what = 0.0, "there is no column for the rate"
+    if "rate" in log and log["rate"].nunique() == 1:
+        rate = log["rate"].iloc[0]  # such as the earth's
+        what = f"the rate of {layout.name('rate')!r} is {rate:.3g} deg/s throughout"
+    elif "rate" in log:
         name, largest = layout.name("rate"), log["rate"].abs().max()
-        own = f" (if it is the gyro's own: --columns 'output={name}')" if largest else ""
-        what = f"the rate of {name!r} is {largest:.3g} deg/s at most and not used{own}"
+        own = f"(if it is the gyro's own: --columns 'output={name}')"
+        what = f"the rate of {name!r} is {largest:.3g} deg/s at most and not used {own}"
     reading.notes.append(f"{what}, and the output does not move: taken as at rest")
     tell(f"note: {reading.notes[-1]}")
-    reading.log = log.assign(rate=0.0)
+    reading.log = log.assign(rate=rate)
     return True
 
 

@@ -480,6 +480,17 @@ def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(run):
     assert "the output is 3 throughout: no gyro gives that." in said
 
 
+def test_the_earth_s_rate_is_no_bias(tmp_path, run):
+    log, found = thermal_cycle(20, -20, 60, 20).drop(columns="gyro_y_dps"), []
+    for table, told in ((log, "no column"), (log.assign(rate_dps=0.003), "is 0.003 deg/s through")):
+        code, said, _ = run(table, "--write constant --terms 1,1 --force")
+        assert (code, told in said) == (0, True)
+        compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
+        rates = compensator.apply(pd.DataFrame({"time": [0.0], "temperature": 10.0, "output": 0.0}))
+        found.append(rates["rate_compensated"].iloc[0])
+    assert found[1] - found[0] == pytest.approx(0.003)
+
+
 def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_path, run):
     log = thermal_cycle(-20, 60, -20)
     log["gyro_x_lsb"] = (131.0 * log["gyro_x_dps"]).round()
