@@ -2,6 +2,7 @@
 
 import difflib
 import re
+import shlex
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,8 +56,8 @@ _OF_NO_PART = (
 )
 _LABVIEW = {"X_Value": ("time", "s")}  # its name for the time
 _LABELS = {
-    "run": {"run", "cycle", "session", "powerup"},
-    "device": {"device", "serial", "sn", "unit"},
+    "run": {"run", "cycle", "session", "powerup", "lauf"},
+    "device": {"device", "serial", "sn", "unit", "gerät"},
 }
 _OF_LABELS = {"id", "no", "nr", "number", "name", "label"}
 _QUANTITIES = {
@@ -341,5 +342,5 @@ def _no_column(part, name, header, taken=()):
     advice = f"{part}={close[0]}" if close else f"{part}={free[0] if free else 'NAME'}"
     return (
         f"there is no column {name!r} for the {part}; the file has {found}. Say which it is "
-        f"(such as --columns {advice}; columns= in Python)."
+        f"(such as --columns {shlex.quote(advice)}; columns= in Python)."
     )

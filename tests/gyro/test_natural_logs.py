@@ -437,6 +437,18 @@ def test_a_supply_voltage_that_never_changes_is_no_output(tmp_path, truth):
     same(found_in(tmp_path, table.assign(**{"Spannung [V]": 3.3})), truth)
 
 
+def test_labels_have_german_names_too(tmp_path, truth):
+    table = truth[[*PARTS, "run"]].rename(columns={"run": "Lauf-Nr."}).assign(Gerät="A")
+    reading = found_in(tmp_path, table.drop(columns="time"))
+    assert reading.log[["run", "device"]].nunique().tolist() == [5, 1]
+
+
+def test_a_name_with_blanks_is_given_as_a_shell_takes_it(tmp_path, truth):
+    table = truth[["time", "output", "temperature"]].rename(columns={"temperature": "Part A"})
+    with pytest.raises(LogError, match=r"--columns 'temperature=Part A'; columns= in Python"):
+        found_in(tmp_path, table)
+
+
 def test_a_column_that_is_no_time_is_named_unless_it_is_used(tmp_path, truth):
     table = truth[PARTS[1:]].rename(columns={"temperature": "T (°C)"})
     assert "is not used" not in "; ".join(found_in(tmp_path, table).notes)
