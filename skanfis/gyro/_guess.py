@@ -294,6 +294,10 @@ def _settle_units(columns, layout, of_first):
             own[part] = column.unit
         if not column.is_time:
             values[part] = column.aligned
+    for part in sorted(own.keys() & layout.units.keys()):
+        if (unit := layout.units[part]) != own[part]:
+            name = layout.name(part)
+            layout.notes.append(f"{name!r} is read in {unit} as told, not in {own[part]}")
     layout.units = own | layout.units
     lacking = [part for part in values if part not in layout.units and values[part].size]
     if of_first is None:

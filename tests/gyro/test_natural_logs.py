@@ -449,6 +449,13 @@ def test_a_name_with_blanks_is_given_as_a_shell_takes_it(tmp_path, truth):
         found_in(tmp_path, table)
 
 
+@pytest.mark.parametrize(("unit", "is_told"), [("deg/s", True), ("rpm", False)])
+def test_a_unit_that_is_not_that_of_the_name_is_told(tmp_path, truth, unit, is_told):
+    table = truth[PARTS].rename(columns={"rate": "rate [rpm]"})
+    notes = found_in(tmp_path, table, units={"rate": unit}).notes
+    assert ("'rate [rpm]' is read in deg/s as told, not in rpm" in notes) == is_told
+
+
 def test_a_column_that_is_no_time_is_named_unless_it_is_used(tmp_path, truth):
     table = truth[PARTS[1:]].rename(columns={"temperature": "T (°C)"})
     assert "is not used" not in "; ".join(found_in(tmp_path, table).notes)
