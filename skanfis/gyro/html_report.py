@@ -266,8 +266,9 @@ def _sure(results):
     calibration = results.calibration
     largest, rate_rises = proven_bounds(calibration)
     added = calibration.compensator.predicts == "rate"
-    if added and largest == 0.0:
-        text = "Nothing is added to the arcsine law, so there is nothing to bound."
+    if largest == 0.0:
+        what = "added to the arcsine law" if added else "subtracted"
+        text = f"Nothing is {what}, so there is nothing to bound."
         return "What is proven", [Block("text", text)]
     what = "addition to the arcsine law" if added else "compensation"
     proven = [(f"largest {what}, proven", f"{results.shown(largest)} {results.symbol}")]

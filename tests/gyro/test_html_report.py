@@ -121,6 +121,9 @@ def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(calibration,
     assert "is flagged (status 1): the value at the edge is held" in text
     assert "largest compensation, proven" in text
     assert "addition to the arcsine law" not in text
+    text = text_of(calibration_of(calibration.log, ("output",), terms=(1,), write="none"))
+    assert "Nothing is subtracted, so there is nothing to bound." in text
+    assert "largest compensation" not in text
 
 
 def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):

@@ -98,7 +98,7 @@ def test_files_that_are_no_log_together_are_refused(tmp_path, log):
     for again in (path, table(tmp_path, log, "a.csv")):
         with pytest.raises(LogError, match=rf"{again.name}: holds the same bytes as .*log.csv"):
             read_log([path, again])
-    with pytest.raises(LogError, match=r"b.csv: the files differ in having time"):
+    with pytest.raises(LogError, match=r"b.csv: some of the files have no column for the time"):
         read_log([path, table(tmp_path, log.drop(columns="time"), "b.csv")])
 
 
