@@ -103,8 +103,11 @@ def check_log(
     for part in columns_of(inputs):
         if part not in log:
             raise LogError(f"the log has no {part}.")
+    for part in LABELS:
+        if part in log:
+            check_values(log[part], part)
     runs = log["run"] if "run" in log else np.zeros(len(log))
-    check_rows(log, units, pd.factorize(runs, use_na_sentinel=False)[0])
+    check_rows(log, units, pd.factorize(runs)[0])
     n_runs = log["run"].nunique() if "run" in log else 1
     if n_runs * _FEWEST_ROWS_PER_RUN > len(log):
         raise LogError(
@@ -160,8 +163,9 @@ def _check_time(log, unit, runs):
         row = int(bad[0])
         raise LogError(
             f"time does not increase within a run: {time[row]:.13g} s after {before[row]:.13g} s "
-            f"({bad.size} such rows). Rows must be in the order of time, each with a time of its "
-            "own; if several runs follow each other, say which column tells them apart (run=NAME).",
+            f"({counted(bad.size, 'such row')}). Rows must be in the order of time, each with a "
+            "time of its own; if several runs follow each other, say which column tells them apart "
+            "(run=NAME).",
             "time",
             row,
         )
@@ -231,7 +235,8 @@ def check_values(values, part, allow_missing=False):
         return
     row = int(np.argmax(bad))
     if part in LABELS:
-        raise LogError(f"the label is missing ({bad.sum()} such rows); fill it in.", part, row)
+        rows = counted(bad.sum(), "such row")
+        raise LogError(f"the label is missing ({rows}); fill it in.", part, row)
     kind = "is missing" if missing[row] else "is infinite"
     raise LogError(f"the value {kind} ({bad.sum()} of {bad.size} rows); drop them.", part, row)
 

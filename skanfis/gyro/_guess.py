@@ -2,6 +2,7 @@
 
 import difflib
 import re
+import shlex
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -55,8 +56,8 @@ _OF_NO_PART = (
 )
 _LABVIEW = {"X_Value": ("time", "s")}  # its name for the time
 _LABELS = {
-    "run": {"run", "cycle", "session", "powerup"},
-    "device": {"device", "serial", "sn", "unit"},
+    "run": {"run", "cycle", "session", "powerup", "lauf"},
+    "device": {"device", "serial", "sn", "unit", "gerät"},
 }
 _OF_LABELS = {"id", "no", "nr", "number", "name", "label"}
 _QUANTITIES = {
@@ -184,7 +185,8 @@ def _guess(source, request, layout, first):
         layout.others = first.others
     layout.notes.append(_sentence(layout))
     if "time" not in layout.places:
-        named = [one.name for one in columns if one.score("time") > 0.0 and one.numbers.size]
+        others = [one for one in columns if one.place not in taken and one.numbers.size]
+        named = [one.name for one in others if one.score("time") > 0.0]
         layout.notes += [f"{name!r} is not used: no time goes up and down" for name in named[:1]]
 
 
@@ -292,6 +294,10 @@ def _settle_units(columns, layout, of_first):
             own[part] = column.unit
         if not column.is_time:
             values[part] = column.aligned
+    for part in sorted(own.keys() & layout.units.keys()):
+        if (unit := layout.units[part]) != own[part]:
+            name = layout.name(part)
+            layout.notes.append(f"{name!r} is read in {unit} as told, not in {own[part]}")
     layout.units = own | layout.units
     lacking = [part for part in values if part not in layout.units and values[part].size]
     if of_first is None:
@@ -340,5 +346,5 @@ def _no_column(part, name, header, taken=()):
     advice = f"{part}={close[0]}" if close else f"{part}={free[0] if free else 'NAME'}"
     return (
         f"there is no column {name!r} for the {part}; the file has {found}. Say which it is "
-        f"(such as --columns {advice}; columns= in Python)."
+        f"(such as --columns {shlex.quote(advice)}; columns= in Python)."
     )

@@ -8,6 +8,7 @@ from ..digits import counted, percent
 from ..export import fold
 from ..export.c.dialect import STATUS
 from ..inspection import export_text, readability
+from ..inspection.text import wrapped
 from ._columns import RATE_UNITS, evenly_chosen
 from ._simpler import LAW_AND_LINE, NAMES, NOTHING
 from .c_compensator import input_units
@@ -54,7 +55,7 @@ def headline(calibration, unit):
         )
     title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
     if name == NOTHING:
-        title = "Leave the gyro as it is: no compensation that was tried is better"
+        title = "Leave the gyro as it is: none that was tried is better beyond chance"
     if most:
         cannot, advice = _CYCLE if most == "constant" else _FEW
         safe = "Leave the gyro as it is" if name == NOTHING else f"Use {ARTICLES[name]}"
@@ -210,25 +211,35 @@ def formula_of(calibration, name):
     if simple.predicts == "rate":
         return law_text(law, recipe)
     text = _line("error", estimator, recipe.inputs) if law is None else _cubic(law, recipe.inputs)
-    return f"rate = output / {calibration.compensator.scale_factor:.9g} - error\n{text}"
+    return f"{_rate_text(calibration)}\n{text}"
 
 
 def rules_text(calibration):
     """The written compensation as text: units, then a formula, or cautions and rules."""
-    recipe, law, caution = calibration.recipe, "", ""
+    recipe, caution = calibration.recipe, ""
     units = input_units(calibration.compensator)
-    inputs = "".join(f", {name} in {units[name]}" for name in recipe.inputs)
-    told = f"Units: rates and errors in deg/s{inputs}.\n\n"
+    # The rate needs the output even if it is no input.
+    columns = dict.fromkeys([*calibration.compensator.inputs, "output"])
+    inputs = "".join(f", {name} in {units[name]}" for name in columns)
+    told = wrapped(f"Units: rates and errors in deg/s{inputs}.") + "\n\n"
     if not calibration.writes_model:
         return f"{told}{formula_of(calibration, calibration.written)}\n"
     if against := against_reading(calibration):
-        caution = "\n".join(["What speaks against reading the rules one by one:", *against, "", ""])
+        heading = "What speaks against reading the rules one by one:"
+        caution = "\n".join([heading, *map(wrapped, against), "", ""])
+    law = f"{_rate_text(calibration)}\nThe rules give the error:\n\n"
     if recipe.physics:
         law = f"{law_text(calibration.model.base_, recipe)}\nTo this rate the rules add:\n\n"
     # A folded model has no readability from training: so the text has the caution only once.
     names = ["rate beyond the law" if recipe.physics else "error"]
     rules = export_text(fold(calibration.rules), precision=_DIGITS, output_names=names)
     return f"{told}{law}{caution}{rules}\n"
+
+
+def _rate_text(calibration):
+    """How the rate follows from the output and the error."""
+    factor = calibration.compensator.scale_factor
+    return f"rate = output{'' if factor == 1.0 else f' / {factor:.9g}'} - error"
 
 
 def law_text(law, recipe):

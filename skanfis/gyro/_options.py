@@ -196,12 +196,12 @@ def _terms(text):
 
 
 class Limit(NamedTuple):
-    """The largest, or smallest, size that a figure may have; ``text`` is the value as typed."""
+    """The largest, or smallest, size that a figure may have; ``number`` is the value as typed."""
 
     figure: str
     value: float
     unit: str
-    text: str
+    number: str
 
     def keeps(self, value):
         return bool(value >= self.value if self.figure in _AT_LEAST else abs(value) <= self.value)
@@ -227,7 +227,7 @@ def parse_limit(text):
     if unit is None:
         takes = " or ".join(filter(None, wanted)) or "no unit"
         raise ArgumentTypeError(f"{text!r}: {figure} takes {takes}; found {found['unit']!r}.")
-    return Limit(figure, float(found["value"]), unit, typed.strip())
+    return Limit(figure, float(found["value"]), unit, found["value"])
 
 
 class Check(NamedTuple):

@@ -57,7 +57,7 @@ _TOO_FEW = {
     "device": "{} devices share a compensator, and are too few to hold one out: the error that it "
     "leaves in any other device is not known, and a compensator for each alone may leave less.",
 }
-_NO_ROWS = "the log has no temperature from {:.4g} to {:.4g} °C: the error there is not known."
+_NO_ROWS = "the log has no temperature from {:.4g} to {:.4g} degC: the error there is not known."
 _LEGS = "legs between turning points of the temperature"
 # What is held out, and what of it is counted.
 _WORDS = {

@@ -76,7 +76,7 @@ def matlab_source(path):
     columns = {name: values for name, values in found.items() if len(values) == length}
     others = sorted(set(found) - set(columns))
     notes = [f"variables of another length are skipped: {', '.join(others)}"] if others else []
-    return TableSource(path, pd.DataFrame(columns), notes)
+    return TableSource(path, pd.DataFrame(columns), notes, first=1)  # MATLAB counts from 1
 
 
 @contextmanager

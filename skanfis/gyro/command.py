@@ -49,6 +49,7 @@ def main(arguments=None):
     parser = make_parser()
     options = parser.parse_args(arguments)
     tell = _progress(options.quiet)
+    options.written = None
     try:
         check_kind(parser, options)
         options.typed = shlex.join(sys.argv[1:] if arguments is None else arguments)
@@ -72,7 +73,8 @@ def main(arguments=None):
         # Arithmetic errors come from odd logs: they too get one sentence.
         return _say_error(error, FAILED)
     except KeyboardInterrupt:
-        return _say_error("interrupted; nothing was written.", INTERRUPTED)
+        told = f"all is written to {options.written}" if options.written else "nothing was written"
+        return _say_error(f"interrupted; {told}.", INTERRUPTED)
 
 
 def _calibrate(options, tell):
@@ -88,6 +90,7 @@ def _calibrate(options, tell):
         targets = list(write_targets(calibration, options.target, written))
         # Before files are moved: until then Ctrl-C and errors leave nothing behind.
         summary = list(errors_and_verdict(calibration, reading.name_row))
+    options.written = folder
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(summary)
@@ -152,7 +155,7 @@ def _read(options, paths, tell):
 
 
 def _settle_rest(reading, tell):
-    """Find whether the gyro was at rest; if so, set the rate in the log to zero."""
+    """Find whether the gyro was at rest; if so, set a rate in the log that changes to zero."""
     log, layout = reading.log, reading.files[0].layout
     try:
         check_at_rest(log, reading.units["output"])
@@ -164,14 +167,17 @@ def _settle_rest(reading, tell):
             f"found among {', '.join(map(repr, layout.header[:20]))}, and the output "
             f"{error.reason} Say which they are (--columns output=NAME rate=NAME)."
         ) from error
-    what = "there is no column for the rate"
-    if "rate" in log:
+    rate, what = 0.0, "there is no column for the rate"
+    if "rate" in log and log["rate"].nunique() == 1:
+        rate = log["rate"].iloc[0]  # such as the earth's
+        what = f"the rate of {layout.name('rate')!r} is {rate:.3g} deg/s throughout"
+    elif "rate" in log:
         name, largest = layout.name("rate"), log["rate"].abs().max()
-        own = f" (if it is the gyro's own: --columns 'output={name}')" if largest else ""
-        what = f"the rate of {name!r} is {largest:.3g} deg/s at most and not used{own}"
+        own = f"(if it is the gyro's own: --columns 'output={name}')"
+        what = f"the rate of {name!r} is {largest:.3g} deg/s at most and not used {own}"
     reading.notes.append(f"{what}, and the output does not move: taken as at rest")
     tell(f"note: {reading.notes[-1]}")
-    reading.log = log.assign(rate=0.0)
+    reading.log = log.assign(rate=rate)
     return True
 
 
@@ -278,8 +284,9 @@ def _apply(options, tell):
         tell(f"note: {note}")
     log = reading.log
     if "time" in compensator.inputs:
-        start = log["power_on"].iloc[0]
-        reading.notes.append(f"power-on is taken to be where the clock begins, at {start:.10g} s")
+        starts = log["power_on"].unique()
+        first = f"{'' if starts.size == 1 else 'in each run, first '}at {starts[0]:.10g} s"
+        reading.notes.append(f"power-on is taken to be where the clock begins, {first}")
     n_rows = counted(f"{len(log):,}", "row")
     tell(n_rows)
     rates = compensator.apply(log)
@@ -289,6 +296,7 @@ def _apply(options, tell):
         # Twelve digits are more than any gyro resolves, and shorter than the 17 of a double.
         log[labels].join(rates).to_csv(folder / target.name, index=False, float_format="%.12g")
         summary = list(of_rates(compensator, log, rates))
+    options.written = target
     _say([f"written        {target}: {n_rows}", *summary])
     _say(f"note           {note}" for note in reading.notes)
     tell("done")

@@ -16,6 +16,7 @@ from ..export.c.dialect import status_word
 from ..export.folding import found_by_search
 from ..export.json_reader import model_of
 from ..export.limits import MOST_BYTES, SMALLEST_NUMBER, number, read_bytes, shown
+from ._checks import columns_of
 from ._columns import ask, declared_units
 from .compose import FrozenRules, Polynomial, ResidualRegressor, cubic_powers, joined, law_and_rules
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
@@ -110,7 +111,15 @@ class GyroCompensator:
             rate_indicated and rate_compensated [deg/s]; coverage by the training data, 0 to 1;
             status, the sum of 1 (an input is out of range), 4 (the coverage is below
             ``min_coverage``) and 8 (the policy gives no rate: NaN). Zero: all is well.
+
+        Raises
+        ------
+        ValueError
+            If the log lacks a column of the inputs, or time does not increase within a run.
         """
+        for part in columns_of((*self.inputs, "output")):
+            if part not in log:
+                raise ValueError(f"the log has no {part}, which the compensator takes.")
         X = features(log, self.inputs, self.time_constant)
         indicated = log["output"].to_numpy() / self.scale_factor
         # The status replaces the warning, row by row.

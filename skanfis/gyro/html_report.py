@@ -227,7 +227,7 @@ def _merit(results):
         blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
     if results.checks:
         checks = [
-            (_words(limit.figure), signs(limit.text), three_digits(value), signs(limit.unit), *told)
+            (_words(limit.figure), limit.number, three_digits(value), signs(limit.unit), *told)
             for limit, value, *told in results.checks
         ]
         caption = "After compensation, on the held-out rows in range"
@@ -266,6 +266,10 @@ def _sure(results):
     calibration = results.calibration
     largest, rate_rises = proven_bounds(calibration)
     added = calibration.compensator.predicts == "rate"
+    if largest == 0.0:
+        what = "added to the arcsine law" if added else "subtracted"
+        text = f"Nothing is {what}, so there is nothing to bound."
+        return "What is proven", [Block("text", text)]
     what = "addition to the arcsine law" if added else "compensation"
     proven = [(f"largest {what}, proven", f"{results.shown(largest)} {results.symbol}")]
     if rate_rises is not None:

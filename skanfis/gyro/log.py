@@ -202,7 +202,8 @@ class LogFile:
             return
         differ = sorted(set(self.layout.places) ^ set(first.layout.places))
         if differ:
-            raise LogError(f"{self.path}: the files differ in having {', '.join(differ)}.")
+            parts = " and ".join(differ)
+            raise LogError(f"{self.path}: some of the files have no column for the {parts}.")
         own, other = self.layout.units["output"], first.layout.units["output"]
         if own != other and {own, other} & set(SIGNALS):
             raise LogError(

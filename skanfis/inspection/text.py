@@ -130,9 +130,9 @@ def export_text(
     said, found = _said(estimator, precision, feature_names, output_names)
     model, chosen = said.model, shown_rules(said.model, max_shown)
     counts = f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."
-    parts = ["\n".join([counts, *map(_wrapped, _deviations(model, found, precision))])]
+    parts = ["\n".join([counts, *map(wrapped, _deviations(model, found, precision))])]
     common = _common_lines(said)
-    parts += [_wrapped(f"Common to the rules, {line}.") for line in common]
+    parts += [wrapped(f"Common to the rules, {line}.") for line in common]
     if common:
         parts[-1] += f"\n{_IN_PLACE}"
     premises = premise_texts(model)
@@ -141,13 +141,13 @@ def export_text(
         lines = [f"IF {premises[r]}"]
         for k, name in enumerate(model.output_names):
             lines.append(f"{' AND' if k else 'THEN'} {name} is {_conclusion(said, r, k)}")
-        said_of = [_wrapped(one, "  ", 7 * " ") for one in lines]
-        parts.append("\n".join([_wrapped(f"{heading}:"), *said_of]))
+        said_of = [wrapped(one, "  ", 7 * " ") for one in lines]
+        parts.append("\n".join([wrapped(f"{heading}:"), *said_of]))
     if len(chosen) < model.n_rules:
         parts.append(f"Left out: {_left_out(model, chosen)}.")
     if show_terms:
         parts.append(_legend(said, found, precision))
-    parts.append("\n".join(_wrapped(one) for one in _last_lines(said, found, precision)))
+    parts.append("\n".join(wrapped(one) for one in _last_lines(said, found, precision)))
     return "\n\n".join(parts)
 
 
@@ -316,12 +316,12 @@ def _legend(said, found, precision):
     lines, has_ranges = _inputs(said, named)
     if has_ranges:
         words = policy_in_words(model.out_of_bounds, model.max_extrapolation)
-        lines.append(_wrapped(f"Outside these ranges {words}: {model.policy}."))
+        lines.append(wrapped(f"Outside these ranges {words}: {model.policy}."))
     for name, low, high in zip(model.output_names, *model.output_limits, strict=True):
         if np.isfinite([low, high]).any():
             limits = " to ".join(limits_in_digits(low, high, precision + 1))
-            lines.append(_wrapped(f"No prediction leaves these limits: {name}, {limits}."))
-    return "\n".join([*lines, "", _wrapped(_how(said, named, found is not None))])
+            lines.append(wrapped(f"No prediction leaves these limits: {name}, {limits}."))
+    return "\n".join([*lines, "", wrapped(_how(said, named, found is not None))])
 
 
 def _inputs(said, named):
@@ -343,19 +343,19 @@ def _inputs(said, named):
             listed.append(j)
             continue
         range_of = range_in_digits(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
-        lines.append(_wrapped(f"{name}: {range_of}", "  ", 6 * " "))
+        lines.append(wrapped(f"{name}: {range_of}", "  ", 6 * " "))
         width = max((len(term["name"]) for term in terms), default=0)
         lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
     lists = categories(model, listed)
     for name, one in lists.items():
         levels = ", ".join([*one.levels, *one.others])
-        lines.append(_wrapped(f"  {name}: {levels}", later=6 * " "))
+        lines.append(wrapped(f"  {name}: {levels}", later=6 * " "))
     unnamed = [one for one in dict.fromkeys(called) if one not in with_part]
     with_slope = set(compress(called, model.coefficients[:, 1:].any(axis=(0, 2))))
     for has_slope, told in ((True, "slopes too small to be written"), (False, "in no rule")):
         if alike := [one for one in unnamed if (one in with_slope) == has_slope]:
             names = ", ".join(alike) if len(alike) <= MOST_NAMED else f"{len(alike)} more inputs"
-            lines.append(_wrapped(f"  {names}: {told}", later=6 * " "))
+            lines.append(wrapped(f"  {names}: {told}", later=6 * " "))
     return lines, bool(with_part - lists.keys())
 
 
@@ -387,7 +387,7 @@ def _left_out(model, chosen):
     return f"{text}, strongest on {rest} of the rows" if has_training_data(model) else text
 
 
-def _wrapped(text, first="", later=""):
+def wrapped(text, first="", later=""):
     """The text in lines, with indents for the first and the later ones; no line breaks at a ±."""
     text = text.replace(" ± ", _UNBROKEN)
     lines = fill(text, _WIDTH, initial_indent=first, subsequent_indent=later)

@@ -95,6 +95,18 @@ def test_the_formula_of_what_is_simpler_can_be_computed(law_and_line, name):
 
 
 @pytest.mark.usefixtures("few_rivals")
+def test_where_nothing_is_surely_better_something_may_still_have_left_less():
+    """A constant is of use in three runs of eight, and does harm in the others."""
+    log = log_of(lambda t, r: 0.01 * np.repeat([1.0, 0.0], [180, 300]))
+    calibration = calibrated(log, ("temperature",), n_folds=8, terms=(1,))
+    verdict = calibration.verdict
+    assert verdict.recommended == "no compensation"
+    assert min(verdict.rms.values()) < verdict.rms["no compensation"]
+    title, _ = headline(calibration, "deg/s")
+    assert title == "Leave the gyro as it is: none that was tried is better beyond chance"
+
+
+@pytest.mark.usefixtures("few_rivals")
 def test_before_after_and_what_is_simpler_are_of_the_same_rows():
     log = log_of(constant)
     # A run at a temperature of its own is out of range, and 30 times worse.

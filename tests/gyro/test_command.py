@@ -366,6 +366,21 @@ def test_a_failure_while_files_are_moved_leaves_those_of_before(
     assert {path.name: path.read_bytes() for path in out.iterdir()} == before
 
 
+@pytest.mark.parametrize(
+    ("where", "told"),
+    [("rules_text", "nothing was written"), ("_say", "all is written to {}")],
+)
+def test_ctrl_c_says_whether_files_were_written(tmp_path, log, monkeypatch, run, where, told):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, where, interrupt)
+    code, _, err = run(log[log["run"] < 3], f"{SMALL} --quiet")
+    out = tmp_path / "out"
+    assert (code, out.exists()) == (command.INTERRUPTED, where == "_say")
+    assert err.endswith(f"interrupted; {told.format(out)}.\n")
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="there a closed pipe is another error")
 def test_a_reader_that_goes_away_ends_it_quietly(calibrated, tmp_path, monkeypatch):
     reader, writer = os.pipe()
@@ -463,6 +478,17 @@ def test_a_small_rate_that_is_not_used_is_said_and_a_constant_is_no_output(run):
     assert code == 3
     assert "'gyro_x_dps' is taken for the output, no column for the true rate" in said
     assert "the output is 3 throughout: no gyro gives that." in said
+
+
+def test_the_earth_s_rate_is_no_bias(tmp_path, run):
+    log, found = thermal_cycle(20, -20, 60, 20).drop(columns="gyro_y_dps"), []
+    for table, told in ((log, "no column"), (log.assign(rate_dps=0.003), "is 0.003 deg/s through")):
+        code, said, _ = run(table, "--write constant --terms 1,1 --force")
+        assert (code, told in said) == (0, True)
+        compensator = GyroCompensator.read_json(tmp_path / "out" / "compensator.json")
+        rates = compensator.apply(pd.DataFrame({"time": [0.0], "temperature": 10.0, "output": 0.0}))
+        found.append(rates["rate_compensated"].iloc[0])
+    assert found[1] - found[0] == pytest.approx(0.003)
 
 
 def test_one_cycle_in_counts_is_checked_by_pieces_and_needs_a_scale_factor(tmp_path, run):
@@ -584,3 +610,17 @@ def test_rows_without_the_true_rate_are_compensated(two_devices, model, tmp_path
         assert say("--apply", model, path, "--output", out, "--quiet")[0] == 0
         answers.append(pd.read_csv(out))
     pd.testing.assert_frame_equal(*answers)
+
+
+def test_each_run_of_one_clock_counts_from_its_own_power_on(two_devices, model, tmp_path, say):
+    table = of_one_device(two_devices)[[*PARTS, "run"]]
+    start = 9000.0 * table["run"].astype(float)
+    found = []
+    for since, told in ((0.0, ", at 0 s"), (start, ", in each run, first at ")):
+        table.assign(time=table["time"] + since).to_csv(tmp_path / "log.csv", index=False)
+        out = tmp_path / "out.csv"
+        code, said, _ = say("--apply", model, tmp_path / "log.csv", "--output", out, "--force")
+        assert code == 0
+        assert f"power-on is taken to be where the clock begins{told}" in said
+        found.append(pd.read_csv(out)["rate_compensated"])
+    np.testing.assert_allclose(*found, rtol=1e-9)

@@ -238,3 +238,9 @@ def test_what_is_no_json_is_refused(tmp_path):
 def test_what_it_predicts_from_what_is_checked_at_once(compensator, wrong, told):
     with pytest.raises(ValueError, match=told):
         replace(compensator, **wrong)
+
+
+@pytest.mark.parametrize("part", ["time", "temperature", "output"])
+def test_a_log_that_lacks_what_it_takes_is_refused_by_name(log, compensator, part):
+    with pytest.raises(ValueError, match=f"the log has no {part}, which the compensator takes"):
+        compensator.apply(log.drop(columns=part))

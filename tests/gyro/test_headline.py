@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from skanfis.datasets import make_ofog
-from skanfis.gyro import OpenLoopArcsineRegressor
+from skanfis.gyro import OpenLoopArcsineRegressor, _headline
 from skanfis.gyro._calibration import Recipe
 from skanfis.gyro._headline import flagged_text, law_text, proven_bounds, rules_text
 
@@ -49,6 +49,26 @@ def test_the_text_of_the_rules_gives_what_they_give():
     off = value - calibration.model.predict(calibration.X)
     assert np.sqrt(np.mean(off**2)) < 0.01 * NOISE
     assert "digits" not in text
+
+
+@pytest.mark.parametrize("write", ["rules", "constant"])
+def test_the_text_says_how_the_rate_follows_from_the_output_even_if_it_is_no_input(write):
+    log = log_of(lambda t, r: -132.0 * r + 7.0)
+    options = {"write": write, "terms": (1,), "output_unit": "counts"}
+    calibration = calibrated(log, inputs=("temperature",), **options)
+    units, text = rules_text(calibration).split("\n\n", 1)
+    assert units.endswith("temperature in degC, output in counts.")
+    factor = calibration.compensator.scale_factor
+    assert text.startswith(f"rate = output / {factor:.9g} - error\n")
+    assert ("The rules give the error:" in text) == (write == "rules")
+
+
+def test_what_speaks_against_reading_is_told_in_lines_that_fit(monkeypatch):
+    found = ["Rules go different ways: " + "by temperature up in rule 0, " * 9]
+    monkeypatch.setattr(_headline, "against_reading", lambda calibration: found)
+    text = rules_text(a_line())
+    assert "What speaks against reading" in text
+    assert max(map(len, text.split("\n"))) <= 100
 
 
 def test_flagged_rows_are_counted_by_the_input_to_blame():

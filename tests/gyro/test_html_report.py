@@ -121,6 +121,9 @@ def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(calibration,
     assert "is flagged (status 1): the value at the edge is held" in text
     assert "largest compensation, proven" in text
     assert "addition to the arcsine law" not in text
+    text = text_of(calibration_of(calibration.log, ("output",), terms=(1,), write="none"))
+    assert "Nothing is subtracted, so there is nothing to bound." in text
+    assert "largest compensation" not in text
 
 
 def test_a_gyro_at_rest_has_no_scale_factor_pictures(few_rivals, no_drawing):
@@ -148,6 +151,8 @@ def test_the_verdict_comes_first(page, calibration, no_pictures):
     assert f"{model.sagnac_factor_[0]:.8g}" in text[text.index("What is written") :]
     assert "are of the arcsine law, as recommended" in text
     assert "Can the rules be read?" not in text
+    assert "Nothing is added to the arcsine law" in text
+    assert "largest addition" not in text
 
 
 def test_one_unit_throughout(page, calibration, no_pictures, monkeypatch):
@@ -192,6 +197,7 @@ def test_limits_on_both_sides_of_the_figure_and_what_is_proven(page, calibration
     text = Outline(page).text
     section = text[text.index("Limits of the specification") : text.index("Pictures")]
     assert re.findall(r"pass|fail|not measured", section) == ["pass", "fail", "not measured"]
+    assert re.search(r"bias instability 1 \S+ °/h not measured", section)
     assert "1 of 3 limits kept; not kept: residual rms; could not be measured" in text
     told = text[text.rindex("What is proven") : text.rindex("Can the rules be read?")]
     assert f"{Results(calibration).shown(proven_bounds(calibration)[0])} °/s" in told

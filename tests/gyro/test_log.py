@@ -98,7 +98,7 @@ def test_files_that_are_no_log_together_are_refused(tmp_path, log):
     for again in (path, table(tmp_path, log, "a.csv")):
         with pytest.raises(LogError, match=rf"{again.name}: holds the same bytes as .*log.csv"):
             read_log([path, again])
-    with pytest.raises(LogError, match=r"b.csv: the files differ in having time"):
+    with pytest.raises(LogError, match=r"b.csv: some of the files have no column for the time"):
         read_log([path, table(tmp_path, log.drop(columns="time"), "b.csv")])
 
 
@@ -145,10 +145,11 @@ def scaled(part, factor):
     [
         (lambda log: bad(log, "output", 7, np.nan), "output", 7, "missing"),
         (lambda log: bad(log, "rate", 9, np.inf), "rate", 9, "infinite"),
+        (lambda log: log.assign(run=log["run"].where(log.index != 4)), "run", 4, "label is miss"),
         (lambda log: bad(log, "temperature", 5, -999.0), "temperature", 5, "not plausible"),
         (lambda log: log.assign(temperature=270 + log.index), "temperature", 0, "is it in K"),
         (scaled("rate", 3600), "rate", 0, "is it in deg/h"),
-        (lambda log: bad(log, "time", 11, 100.0), "time", 11, "does not increase"),
+        (lambda log: bad(log, "time", 11, 100.0), "time", 11, r"not increase .*\(1 such row\)"),
         (lambda log: log.drop(columns="run"), "time", 60, "which column tells them apart"),
         (scaled("time", 1e6), "time", None, "smaller unit than s"),
         (scaled("time", 1e-4), "time", None, "larger unit than s"),

@@ -337,7 +337,7 @@ def test_a_file_of_matlab(tmp_path, truth, how):
     same(reading, truth)
     np.testing.assert_allclose(reading.log["time"], truth["clock"])
     assert "variables of another length are skipped: fs, other" in "; ".join(reading.notes)
-    assert reading.name_row(3).endswith("row 3")
+    assert reading.name_row(3).endswith("row 4")
 
 
 def test_a_file_of_excel_with_lines_above_the_header(tmp_path, truth):
@@ -435,6 +435,32 @@ def test_a_supply_voltage_that_never_changes_is_no_output(tmp_path, truth):
     names = {"output": "Drehrate [°/s]", "rate": "Drehtisch"}
     table = truth[[*PARTS, "run"]].rename(columns=names)
     same(found_in(tmp_path, table.assign(**{"Spannung [V]": 3.3})), truth)
+
+
+def test_labels_have_german_names_too(tmp_path, truth):
+    table = truth[[*PARTS, "run"]].rename(columns={"run": "Lauf-Nr."}).assign(Gerät="A")
+    reading = found_in(tmp_path, table.drop(columns="time"))
+    assert reading.log[["run", "device"]].nunique().tolist() == [5, 1]
+
+
+def test_a_name_with_blanks_is_given_as_a_shell_takes_it(tmp_path, truth):
+    table = truth[["time", "output", "temperature"]].rename(columns={"temperature": "Part A"})
+    with pytest.raises(LogError, match=r"--columns 'temperature=Part A'; columns= in Python"):
+        found_in(tmp_path, table)
+
+
+@pytest.mark.parametrize(("unit", "is_told"), [("deg/s", True), ("rpm", False)])
+def test_a_unit_that_is_not_that_of_the_name_is_told(tmp_path, truth, unit, is_told):
+    table = truth[PARTS].rename(columns={"rate": "rate [rpm]"})
+    notes = found_in(tmp_path, table, units={"rate": unit}).notes
+    assert ("'rate [rpm]' is read in deg/s as told, not in rpm" in notes) == is_told
+
+
+def test_a_column_that_is_no_time_is_named_unless_it_is_used(tmp_path, truth):
+    table = truth[PARTS[1:]].rename(columns={"temperature": "T (°C)"})
+    assert "is not used" not in "; ".join(found_in(tmp_path, table).notes)
+    notes = found_in(tmp_path, table.assign(t=truth["output"])).notes
+    assert "'t' is not used: no time goes up and down" in notes
 
 
 def test_of_axes_that_all_feel_the_table_that_along_it_is_taken(tmp_path, truth):

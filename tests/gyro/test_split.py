@@ -232,6 +232,7 @@ def test_temperatures_far_from_all_others_are_told(soaks, most, rng):
     split = choose_split(pd.DataFrame({"temperature": temperature, "rate": rate, "run": run}))
     assert split.most == most
     assert [told[:26] for told in split.cautions] == ["the log has no temperature"] * bool(most)
+    assert all(told.endswith(" degC: the error there is not known.") for told in split.cautions)
 
 
 @pytest.mark.parametrize(
