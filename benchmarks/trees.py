@@ -137,7 +137,9 @@ def run(options):
     planted = [figures for figures in found if "name" in figures]
     rows, tables = [Row("trees: cases", [failed])], []
     if sets:
-        rows += [*(beside(sets, *pair, *bars) for pair, bars in BARS.items()), largest_jumps(sets)]
+        is_known = {rival for rival in GLASS_BOXES if any(one["folds"][rival] for one in sets)}
+        rows += [beside(sets, *pair, *bars) for pair, bars in BARS.items() if pair[1] in is_known]
+        rows.append(largest_jumps(sets))
         tables.append(one_by_one(sets))
     for name in dict.fromkeys(figures["name"] for figures in planted):
         rows.append(of_kinds(name, [one for one in planted if one["name"] == name]))
