@@ -107,7 +107,8 @@ class Laplace:
 
     def _traces(self, factor, by_stiffness):
         found = self.line.weights(self.penalty)
-        found[_AGREEMENT] *= factor.trace(self.disagreement)
+        # One rule disagrees with none: its Q holds rounding errors alone.
+        found[_AGREEMENT] *= factor.trace(self.disagreement) if self.line.n_rules > 1 else 0.0
         found[_OTHERS] *= self.line.traces(factor)
         found[_STIFFNESS] = by_stiffness
         return found

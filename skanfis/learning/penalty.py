@@ -21,7 +21,7 @@ line's height has no penalty.
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import linalg
+from scipy import linalg, sparse
 
 from ..antecedent import Antecedent
 from ..consequent import LocalBasis, NormalFactor
@@ -119,6 +119,9 @@ class CommonLine:
         # Rows that map u to slopes of the line and to departures, (n_slopes + n_columns,
         # n_columns), and the part of the penalty that each row belongs to.
         self._rows = np.concatenate([to_slopes[is_varying], by_part])
+        if self.n_rules == 1:
+            # Its slopes are those of the line, and it departs by nothing: most entries are zero.
+            self._rows = sparse.csr_array(self._rows)
         self._part = np.concatenate([np.arange(len(self.slopes)), len(self.slopes) + component])
         parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.components)
         self.kinds = np.array([*WEIGHTS, *parts])

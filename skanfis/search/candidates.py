@@ -17,6 +17,7 @@ from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 
 from ..antecedent import TreeAntecedent
+from ..blocks import BLOCK_BYTES, row_blocks
 from .clusters import clustered_antecedent, grown_antecedent
 from .grid import OVERLAP, Spacing, grid_antecedent
 from .sample import DIGITS, counting_weight, in_deviations, to_six_digits
@@ -143,7 +144,7 @@ class TermScores:
 
     def project_out(self, j, count):
         """Project what ``count`` terms on an input explain out of the residual and later scores."""
-        pairs = self._shares(j, count)[:, :, None] * self.basis[:, None]
+        pairs = self._shares([j], count)[:, 0].T[:, :, None] * self.basis[:, None]
         functions = pairs.reshape(len(self.X), -1)
         least = _RANK * np.sum(functions**2, axis=0).max()
         functions -= self.known @ (self.known.T @ functions)
@@ -154,28 +155,42 @@ class TermScores:
 
     def of(self, pairs):
         """Scores of pairs of an input and a number of terms, in deviations from chance."""
-        scores, squared, n_known = [], self.basis**2, self.known.shape[1]
+        scores, squared, n_known = np.empty(len(pairs)), self.basis**2, self.known.shape[1]
         products = (self.residual[:, :, None] * self.basis[:, None]).reshape(len(self.X), -1)
         part_free = max(1.0 - n_known / len(self.X), np.finfo(float).eps)
         variance = np.sum(self.residual**2, axis=0) / (part_free * self.weight.sum())
-        for j, count in pairs:
-            shares = self._shares(j, count)
-            norm = (shares**2).T @ squared
-            if n_known:
-                explained = [self.known.T @ (own[:, None] * self.basis) for own in shares.T]
-                norm = np.maximum(norm - np.sum(np.square(explained), axis=1), _RANK * norm)
-            along = (shares.T @ products).reshape(count, variance.size, -1)
-            least = np.finfo(float).tiny
-            squares = along**2 / np.maximum(norm[:, None] * variance[:, None], least)
-            free = 1.0 - 1.0 / count  # one of the shares follows from the others
-            scores.append(to_six_digits(in_deviations(free * squares.sum(), free * squares.size)))
-        return np.array(scores)
+        least = np.finfo(float).tiny
+        inputs, counts = np.transpose(pairs).reshape(2, -1)
+        for count in np.unique(counts):
+            # Many inputs at once, as some four arrays of them fit into a block: for few rows, calls
+            # of NumPy would take longer than its work.
+            size = BLOCK_BYTES // (4 * 8 * count * (len(self.X) + products.shape[1]))
+            places = np.flatnonzero(counts == count)
+            for block in row_blocks(places.size, max(size, 1)):
+                own = places[block]
+                shares = self._shares(inputs[own], count).reshape(count * own.size, -1)
+                norm = shares**2 @ squared
+                if n_known:
+                    told = (self.known.T @ (one[:, None] * self.basis) for one in shares)
+                    explained = np.array([np.sum(one**2, axis=0) for one in told])
+                    norm = np.maximum(norm - explained, _RANK * norm)
+                along = (shares @ products).reshape(count * own.size, variance.size, -1)
+                squares = along**2 / np.maximum(norm[:, None] * variance[:, None], least)
+                squares = squares.reshape(count, own.size, -1)
+                free = 1.0 - 1.0 / count  # one of the shares follows from the others
+                excess = in_deviations(free * squares.sum(axis=(0, 2)), free * squares[:, 0].size)
+                scores[own] = [to_six_digits(one) for one in excess]
+        return scores
 
-    def _shares(self, j, count):
-        """Centred shares of Gaussian terms whose neighbours cross at membership ``OVERLAP``."""
-        centers = self.spacing.centers(j, count)
-        distance = np.mean(np.diff(centers)) or 1.0
-        log_truth = 4.0 * np.log(OVERLAP) * ((self.X[:, [j]] - centers) / distance) ** 2
-        shares = np.exp(log_truth - log_truth.max(axis=1, keepdims=True))
-        shares /= shares.sum(axis=1, keepdims=True)
-        return shares - np.average(shares, axis=0, weights=self.weight)
+    def _shares(self, inputs, count):
+        """Centred shares of Gaussian terms whose neighbours cross at membership ``OVERLAP``.
+
+        The shape is (count, n_inputs, n_rows).
+        """
+        centers = np.array([self.spacing.centers(j, count) for j in inputs]).T[:, :, None]
+        distance = np.mean(np.diff(centers, axis=0), axis=0)
+        distance[distance == 0.0] = 1.0
+        log_truth = 4.0 * np.log(OVERLAP) * ((self.X.T[inputs] - centers) / distance) ** 2
+        shares = np.exp(log_truth - log_truth.max(axis=0))
+        shares /= shares.sum(axis=0)
+        return shares - np.average(shares, axis=2, weights=self.weight)[:, :, None]

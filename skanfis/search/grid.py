@@ -33,13 +33,19 @@ class Spacing:
         ends = np.transpose(rows.inputs.box)
         columns = zip(table[:, : len(ends)].T, ends, strict=True)
         self._columns = [_levels(column, weight, own) for column, own in columns]
+        self._centers: dict[tuple[int, int], np.ndarray] = {}  # that were asked for already
 
     def n_values(self, j):
         """Distinct values of an input between its outer quantiles: more terms are of no use."""
         return self._columns[j][0].size
 
     def centers(self, j, count):
-        """Places of ``count`` terms on input ``j``, standardised."""
+        """Places of ``count`` terms on input ``j``, standardised; not to be changed."""
+        if (j, count) not in self._centers:
+            self._centers[j, count] = self._found(j, count)
+        return self._centers[j, count]
+
+    def _found(self, j, count):
         values, levels = self._columns[j]
         places = np.interp(np.linspace(0.0, 1.0, count), levels, values)
         gaps, k = np.diff(places), np.arange(count - 1)

@@ -41,7 +41,9 @@ def test_the_statistic_is_the_formula_at_every_cut(rng, n_outputs):
         along = (own[:, None, None] * b[:, :, None] * residual[:, None]).reshape(rows.n_rows, -1)
         sums = np.column_stack([own, own[:, None] * b**2, along])
         for j in range(3):
-            cuts, found = _scored(rows.X[:, j], np.argsort(rows.X[:, j]), sums, 4, variance)
+            column = rows.X.T[[j]]
+            (cuts,), (found,) = _scored(column, np.argsort(column), sums, 4, variance)
+            cuts, found = cuts[np.isfinite(cuts)], found[np.isfinite(found)]
             expected = []
             for cut in cuts:
                 assert not np.isin(cut, rows.X[:, j])
