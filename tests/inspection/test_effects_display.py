@@ -114,8 +114,9 @@ def test_a_category_is_drawn_by_its_levels(drop, levels):
     ],
 )
 def test_labels_of_many_levels_stand_apart(levels, rng):
-    X = pd.DataFrame({"class": rng.choice(levels, 200), "power": rng.normal(size=200)})
-    y = X["power"] * (X["class"] == "suv") + 0.1 * rng.normal(size=200)
+    X = pd.DataFrame({"class": rng.choice(levels, 300), "power": rng.normal(size=300)})
+    X.loc[:99, "class"] = "suv"
+    y = X["power"] * (X["class"] == "suv") + 0.1 * rng.normal(size=300)
     model = encoded(["class"], quick(partition="tree", max_rules=2)).fit(X, y)
     display = drawn(EffectsDisplay.from_estimator(model, X))
     sides = [
