@@ -51,11 +51,14 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
             drawn = way  # no proof was found before the rules in order
     raised = after / max(before, _OF_MARGINS)  # on exact data, the free fit may have no error
     report = {"certified": True, "drawn": drawn, "loss_before": before, "loss_after": after}
+    told = []
     if rows is not None:
         unheld, fixed = replace(model, target=None), (constraints.points, constraints.values)
-        for message in contradicted(unheld, held, found.inequalities, fixed, rows, raised):
-            warn_user(message, ConstraintWarning)
-    if drawn and raised > _WORTH_A_WARNING:
+        told = list(contradicted(unheld, held, found.inequalities, fixed, rows, raised))
+    for message in told:
+        warn_user(message, ConstraintWarning)
+    # What the data contradict costs much with any rules: other rules are no remedy.
+    if drawn and raised > _WORTH_A_WARNING and not told:
         names = ", ".join(one.name for one in found.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"

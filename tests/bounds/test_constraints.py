@@ -284,6 +284,18 @@ def test_rules_drawn_all_the_way_are_said_to_be():
     assert len(np.unique(held.consequents_, axis=0)) > 1
 
 
+def test_of_a_false_sign_other_rules_are_no_remedy():
+    rng = np.random.default_rng(0)
+    X = rng.uniform(-1.0, 1.0, (200, 3))
+    y = 2.0 * np.tanh(3.0 * X[:, 0]) + X[:, 1] + X[:, 2] ** 2 + 0.1 * rng.normal(size=200)
+    clusters = KMeans(6, n_init=1, random_state=0)
+    params = QUICK | {"n_mfs": "auto", "partition": clusters, "monotonic_cst": [-1, 1, 0]}
+    with pytest.warns(ConstraintWarning) as told:
+        held = ANFISRegressor(**params).fit(X, y)
+    assert held.constraints_["drawn"]
+    assert ["The data contradict" in str(one.message) for one in told] == [True]
+
+
 def test_there_is_always_a_line(rng):
     """Of triangles, slopes of which jump, with sparse slopes."""
     held = ANFISRegressor(n_mfs=4, mf="triangular", monotonic_cst=[1, 0])
