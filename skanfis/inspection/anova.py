@@ -156,10 +156,8 @@ class ProductAnova:
         self.mean = float(self._others(())[1].sum())
         # Count from the mean, so that squares lose no digits.
         self.start[1] -= self.mean
-        variance = _but_rounding(self.closed(range(len(blocks))), self.mean)
-        # What the rules say may cancel: then only rounding errors of its squares are left.
         apart = np.abs(self.start[1]).max() + np.abs(slopes).max()
-        self.variance = variance if variance > ROUNDING * apart**2 else 0.0
+        self.variance = _but_rounding(self.closed(range(len(blocks))), self.mean, apart)
 
     def _others(self, subset):
         """For every rule, the product of the means of all blocks that are not in the subset."""
@@ -227,9 +225,12 @@ def _outer(of_rules):
     return of_rules[:, None, :, None] * of_rules[None, :, None, :]
 
 
-def _but_rounding(variance, mean):
-    """The variance, or zero where an output varies by rounding errors only."""
-    return variance if variance > (ROUNDING * mean) ** 2 else 0.0
+def _but_rounding(variance, mean, apart=0.0):
+    """The variance, or zero where an output varies by rounding errors only.
+
+    What rules say ``apart`` from the mean may cancel: then rounding errors of its squares are left.
+    """
+    return variance if variance > max((ROUNDING * mean) ** 2, ROUNDING * apart**2) else 0.0
 
 
 class DrawnAnova:
