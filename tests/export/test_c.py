@@ -18,7 +18,6 @@ from skanfis.export.c.dialect import STATUS
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.options import LinearExtrapolation
-from skanfis.policies import OUT_OF_BOUNDS
 
 from ..oracles import random_grid
 from ..quick import quick
@@ -66,6 +65,9 @@ def expected_outputs(model, X, status, std):
 )
 def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path):
     X = rows(NUMPY[dtype])
+    # Of a row that is not finite there is no answer: each of three numbers in each column.
+    bad = X[:9].copy()
+    bad[np.arange(9), np.arange(9) % 3] = np.repeat([np.nan, np.inf, -np.inf], 3)
     # Each family four times in a row, each time on another partition.
     turned = sorted(range(len(FEWEST)), key=lambda i: (i // 4, (i + i // 4) % 4))
     cases = [FEWEST[i] for i in turned[part]]
@@ -74,9 +76,13 @@ def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path):
         for i, case in enumerate(cases)
     ]
     n_outputs = [case.model.n_outputs for case in cases]
-    answers = evaluate_all(codes, X, tmp_path, std, n_outputs, flags)
+    answers = evaluate_all(codes, np.vstack([X, bad]), tmp_path, std, n_outputs, flags)
+    Z = X.astype(float)
     for case, (y, status) in zip(cases, answers, strict=True):
-        Z = X.astype(float)
+        none = np.nan if (case.model.out_of_bounds, std) == ("nan", "c99") else UNTOUCHED
+        assert np.array_equal(y[len(X) :], np.full((9, y.shape[1]), none), equal_nan=True)
+        assert (status[len(X) :] == STATUS["NOT_FINITE"] + STATUS["NO_OUTPUT"]).all(), case.label
+        y, status = y[: len(X)], status[: len(X)]
         expected, unsure = expected_status(case.model, Z)
         assert (status == expected)[~unsure].all(), case.label
         wanted = expected_outputs(case.model, Z, expected, std)
@@ -145,23 +151,6 @@ def test_tangents_of_far_inputs_are_found_at_their_medians(tmp_path):
 def test_the_short_form_leaves_the_files_out():
     code = export_c(quick(n_mfs=2, solver="lse").fit(X, Y), name="m")
     assert repr(code) == f"CCode(name='m', cost={code.cost!r})"
-
-
-@pytest.mark.theory
-@needs_compiler
-def test_row_that_is_not_finite_gets_no_answer(tmp_path):
-    model = quick(n_mfs=2, solver="lse").fit(X, Y).model_
-    # Each of the three in each of the columns, between rows that have an answer.
-    Z = X[:9].repeat(2, axis=0)
-    Z[np.arange(0, 18, 2), np.arange(9) % 3] = np.repeat([np.nan, np.inf, -np.inf], 3)
-    models = {policy: model.with_out_of_bounds(policy) for policy in OUT_OF_BOUNDS}
-    codes = [export_c(one, name=f"m_{policy}") for policy, one in models.items()]
-    answers = evaluate_all(codes, Z, tmp_path, "c99", [1] * len(codes))
-    for policy, (found, status) in zip(models, answers, strict=True):
-        none = UNTOUCHED if policy != "nan" else np.nan
-        assert np.array_equal(found[::2, 0], np.full(9, none), equal_nan=True), policy
-        assert (status[::2] == STATUS["NOT_FINITE"] + STATUS["NO_OUTPUT"]).all(), policy
-        np.testing.assert_allclose(found[1::2], model.predict(X[:9]), rtol=1e-10)
 
 
 @pytest.mark.theory
@@ -393,10 +382,7 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),
         ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of 'double', 'float'"),
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
-        (
-            {"name": "m", "saturate": [(0.0, 1.0)] * 2},
-            "for each of the 1 outputs",
-        ),
+        ({"name": "m", "saturate": [(0.0, 1.0)] * 2}, "for each of the 1 outputs"),
         ({"name": "m", "saturate": [(1.0, 0.0)]}, "must have finite .* with low below high"),
         (
             {"name": "m", "saturate": [(1.0 + 1e-9, 1.0 + 2e-9)], "dtype": "float"},

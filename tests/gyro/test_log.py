@@ -77,20 +77,18 @@ def test_quotes_hide_separators_and_line_ends(tmp_path, note):
     assert set(read["run"]) == {note[1:-1].replace('""', '"'), "b"}
 
 
-def test_names_of_columns_up_to_blanks_and_capitals(tmp_path):
-    text = " Temperature ,OUTPUT\t, Rate\n20,1,2\n21,3,4\n"
-    read = read_log(written(tmp_path, text))
-    assert list(read) == ["temperature", "output", "rate"]
-    assert read["rate"].tolist() == [2.0, 4.0]
-    # A name that fits to the letter comes first, and a column plays one part.
-    text = "Rate,rate,temperature,Output\n9,2,20,1\n9,4,21,3\n"
-    read = read_log(written(tmp_path, text), columns={"output": "Output"})
-    assert read["rate"].tolist() == [2.0, 4.0]
-    read = read_log(
-        written(tmp_path, "Output,temperature,speed\n1,20,2\n"),
-        columns={"rate": "Output", "output": "speed"},
-    )
-    assert read.iloc[0].tolist() == [20.0, 2.0, 1.0]
+@pytest.mark.parametrize(
+    ("header", "columns"),
+    [
+        (" Temperature ,OUTPUT\t, Rate,x", {}),
+        # A name that fits to the letter comes first, and a column plays one part.
+        ("temperature,Output,rate,Rate", {"output": "Output"}),
+        ("temperature,speed,Output,x", {"rate": "Output", "output": "speed"}),
+    ],
+)
+def test_names_of_columns_up_to_blanks_and_capitals(tmp_path, header, columns):
+    read = read_log(written(tmp_path, f"{header}\n20,1,2,9\n"), columns=columns)
+    assert read.to_dict("records") == [{"temperature": 20.0, "output": 1.0, "rate": 2.0}]
 
 
 def test_files_that_are_no_log_together_are_refused(tmp_path, log):
@@ -127,29 +125,34 @@ def test_good_logs_pass(log):
     check_log(log.sort_values("time", kind="stable").reset_index(drop=True))
 
 
-def bad(log, part, row, value):
-    log = log.copy()
-    log.iloc[row, log.columns.get_loc(part)] = value
-    return log
-
-
-TO_RADIANS = np.pi / 180
+def bad(part, row, value):
+    return lambda log: log.assign(**{part: log[part].mask(log.index == row, value)})
 
 
 def scaled(part, factor):
     return lambda log: log.assign(**{part: factor * log[part]})
 
 
+def of_today(log):
+    """Stamps of the time, of which one falls by little."""
+    times = 1_767_225_600.0 + log["time"] + 3600.0 * log["run"]
+    return log.assign(time=times.mask(log.index == 11, times[10] - 0.05))
+
+
+TO_RADIANS = np.pi / 180
+
+
 @pytest.mark.parametrize(
     ("spoil", "column", "row", "message"),
     [
-        (lambda log: bad(log, "output", 7, np.nan), "output", 7, "missing"),
-        (lambda log: bad(log, "rate", 9, np.inf), "rate", 9, "infinite"),
-        (lambda log: log.assign(run=log["run"].where(log.index != 4)), "run", 4, "label is miss"),
-        (lambda log: bad(log, "temperature", 5, -999.0), "temperature", 5, "not plausible"),
+        (bad("output", 7, np.nan), "output", 7, "missing"),
+        (bad("rate", 9, np.inf), "rate", 9, "infinite"),
+        (bad("run", 4, np.nan), "run", 4, "label is missing"),
+        (bad("temperature", 5, -999.0), "temperature", 5, "not plausible"),
         (lambda log: log.assign(temperature=270 + log.index), "temperature", 0, "is it in K"),
         (scaled("rate", 3600), "rate", 0, "is it in deg/h"),
-        (lambda log: bad(log, "time", 11, 100.0), "time", 11, r"not increase .*\(1 such row\)"),
+        (bad("time", 11, 100.0), "time", 11, r"not increase .*\(1 such row\)"),
+        (of_today, "time", 11, r"1767225699.95 s after 1767225700 s"),
         (lambda log: log.drop(columns="run"), "time", 60, "which column tells them apart"),
         (scaled("time", 1e6), "time", None, "smaller unit than s"),
         (scaled("time", 1e-4), "time", None, "larger unit than s"),
@@ -157,12 +160,7 @@ def scaled(part, factor):
         (lambda log: log.iloc[:3], None, None, "has 3 rows; it takes 20"),
         (lambda log: log.assign(rate=0.0), "rate", None, "leave output out"),
         (lambda log: log.assign(rate=5.0), "rate", None, r"Log at several rates\.$"),
-        (
-            lambda log: log.assign(output=log["output"].clip(upper=40.0)),
-            "output",
-            36,
-            "saturated",
-        ),
+        (lambda log: log.assign(output=log["output"].clip(upper=40.0)), "output", 36, "saturated"),
         (lambda log: log.assign(output=log["rate"]), "output", None, "one of them is not that"),
         (lambda log: log.assign(output=log["temperature"]), "output", None, "does not follow"),
         (scaled("output", -1), "output", None, "sign is reversed"),
@@ -178,18 +176,8 @@ def test_logs_that_are_refused(log, spoil, column, row, message):
     assert (caught.value.column, caught.value.row) == (column, row)
 
 
-def test_stamps_of_today_that_fall_by_little_are_told_apart(log):
-    times = 1_767_225_600.0 + log["time"] + 3600.0 * log["run"]
-    times[11] = times[10] - 0.05
-    with pytest.raises(LogError, match=rf"{times[11]:.2f} s after {times[10]:.0f} s"):
-        check_log(log.assign(time=times))
-
-
 def test_a_log_without_an_input_or_beyond_any_converter_is_refused(log):
-    for part, name in (
-        *(("output", "output"), ("temperature", "temperature")),
-        *(("time", "time"), ("time", "temperature_rate")),
-    ):
+    for part, name in (("output", "output"), ("time", "temperature_rate")):
         with pytest.raises(LogError, match=f"the log has no {part}"):
             check_log(log.drop(columns=part), inputs=[name])
     for factor in (1e-40, 1e40):
@@ -222,12 +210,9 @@ def test_a_log_at_rest_is_told_from_one_that_moves(log):
     check_at_rest(at_rest, "deg/s")
     check_at_rest(at_rest.assign(output=3e4 * at_rest["output"]).round(0), "counts")
     check_at_rest(at_rest.assign(rate=0.0042), "deg/s")
-    with pytest.raises(LogError, match="is 3 throughout: no gyro gives that"):
-        check_at_rest(at_rest.assign(output=3.0), "deg/s")
     with pytest.raises(LogError, match="deg/s: the gyro was not at rest") as caught:
         check_at_rest(log, "deg/s")
-    assert caught.value.column == "rate"
-    assert caught.value.row == log["rate"].abs().idxmax()
+    assert (caught.value.column, caught.value.row) == ("rate", log["rate"].abs().idxmax())
     unknown = log.drop(columns="rate")
     with pytest.raises(LogError, match=r"spans -\d+\S* to \d+\S* deg/s: no bias does"):
         check_at_rest(unknown, "deg/s")

@@ -41,11 +41,6 @@ def same(reading, truth, parts=PARTS[1:]):
         np.testing.assert_allclose(reading.log[part], truth[part], rtol=1e-9, atol=1e-9)
 
 
-def moments(truth, form):
-    start = pd.Timestamp("2026-02-27")
-    return (start + pd.to_timedelta(truth["clock"], unit="s")).dt.strftime(form)
-
-
 def test_files_of_a_logger_that_begins_a_new_one_now_and_then(tmp_path, truth):
     """A run that is cut is one run; one from zero on is another, and one a while later too."""
     parts = [rows.iloc[k : k + 20] for _, rows in truth.groupby("run") for k in (0, 20, 40)]
@@ -209,21 +204,21 @@ def test_what_is_no_log_is_refused_in_words_and_at_once(tmp_path, content, messa
     assert time.perf_counter() - begin < 1.0
 
 
-@pytest.mark.parametrize("kind", [("parquet", "pyarrow"), ("xlsx", "openpyxl"), ("mat", "scipy")])
-def test_a_damaged_file_is_refused(tmp_path, kind):
-    path = tmp_path / f"log.{kind[0]}"
-    pytest.importorskip(kind[1])
-    path.write_bytes(b"MATLAB 5.0 and no more" * 20)
-    with pytest.raises(LogError, match=r"is no .* that can be read"):
-        found(path)
-
-
-@pytest.mark.parametrize(("length", "end"), [(4, b""), (-9, b""), (-9, bytes(9))])
-def test_a_file_of_matlab_that_was_cut_or_damaged_is_refused(tmp_path, truth, length, end):
-    path = tmp_path / "log.mat"
-    savemat(path, {"output": truth["output"].to_numpy()}, do_compression=True)
-    path.write_bytes(path.read_bytes()[:length] + end)
-    with pytest.raises(LogError, match=r"is no MATLAB file that can be read"):
+@pytest.mark.parametrize(
+    ("suffix", "library", "length", "end"),
+    [
+        *((suffix, library, 0, b"MATLAB 5.0 and no more" * 20)
+          for suffix, library in (("parquet", "pyarrow"), ("xlsx", "openpyxl"), ("mat", "scipy"))),
+        *(("mat", "scipy", *kept) for kept in ((4, b""), (-9, b""), (-9, bytes(9)))),
+    ],
+)  # fmt: skip
+def test_a_file_that_was_cut_or_damaged_is_refused(tmp_path, truth, suffix, library, length, end):
+    pytest.importorskip(library)
+    savemat(tmp_path / "log.mat", {"output": truth["output"].to_numpy()}, do_compression=True)
+    sound, path = (tmp_path / "log.mat").read_bytes(), tmp_path / f"log.{suffix}"
+    path.write_bytes(sound[:length] + end)
+    kind = "MATLAB file" if suffix == "mat" else ".*"
+    with pytest.raises(LogError, match=rf"is no {kind} that can be read"):
         found(path)
 
 
@@ -232,11 +227,9 @@ def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
     """Runs a day apart, by whose hours alone each would go on from the one before."""
     clock = 36_000 + 10 * np.arange(300) + 86_400 * truth["run"].astype(int)
     moment = pd.Timestamp("2024-02-27") + pd.to_timedelta(clock, unit="s")
-    table = truth[["temperature", "output", "rate"]].assign(
-        Remark="", Date=moment.dt.strftime(form), Time=moment.dt.strftime("%H:%M:%S")
-    )
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
+    told = {"Date": moment.dt.strftime(form), "Time": moment.dt.strftime("%H:%M:%S")}
+    table = truth[PARTS[1:]].assign(Remark="", **told)
+    reading = found_in(tmp_path, table)
     same(reading, truth)
     np.testing.assert_array_equal(np.diff(reading.log["time"]), np.diff(clock))
     assert (reading.log["run"].astype(int) == truth["run"].astype(int) + 1).all()
@@ -256,11 +249,8 @@ def test_dates_and_hours_in_two_columns_are_one_time(tmp_path, truth, form):
 def test_whether_month_or_day_comes_first_is_told(tmp_path, truth, start, form, told):
     clock = np.arange(300) + (0.0 if start == "2024-06-01" else 86_400 - 250)
     moment = pd.Timestamp(start) + pd.to_timedelta(clock, unit="s")
-    table = truth[["temperature", "output", "rate"]].assign(
-        Time=moment.strftime(f"{form} %H:%M:%S")
-    )
-    table.to_csv(tmp_path / "log.csv", index=False)
-    reading = found(tmp_path / "log.csv")
+    table = truth[PARTS[1:]].assign(Time=moment.strftime(f"{form} %H:%M:%S"))
+    reading = found_in(tmp_path, table)
     assert (np.diff(reading.log["time"]) == 1.0).all()
     notes = "; ".join(reading.notes)
     assert told in notes
