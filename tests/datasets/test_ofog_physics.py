@@ -27,16 +27,11 @@ def history(schedule=SCHEDULE, start=10.0, rising=True, heat=0.0, **coefficients
     return list(temperatures(device, schedule, start, rising, heat))
 
 
-def simulate(device, *, ambient=20.0, bias=0.0, normals=None, rate=RATE):
-    """Measurement and parts of the error at a constant ambient temperature."""
-    normals = np.zeros((4, TIME.size)) if normals is None else normals
-    (thermal,) = history(SCHEDULE, ambient, **device)
-    return simulate_power_up(SimpleNamespace(**device), bias, rate, thermal, normals, 5.0)
-
-
-@pytest.fixture(name="normals")
-def standard_normals():
-    return np.random.RandomState(0).standard_normal((4, TIME.size))
+def simulate(device, bias=0.0):
+    """Measurement and parts of the error at an ambient temperature of 20 degC."""
+    normals = np.random.RandomState(0).standard_normal((4, TIME.size))
+    (thermal,) = history(SCHEDULE, 20.0, **device)
+    return simulate_power_up(SimpleNamespace(**device), bias, RATE, thermal, normals, 5.0)
 
 
 def test_thermometer_follows_the_coil_with_two_time_constants():
@@ -112,17 +107,17 @@ def test_later_power_ups_begin_as_warm_as_the_off_time_leaves_the_gyro():
         ({"quantisation": 0.5}, "quantisation"),
     ],
 )
-def test_each_coefficient_acts_in_its_own_part_alone(coefficient, part, normals):
-    measured, parts = simulate(IDEAL | coefficient, normals=normals)
+def test_each_coefficient_acts_in_its_own_part_alone(coefficient, part):
+    measured, parts = simulate(IDEAL | coefficient)
     acting = {name for name, values in parts.items() if np.abs(values).max() > 1e-12}
     assert acting == {"nonlinearity", part}
     assert_allclose(measured["error"] - parts["nonlinearity"], parts[part], rtol=1e-9, atol=1e-12)
 
 
-def test_noise_is_what_a_perfect_compensation_leaves(normals):
+def test_noise_is_what_a_perfect_compensation_leaves():
     # With every systematic coefficient known, the arcsine inverts the law; noise is all that stays.
     device = NOMINAL | {"quantisation": 3.0}
-    measured, parts = simulate(device, bias=2.0, normals=normals)
+    measured, parts = simulate(device, bias=2.0)
     coil = 20.0 + 15.0 * (1 - np.exp(-TIME / 1200.0))
     factor = 0.2536 * (1 - 370e-6 * (coil - 25))
     amplitude = 1 + 1e-6 * (coil - 25) * (-40 - 0.5 * (coil - 25))

@@ -2,7 +2,6 @@
 
 import re
 import shutil
-import subprocess
 from dataclasses import astuple, replace
 from fractions import Fraction
 
@@ -28,8 +27,6 @@ from .rule_bases import MODELS, SCALE, build
 MIN_COVERAGE = 0.3
 TOLERANCE = {"double": 1e-12, "float": 1e-5}
 NUMPY = {"double": np.float64, "float": np.float32}
-
-
 X, Y = surface()
 
 
@@ -95,12 +92,6 @@ def test_every_model_answers_as_predict(dtype, std, part, flags, tmp_path):
 # What lies around the list: pipelines, policies, edges, numbers of unusual size.
 
 
-def around(X, dtype="double", n_rows=2000):
-    low, high = X.min(axis=0), X.max(axis=0)
-    unit = np.random.default_rng(1).uniform(-0.3, 1.3, (n_rows, X.shape[1]))
-    return (low + (high - low) * unit).astype(NUMPY[dtype])
-
-
 @pytest.mark.theory
 @needs_compiler
 @pytest.mark.parametrize(("dtype", "std"), [("double", "c89"), ("float", "c99")])
@@ -108,7 +99,7 @@ def test_outputs_are_held_between_limits(dtype, std, tmp_path):
     X, y = surface(n_outputs=2)
     rules = quick(n_mfs=[3, 2, 2], max_iter=5, solver=VariableProjection(tol=1.0))
     estimator = make_pipeline(RobustScaler(), rules).fit(X, y)
-    Z = around(X, dtype)
+    Z = (X.mean(axis=0) + 1.6 * (X - X.mean(axis=0))).astype(NUMPY[dtype])
     expected = estimator.predict(Z.astype(float))
     limits = np.quantile(expected, [0.2, 0.7], axis=0).T
     proven = bounds(estimator, np.stack([Z.min(axis=0), Z.max(axis=0)], axis=1))
@@ -204,11 +195,8 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(kind, dtype, tmp_path)
     case = next(c for c in CASES if c.partition == kind and c.model.out_of_bounds == "linear")
     code = export_c(case.model, tmp_path / "m", dtype=dtype)
     gcc(["-std=c99", "-Os", "-c", "m.c", "-o", "m.o"], tmp_path)
-    symbols = subprocess.run(
-        ["nm", "-S", "m.o"], cwd=tmp_path, capture_output=True, text=True, check=True
-    ).stdout.splitlines()
     by_kind = {}
-    for line in symbols:
+    for line in run(["nm", "-S", "m.o"], tmp_path).stdout.splitlines():
         *size, letter, name = line.split()
         by_kind.setdefault(letter, {})[name] = int(size[1], 16) if len(size) > 1 else 0
     # Undefined: the functions of the library. No "d", "b", "c": nothing that could be written to.
@@ -217,8 +205,7 @@ def test_no_state_no_heap_and_tables_of_the_size_reported(kind, dtype, tmp_path)
     assert set(by_kind) <= {"U", "T", "t", "r"}
     assert list(by_kind["T"]) == ["m_predict"]
     tables = {name: size for name, size in by_kind["r"].items() if name.startswith("m_")}
-    declared = re.findall(r"^static const [\w ]+ (m_\w+)\[", code.source, re.MULTILINE)
-    declared = [name for name in declared if "_test" not in name]
+    declared = re.findall(r"^static const [\w ]+ (m_(?!test)\w+)\[", code.source, re.MULTILINE)
     # Tables of one number may become part of the code.
     assert set(tables) <= set(declared)
     assert code.cost.table_bytes == sum(tables.values()) or len(tables) < len(declared)
@@ -319,8 +306,7 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     flags = ["-std=c89", *STRICT, *SANITIZE, "-DM_SELF_TEST", "-DM_SELF_TEST_MAIN"]
     gcc([*flags, "m.c", "-o", "test", "-lm"], tmp_path)
     assert run(["./test"], tmp_path).returncode == 0
-    table = code.source.index("m_consequents")
-    first = re.compile(r"-?\d\.\d{6}").search(code.source, table)
+    first = re.compile(r"-?\d\.\d{6}").search(code.source, code.source.index("m_consequents"))
     digit = str((int(first[0][-1]) + 5) % 10)
     spoilt = code.source[: first.end() - 1] + digit + code.source[first.end() :]
     (tmp_path / "m.c").write_text(spoilt, encoding="ascii")

@@ -14,7 +14,6 @@ from skanfis.export.json_reader import parse_json
 
 from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
 
-ALL = pytest.mark.parametrize("model", EVERY_PAIR.values(), ids=list(EVERY_PAIR))
 A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
 
 
@@ -40,7 +39,11 @@ def assert_same(read, model):
         assert_array_equal(read, model)
 
 
-@ALL
+# A tree without one rule has two terms of the first input, where others have other inputs.
+A_REST = build(MODELS["tree, order 1, 2 outputs"].antecedent.without_rules([1])[0])
+
+
+@pytest.mark.parametrize("model", [*EVERY_PAIR.values(), A_REST], ids=[*EVERY_PAIR, "a rest"])
 def test_comes_back_to_the_last_bit(model):
     read = parse_json(export_json(model))
     assert_same(read, model)
@@ -151,7 +154,6 @@ NO_TREE = [
     (_idle, "the paths are no tree"),
 ]
 A_TABLE = MODELS["rule table, order 1, 1 outputs"]
-TERM_TWICE = _set("rules", 0, "terms", [3, 3, -1]), r"rules\[0\]\.terms: \[3, 3\] has a term twice"
 
 
 @pytest.mark.parametrize(
@@ -159,7 +161,7 @@ TERM_TWICE = _set("rules", 0, "terms", [3, 3, -1]), r"rules\[0\]\.terms: \[3, 3\
     [
         *((A_GRID, *case) for case in REFUSED),
         *((A_TREE, *case) for case in NO_TREE),
-        (A_TABLE, *TERM_TWICE),
+        (A_TABLE, _set("rules", 0, "terms", [3, 3, -1]), r"terms: \[3, 3\] has a term twice"),
     ],
 )
 def test_refuses(model, change, message):
@@ -192,13 +194,6 @@ def test_refuses_text_that_is_no_such_json(text, message):
         parse_json(text)
 
 
-def test_a_rule_table_that_a_tree_leaves_comes_back():
-    antecedent, _ = A_TREE.antecedent.without_rules([1])
-    # Its rules have two terms of the first input, at places that others have for other inputs.
-    left = build(antecedent)
-    assert_same(parse_json(export_json(left)), left)
-
-
 @pytest.mark.parametrize("given", [export_json(A_GRID), '{"a": 1}', b"{}", Path('{"a": 1}')])
 def test_text_in_place_of_a_path_is_named(given):
     for read in (read_json, read_fis):
@@ -213,9 +208,6 @@ def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
         read_json(path)
     path.write_text(export_json(A_GRID), encoding="utf-16")
     with pytest.raises(ValueError, match=r"model\.json: no JSON: 'utf-8' codec"):
-        read_json(path)
-    path.write_text("time,rate\n", encoding="utf-8")
-    with pytest.raises(ValueError, match=r"model\.json: no JSON: Expecting value"):
         read_json(path)
     with open(path, "wb") as file:
         file.truncate(2**40)

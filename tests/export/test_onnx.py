@@ -65,13 +65,16 @@ def answers(estimator, X, **options):
 @PRECISIONS
 def test_every_model_answers_as_predict(dtype, tolerance):
     X = rows(dtype, 1000)
+    # Rows that are not finite.
+    bad = np.where(np.eye(3), np.array([[np.nan], [np.inf], [-np.inf]]), X[:3]).astype(dtype)
     # The operators are the same in either precision: each has half of the models, and in each every
     # family stands twice, each time on another partition.
     half = dtype is np.float32
     listed = [case for i, case in enumerate(FEWEST) if (i + i // 4) % 2 == half]
     for case in (case for case in listed if case.model.out_of_bounds != "raise"):
-        found = answers(holding(case.model), X)
-        wanted = case.model.predict(X.astype(float))
+        found = answers(holding(case.model), np.vstack([X, bad]))
+        assert np.isnan(found[len(X) :]).all(), case.label
+        found, wanted = found[: len(X)], case.model.predict(X.astype(float))
         assert found.shape == wanted.shape
         assert np.array_equal(np.isnan(found), np.isnan(wanted)), case.label
         difference = np.abs(found - wanted) / full_scale(wanted)
@@ -82,12 +85,10 @@ COLUMNS = ColumnTransformer(
     [("first", StandardScaler(), [2]), ("second", MinMaxScaler(), [0])], remainder="passthrough"
 )
 PIPELINES = {
-    "robust": (RobustScaler(), {"n_mfs": 2, "mf": "bell", "out_of_bounds": "nan"}),
     "columns": (COLUMNS, {"partition": KMeans(4, n_init=1, random_state=0)}),
-    "two": (make_pipeline(RobustScaler(), StandardScaler()), {"n_mfs": [1, 3, 1], "order": 0}),
-    "triangles": (
-        StandardScaler(),
-        {"n_mfs": 3, "mf": ["triangular", "s_shaped", "gaussian"], "out_of_bounds": "linear"},
+    "two": (
+        make_pipeline(RobustScaler(), StandardScaler()),
+        {"n_mfs": 3, "mf": ["triangular", "s_shaped", "bell"], "out_of_bounds": "nan"},
     ),
 }
 
@@ -107,15 +108,6 @@ def test_pipeline_answers_as_predict(kind, dtype, tolerance):
     assert same.mean() > (0.99 if dtype == np.float32 else 0.9999)
     scale = size_of_sum(fold(pipeline), Z, np.nan_to_num(wanted))
     assert np.nanmax((np.abs(found - wanted) / scale)[same]) < tolerance
-
-
-@pytest.mark.parametrize("policy", ["clip", "linear", "nan"])
-def test_row_that_is_not_finite_gives_nan(policy):
-    estimator = quick(n_mfs=2, out_of_bounds=policy).fit(X, Y)
-    Z = X[:6].copy()
-    Z[[0, 1, 2], [0, 1, 2]] = [np.nan, np.inf, -np.inf]
-    found = answers(estimator, Z)
-    assert np.isnan(found[:, 0]).tolist() == [True, True, True, False, False, False]
 
 
 def test_tangent_without_end_is_finite():

@@ -68,24 +68,16 @@ void rates(const double *t, const double *T, double *rates, int n)
 FEATURE = ThermalRate(20.0, time="t", run="run")
 
 
-@pytest.fixture
-def columns(log):
-    return log[["t", "T", "run"]]
+def test_runs_do_not_know_of_each_other(log):
+    features = clone(FEATURE).fit_transform(log)
+    for _, rows in log.reset_index(drop=True).groupby("run"):
+        assert_array_equal(clone(FEATURE).fit_transform(rows), features[rows.index])
+        assert_array_equal(features[rows.index[0]], 0.0)
 
 
-@pytest.fixture
-def features(columns):
-    return clone(FEATURE).fit_transform(columns)
-
-
-def test_runs_do_not_know_of_each_other(columns, features):
-    for name in "abc":
-        rows = (columns["run"] == name).to_numpy()
-        assert_array_equal(clone(FEATURE).fit_transform(columns[rows]), features[rows])
-        assert features[rows][0] == 0
-
-
-def test_frames_of_any_kind_and_arrays_give_the_same(columns, features):
+def test_frames_of_any_kind_and_arrays_give_the_same(log):
+    columns = log[["t", "T", "run"]]
+    features = clone(FEATURE).fit_transform(columns)
     polars = pl.DataFrame(columns.to_dict("list"))
     categorical = columns.assign(run=columns["run"].astype("category"))
     for frame in (polars, categorical):
@@ -120,16 +112,13 @@ def test_new_columns_have_names_and_keep_the_index(log):
     ],
 )
 def test_refuses_parameters_without_meaning(parameters, message, log):
-    feature = ThermalRate(time="t", run="run").set_params(**parameters)
     with pytest.raises(ValueError, match=message):
-        feature.fit(log)
+        clone(FEATURE).set_params(**parameters).fit(log)
 
 
 def test_refuses_logs_that_cannot_be_filtered(log):
-    feature = ThermalRate(time="t", run="run")
-    standing = log.copy()
-    row = int(np.flatnonzero(standing["run"] == "b")[5])
-    previous = int(np.flatnonzero(standing["run"] == "b")[4])
+    feature, standing = clone(FEATURE), log.copy()
+    previous, row = np.flatnonzero(log["run"] == "b")[4:6]
     standing.iloc[row, 0] = standing.iloc[previous, 0]
     with pytest.raises(ValueError, match=f"within a run; at row {row} it does not.$"):
         feature.fit(standing)

@@ -19,10 +19,9 @@ def truth():
 
 
 def read_table(tmp_path, table, require=PARTS, paths=1):
-    found = []
-    for number, rows in enumerate(np.array_split(np.arange(len(table)), paths)):
-        found.append(tmp_path / f"log{number}.csv")
-        table.iloc[rows].to_csv(found[-1], index=False)
+    found = [tmp_path / f"log{number}.csv" for number in range(paths)]
+    for path, rows in zip(found, np.array_split(np.arange(len(table)), paths), strict=True):
+        table.iloc[rows].to_csv(path, index=False)
     return read(found, Request(require=require, guess=True))
 
 
@@ -66,12 +65,9 @@ def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offset
 
 
 def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, truth):
-    turn = np.pi / 180
-    with pytest.raises(UsageError) as caught:
+    turn, options = np.pi / 180, "output=deg/s rate=deg/s or --units output=rad/s rate=rad/s"
+    with pytest.raises(UsageError, match=rf"may be in deg/s \(-1\..* {options}"):
         reading(tmp_path, truth, NAMES, (1, 1, turn, turn))
-    told = str(caught.value)
-    assert "output=deg/s rate=deg/s or --units output=rad/s rate=rad/s" in told
-    assert "may be in deg/s (-1." in told
     # The name of one column tells the other.
     found = reading(tmp_path, truth, ("time", "temp", "gyro", "rate_rad_s"), (1, 1, turn, turn))
     assert (found.units["output"], found.units["rate"]) == ("rad/s", "rad/s")
