@@ -72,6 +72,11 @@ def gcc(arguments, folder, compiler=COMPILER):
     assert done.returncode == 0, done.stderr[:4000]
 
 
+def told(header):
+    """The first comment of a header as one line."""
+    return " ".join(header.partition("*/\n")[0].replace("\n *", " ").split())
+
+
 def run(command, folder):
     # Address space that the leak check asks for is not to be had in every container.
     environment = os.environ | {"ASAN_OPTIONS": "detect_leaks=0"}

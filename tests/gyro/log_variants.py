@@ -6,7 +6,7 @@ order of rows and separator; else it is *ambiguous*, and an option settles it.
 
 import csv
 import io
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -52,20 +52,16 @@ def clean_logs():
                        sampling_interval=20.0, rates=np.arange(-90.0, 91.0, 15.0))  # fmt: skip
     time = np.arange(0.0, 14_400.0, 40.0)
     heat = 20.0 - 40.0 * np.sin(2.0 * np.pi * time / 7200.0)
-    bias = (
-        0.4 + 0.01 * heat + 1e-4 * heat**2 + 1e-3 * np.random.default_rng(0).normal(size=time.size)
-    )
+    bias = 0.4 + 0.01 * heat + 1e-4 * heat**2
+    bias += 1e-3 * np.random.default_rng(0).normal(size=time.size)
     rest = pd.DataFrame({"time": time, "temperature": heat, "output": bias})
-    parts = ["time", "temperature", "output", "rate"]
-    return {"runs": runs[[*parts, "run"]].astype({"run": str}), "levels": levels[parts],
-            "rest": rest}  # fmt: skip
+    runs = runs[[*NAMES, "run"]].astype({"run": str})
+    return {"runs": runs, "levels": levels[list(NAMES)], "rest": rest}
 
 
-@dataclass
-class Variant:
+class Variant(NamedTuple):
     """What is written, under which suffix, and what is to be found in it."""
 
-    number: int
     source: str
     suffix: str
     content: bytes
@@ -108,8 +104,7 @@ def variant(number, logs, seed=0):
     frame = frame[list(rng.permutation(list(frame)))]
     is_determined = not nameless and not headless and _is_settled(log, units, told, source)
     suffix, content = _written(frame, [header[name] for name in frame], headless, rng)
-    story = f"units {units}; told {told}"
-    return Variant(number, source, suffix, content, is_determined, rows, story)
+    return Variant(source, suffix, content, is_determined, rows, f"units {units}; told {told}")
 
 
 def _name(part, unit, is_told, rng):
@@ -136,15 +131,13 @@ def _time_form(log, table, header, units, told, rng):
 
 
 def _add_axes(frame, header, rng):
-    name = header["output"]
     stem = str(rng.choice(["gyro_x", "Gyr_X", "GyrX"]))
-    axes = [stem.replace(stem[-1], axis) for axis in ("xyz" if stem.islower() else "XYZ")]
-    tail = name.partition("[")[2].partition("(")[0] or None
-    if tail is None:
+    axes = [stem[:-1] + axis for axis in ("xyz" if stem.islower() else "XYZ")]
+    tail = header["output"].partition("[")[2]
+    if not tail:
         return
-    true = str(rng.choice(axes))
+    true, size = str(rng.choice(axes)), frame["output"].abs().max()
     header["output"] = f"{true} [{tail}"
-    size = frame["output"].abs().max()
     for other in axes:
         if other != true:
             frame[other] = 1e-3 * size * rng.normal(size=len(frame))
@@ -156,19 +149,17 @@ def _rows(frame, rng):
     kind = str(rng.choice(["", "", "", "cells", "lost", "twice", "reversed"]))
     frame, rows = frame.astype(object), np.arange(len(frame))
     if kind == "cells":
-        lacking = np.sort(rng.choice(np.arange(5, len(frame) - 5), 6, replace=False))
+        lacking = rng.choice(np.arange(5, len(frame) - 5), 6, replace=False)
         begin = int(rng.integers(5, len(frame) // 3))
         lacking = np.union1d(lacking, np.arange(begin, begin + 8))
-        sign = str(rng.choice(["", "NaN", "---", "ERR"]))
-        frame.loc[lacking, "output"] = sign
+        frame.loc[lacking, "output"] = str(rng.choice(["", "NaN", "---", "ERR"]))
         rows = np.setdiff1d(rows, lacking)
     elif kind == "lost":
         lost = rng.choice(np.arange(5, len(frame) - 5), 5, replace=False)
         frame, rows = frame.drop(index=lost), np.setdiff1d(rows, lost)
     elif kind == "twice":
         begin = int(rng.integers(10, 60))
-        order = np.r_[0 : begin + 30, begin : len(frame)]
-        frame = frame.iloc[order].reset_index(drop=True)
+        frame = frame.iloc[np.r_[0 : begin + 30, begin : len(frame)]].reset_index(drop=True)
     elif kind == "reversed" and "run" not in frame:
         time = frame["time"]
         numbers = time if time.map(type).ne(str).all() else pd.Series(range(len(time)))
@@ -210,9 +201,8 @@ def _written(frame, header, headless, rng):
     decimal = "," if separator != "," and rng.random() < 0.4 else "."
     encoding = str(rng.choice(["utf-8", "utf-8", "utf-8-sig", "utf-16", "cp1252"]))
     end = str(rng.choice(["\n", "\r\n"]))
-    lines = []
-    if not headless and rng.random() < 0.4:
-        lines = list(PREAMBLES[int(rng.integers(len(PREAMBLES)))])
+    is_below = not headless and rng.random() < 0.4
+    lines = PREAMBLES[int(rng.integers(len(PREAMBLES)))] if is_below else []
     buffer = io.StringIO(newline="")
     quoting = csv.QUOTE_ALL if rng.random() < 0.15 else csv.QUOTE_MINIMAL
     # Some programs end every line with the separator, and begin the header like a comment.
@@ -228,7 +218,4 @@ def _written(frame, header, headless, rng):
 
 
 def _cell(value, decimal):
-    if isinstance(value, str):
-        return value
-    text = f"{float(value):.10g}"
-    return text.replace(".", decimal)
+    return value if isinstance(value, str) else f"{float(value):.10g}".replace(".", decimal)

@@ -22,7 +22,7 @@ from skanfis.gyro import OpenLoopArcsineRegressor, ResidualRegressor, export_c_p
 from skanfis.gyro.compose import law_and_rules
 from skanfis.gyro.physics import phase_of
 
-from ..export.c_compiler import SANITIZE, UNTOUCHED, evaluate_all, needs_compiler
+from ..export.c_compiler import SANITIZE, UNTOUCHED, evaluate_all, needs_compiler, told
 from ..quick import quick
 from .targets.models import polynomial
 
@@ -194,11 +194,6 @@ def test_header_says_what_goes_in():
     header = export_c_physics(cubic()[0], name="gyro", notes=["Subtract y[0]."]).header
     assert " * Subtract y[0].\n" in header
     assert "A polynomial of the third degree with 35 terms" in header
-
-
-def told(header):
-    """The first comment of a header as one line."""
-    return " ".join(header.partition("*/")[0].replace("\n *", " ").split())
 
 
 def test_law_takes_what_its_degrees_do_besides_the_rules():

@@ -4,8 +4,9 @@ from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegr
 from skanfis.gyro.c_compensator import export_c_compensator
 from skanfis.gyro.compensator import features
 
+from ..export.c_compiler import told
 from ..quick import quick
-from .test_c_code import COUNTS, simulated, told
+from .test_c_code import COUNTS, simulated
 
 
 def test_header_of_a_compensator_says_units_and_how_inputs_are_made(tmp_path):

@@ -1,14 +1,13 @@
 """From a log to a verdict: planted truths, held out by hand, and structures chosen within folds."""
 
-from itertools import islice
-
 import numpy as np
 import pytest
 
-from skanfis.gyro import _calibration, _simpler
+from skanfis.gyro import _calibration
 from skanfis.gyro._calibration import Recipe, fit_model
 from skanfis.gyro._headline import errors_and_verdict, formula_of, headline
 from skanfis.gyro.compose import rules_of
+from skanfis.gyro.metrics import rms
 
 from .planted import NOISE, calibrated, evaluated, log_of
 
@@ -64,14 +63,12 @@ def law_and_line():
 
 
 @pytest.mark.floors
-def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended(law_and_line, monkeypatch):
+def test_the_law_and_a_line_in_what_the_law_does_not_know_is_recommended(law_and_line, few_rivals):
     verdict = law_and_line.verdict
     assert verdict.recommended == BOTH, verdict
     # Law and line are fitted in turns: what is left is a little more than the noise.
     assert verdict.rms[BOTH] < 0.5 * verdict.rms["arcsine law"]
     assert verdict.rms[BOTH] < 3.0 * NOISE
-    every = _simpler.kinds
-    monkeypatch.setattr(_simpler, "kinds", lambda *given: islice(every(*given), 1))
     # The single rule of --physics --terms 1,1,1 is that line.
     alone = calibrated(law_and_line.log, INPUTS, physics=True, **SLOWLY).verdict
     assert alone.rms["this model"] == pytest.approx(verdict.rms[BOTH], rel=0.01)
@@ -118,12 +115,12 @@ def test_before_after_and_what_is_simpler_are_of_the_same_rows():
     assert not rows[hot].any()
     before = (log["output"] - log["rate"]).to_numpy()
     verdict = calibration.verdict
-    assert verdict.rms["no compensation"] == pytest.approx(np.sqrt(np.mean(before[rows] ** 2)))
+    assert verdict.rms["no compensation"] == pytest.approx(rms(before[rows]))
     # The constant of every fold by hand.
     left = before.copy()
     for train, test in calibration.split.folds:
         left[test] -= before[train].mean()
-    assert verdict.rms["constant"] == pytest.approx(np.sqrt(np.mean(left[rows] ** 2)))
+    assert verdict.rms["constant"] == pytest.approx(rms(left[rows]))
     shown, left, *_ = errors_and_verdict(calibration)
     error = np.abs(calibration.after - calibration.rate)[calibration.in_range]
     row = np.flatnonzero(calibration.in_range)[error.argmax()]

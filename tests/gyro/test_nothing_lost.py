@@ -26,11 +26,9 @@ def files(tmp_path, monkeypatch):
     """A log and a compensator of a constant."""
     monkeypatch.chdir(tmp_path)
     log = make_ofog(n_devices=1, n_runs=3, duration=300.0, random_state=0)
-    named = log.rename(columns={"temperature": "temp_c", "output": "gyro_dps"})
-    named[["time", "temp_c", "gyro_dps"]].to_csv("log.csv", index=False)
+    log[["time", "temperature", "output"]].to_csv("log.csv", index=False)
     constant = quick(1, order=0).fit(log[["temperature"]], np.full(len(log), 0.5))
-    compensator = GyroCompensator(constant, ("temperature",))
-    compensator.write_json("model.json")
+    GyroCompensator(constant, ("temperature",)).write_json("model.json")
     return log
 
 
@@ -108,8 +106,8 @@ def test_an_interrupt_while_pandas_reads_is_one(tmp_path, monkeypatch):
 @pytest.mark.parametrize("during", ["imports", "fold 1"])
 def test_ctrl_c_leaves_no_traceback_and_no_folder(tmp_path, during):
     log = make_ofog(n_devices=1, n_runs=8, duration=900.0, random_state=0)
-    log = log.rename(columns={"output": "gyro_dps", "temperature": "temp_c"})
-    log[["time", "temp_c", "gyro_dps", "rate", "run"]].to_csv(tmp_path / "log.csv", index=False)
+    parts = ["time", "temperature", "output", "rate", "run"]
+    log[parts].to_csv(tmp_path / "log.csv", index=False)
     command = [sys.executable, "-m", "skanfis.gyro", "log.csv", "--output", "out"]
     process = subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True)
     if during == "imports":

@@ -12,6 +12,8 @@ from skanfis.gyro._simpler import kinds, make_law
 from skanfis.gyro.c_compensator import export_c_compensator
 from skanfis.gyro.compensator import as_written
 
+from .targets.models import polynomial
+
 INPUTS = ("time", "temperature", "output")
 CUBIC = make_pipeline(StandardScaler(), PolynomialFeatures(3), LinearRegression())
 
@@ -21,18 +23,12 @@ def log():
     return make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=0)
 
 
-def fitted(kind, log, policy="linear"):
-    """A simple compensation, and what it predicts."""
-    X, rate = log[list(INPUTS)], log["rate"].to_numpy()
-    every = {name: (predicts, fit) for name, predicts, fit in kinds(INPUTS, policy)}
-    predicts, fit = every[kind]
-    target = rate if predicts == "rate" else log["output"].to_numpy() - rate
-    return fit(X, target), predicts
-
-
-@pytest.fixture(scope="module", params=[name for name, *_ in kinds(INPUTS, "linear")])
+@pytest.fixture(scope="module", params=kinds(INPUTS, "linear"), ids=lambda kind: kind[0])
 def case(request, log):
-    return request.param, *fitted(request.param, log)
+    """A simple compensation: its name, and what it predicts."""
+    name, predicts, fit = request.param
+    target = log["rate"] if predicts == "rate" else log["output"] - log["rate"]
+    return name, fit(log[list(INPUTS)], target.to_numpy()), predicts
 
 
 def test_it_gives_what_the_model_gives_and_knows_the_rows(case, log):
@@ -76,15 +72,11 @@ def test_the_file_of_it_gives_the_same(case, log, tmp_path):
 
 @pytest.mark.parametrize("policy", ["linear", "clip", "nan"])
 def test_beyond_the_box_a_polynomial_keeps_its_policy(log, policy):
-    X = log[list(INPUTS)]
-    estimator, _ = fitted("cubic polynomial", log, policy)
-    model = CUBIC.fit(X, log["output"] - log["rate"])
+    X, error = log[list(INPUTS)], log["output"] - log["rate"]
+    estimator, model = polynomial(X, error, policy), CUBIC.fit(X, error)
     far = X.assign(output=3.0 * X["output"], temperature=X["temperature"] - 15.0)
     nearest = far.clip(X.min(), X.max(), axis=1)
-    found, at_edge = estimator.predict(far), model.predict(nearest)
-    outside = (nearest != far).any(axis=1).to_numpy()
-    np.testing.assert_allclose(found[~outside], model.predict(far)[~outside], atol=1e-12)
-    if policy == "nan":
-        assert np.isnan(found[outside]).all()
-    else:
-        np.testing.assert_allclose(found, at_edge, atol=1e-7)
+    expected, outside = model.predict(nearest), (nearest != far).any(axis=1)
+    expected[outside & (policy == "nan")] = np.nan
+    np.testing.assert_allclose(estimator.predict(far), expected, atol=1e-7)
+    np.testing.assert_allclose(estimator.predict(X), model.predict(X), atol=1e-12)

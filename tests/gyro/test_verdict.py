@@ -15,9 +15,8 @@ def errors_of(rng, **sizes):
     """Errors of given sizes by group, by name, "no compensation" first."""
     found = {"no compensation": np.full(GROUPS.size, 1.0)}
     for name, size in sizes.items():
-        by_group = np.broadcast_to(size, N_GROUPS)
         signs = rng.permuted(np.tile([-1.0, 1.0], (N_GROUPS, N_ROWS // 2)), axis=1)
-        found[name.replace("_", " ")] = (by_group[:, None] * signs).ravel()
+        found[name] = np.broadcast_to(size, N_GROUPS)[GROUPS] * signs.ravel()
     return found
 
 

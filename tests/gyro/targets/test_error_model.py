@@ -11,10 +11,13 @@ from skanfis.gyro.targets.tables import Table
 from .models import ENDS, error_of, polynomial, rows
 
 BEND = 3e-5  # deg/s/degC^2
-KINDS = ["rules", "polynomial", "constant", "law and line"]
 
 
-@pytest.mark.parametrize("kind", KINDS)
+def values_at(function, points):
+    return function(points.reshape(-1, 2)).reshape(points.shape[:-1])
+
+
+@pytest.mark.parametrize("kind", ["rules", "polynomial", "constant", "law and line"])
 def test_values_and_slopes_in_a_box_are_in_their_ranges(kind):
     error, rng = error_of(kind), np.random.default_rng(2)
     widths = np.diff(ENDS).ravel()
@@ -23,14 +26,10 @@ def test_values_and_slopes_in_a_box_are_in_their_ranges(kind):
         high = low + part * widths
         value, slopes = error.ranges(low.T, high.T)
         inside = low + (high - low) * rng.uniform(size=(50, 40, 2))
-        met = error(inside.reshape(-1, 2)).reshape(50, 40)
-        assert (met >= value[0]).all()
-        assert (met <= value[1]).all()
-        for axis in (0, 1):
-            step = np.zeros(2)
-            step[axis] = 1e-4 * widths[axis]
-            by_difference = (error((inside + step).reshape(-1, 2)) - met.ravel()) / step[axis]
-            by_difference = by_difference.reshape(50, 40)
+        met = values_at(error, inside)
+        assert ((value[0] <= met) & (met <= value[1])).all()
+        for axis, step in enumerate(1e-4 * np.diag(widths)):
+            by_difference = (values_at(error, inside + step) - met) / step[axis]
             # Of points that a step does not take out of the box.
             stays = (inside + step <= high).all(axis=-1)
             slack = 1e-9 * np.abs(by_difference).max()
@@ -71,8 +70,7 @@ def test_lines_through_a_parabola_by_the_closed_form(parabola, n_cells):
     edges = np.linspace(-20.0, 60.0, n_cells + 1)
     largest = BEND * (80.0 / n_cells) ** 2 / 4.0
     low, high = difference(parabola, line_through(parabola, edges))
-    assert low == pytest.approx(-largest, rel=0.03)
-    assert low <= -largest
+    assert -1.03 * largest <= low <= -largest
     assert 0.0 <= high <= 0.03 * largest
     low, high = difference(parabola, line_through(parabola, edges, shift=-2.0 * largest))
     assert high == pytest.approx(2.0 * largest, rel=0.03)
@@ -80,20 +78,13 @@ def test_lines_through_a_parabola_by_the_closed_form(parabola, n_cells):
 
 
 @pytest.mark.theory
-@pytest.mark.parametrize(
-    ("kind", "type_name"),
-    [
-        *((kind, "double") for kind in ("rules", "polynomial", "law and line")),
-        *(("over the temperature", name) for name in ("double", "float", "q31", "q15")),
-    ],
-)
-def test_no_point_is_beyond_and_some_is_near(kind, type_name):
-    error = error_of("rules", 1) if kind == "over the temperature" else error_of(kind)
-    target = Table(error, type_name, 8).piecewise
+@pytest.mark.parametrize("kind", ["rules", "polynomial", "law and line"])
+def test_no_point_is_beyond_and_some_is_near(kind):
+    """Tables of other types, and over the temperature: test_tables.py."""
+    error = error_of(kind)
+    target = Table(error, "double", 8).piecewise
     low, high = difference(error, target)
-    points = rows(100_000, seed=3)[:, : len(target.ends)]
-    # A table of whole numbers may begin a step within the range.
-    points = points[points[:, 0] >= target.ends[0, 0]]
+    points = rows(100_000, seed=3)
     off = error(points) - target(points)
     assert low <= off.min() < 0.0 < off.max() <= high
     assert max(-low, high) < 1.1 * np.abs(off).max() + target.slack

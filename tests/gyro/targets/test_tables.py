@@ -9,7 +9,7 @@ from scipy.interpolate import RegularGridInterpolator
 from skanfis.gyro.targets.error_model import difference
 from skanfis.gyro.targets.tables import TYPES, Table
 
-from ...export.c_compiler import UNTOUCHED, evaluate_all, needs_compiler
+from ...export.c_compiler import UNTOUCHED, evaluate_all, needs_compiler, told
 from .models import ENDS, error_of
 
 UNITS = {"temperature": "degC", "output": "counts"}
@@ -23,9 +23,8 @@ def made(kind, type_name, n_cells=8):
 
 def scales_of(header):
     """What a whole number stands for, by input and of the error, as the header tells it."""
-    text = header.replace("\n *", "")
-    inputs = re.findall(r"x\[\d\] is \w+ / 2\^(-?\d+) ", text)
-    unit = re.search(r"y\[0\] \* 2\^(-?\d+) ", text)[1]
+    inputs = re.findall(r"x\[\d\] is \w+ / 2\^(-?\d+) ", told(header))
+    unit = re.search(r"y\[0\] \* 2\^(-?\d+) ", told(header))[1]
     return 2.0 ** np.array(inputs, dtype=float), 2.0 ** float(unit)
 
 
@@ -84,7 +83,6 @@ def test_a_table_is_the_interpolation_between_values_of_the_error(kind):
 
 def test_the_header_says_what_goes_in_and_comes_out():
     header = made("rate-table", "q15")[1].code(["Subtract it."], UNITS).header
-    told = " ".join(header.replace("\n *", " ").split())
     for text in (
         "Subtract it.",
         "8 x 8 cells; C99, int_least16_t.",
@@ -95,7 +93,7 @@ def test_the_header_says_what_goes_in_and_comes_out():
         "caller and held within -32768 and 32767.",
         "No sum or product overflows",
     ):
-        assert text in told
+        assert text in told(header)
     assert "#include <stdint.h>" in header
 
 
