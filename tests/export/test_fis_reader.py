@@ -32,10 +32,6 @@ def system(n_terms, rules, n_outputs=1):
     return "\n".join(lines)
 
 
-def average(strengths, values):
-    return np.dot(strengths, values) / np.sum(strengths)
-
-
 def test_means_what_was_written_by_hand():
     model = parse_fis(BY_HAND)
     rows = np.array([[2.0, 0.5], [9.0, -0.25], [12.0, 0.0]])
@@ -46,8 +42,8 @@ def test_means_what_was_written_by_hand():
         strengths = [low * zero, zero, high]
         sloped = x - 2 * z + 0.5
         # The triangle has a floor of 1e-10 beyond its foot.
-        assert_allclose(u, average(strengths, [sloped, 3, sloped]), rtol=1e-8)
-        assert_allclose(v, average(strengths, [1, 2, 4]), rtol=1e-8)
+        assert_allclose(u, np.average([sloped, 3, sloped], weights=strengths), rtol=1e-8)
+        assert_allclose(v, np.average([1, 2, 4], weights=strengths), rtol=1e-8)
     assert model.input_names == ("x y", "z")
     assert model.output_names == ("u", "v")
     assert model.term_names == ("low", "high", "about zero")
@@ -72,9 +68,9 @@ def test_rule_base_is_of_the_kind_that_suits_and_means_the_same(n_terms, rules, 
     rows = rng.uniform(0.0, 4.0, (20, len(n_terms)))
     for row, outputs in zip(rows, model.predict(rows), strict=True):
         # Term k stands at k and has deviation 1.
-        asked = (np.array(rule) for rule in rules)
-        mu = [np.exp(-0.5 * np.sum((row - rule)[rule > 0] ** 2)) for rule in asked]
-        assert_allclose(outputs, average(mu, np.arange(len(rules)) + 1.0))
+        distance = np.where(rules, row - rules, 0.0)
+        mu = np.exp(-0.5 * np.sum(distance**2, axis=1))
+        assert_allclose(outputs, np.average(np.arange(len(rules)) + 1.0, weights=mu))
 
 
 REFUSED = [

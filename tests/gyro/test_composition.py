@@ -17,11 +17,8 @@ from skanfis.gyro.physics import OpenLoopArcsineRegressor
 pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsWarning")
 
 
-@pytest.fixture(scope="module")
-def data():
-    """Four runs of one gyro."""
-    log = make_ofog(n_devices=1, n_runs=4, duration=2400, sampling_interval=20, random_state=0)
-    return log[["output", "temperature", "time"]], log["rate"].to_numpy()
+LOG = make_ofog(n_devices=1, n_runs=4, duration=2400, sampling_interval=20, random_state=0)
+X, RATE = LOG[["output", "temperature", "time"]], LOG["rate"].to_numpy()
 
 
 def test_the_second_learns_what_the_first_leaves():
@@ -41,11 +38,11 @@ def test_rounds_take_from_the_base_what_is_not_its_own(rng):
     y = 2.0 * x[:, 0] - 1.0 * x[:, 1]
     columns = [make_column_transformer(("passthrough", [j])) for j in (0, 1)]
     parts = [make_pipeline(column, LinearRegression()) for column in columns]
-    slopes = {}
+    distance = {}
     for n_rounds in (1, 3, 60):
         model = ResidualRegressor(*parts, n_rounds=n_rounds).fit(x, y)
-        slopes[n_rounds] = [model.base_[-1].coef_[0], model.residual_[-1].coef_[0]]
-    distance = {n: np.abs(np.subtract(slope, [2.0, -1.0])).max() for n, slope in slopes.items()}
+        slopes = [model.base_[-1].coef_[0], model.residual_[-1].coef_[0]]
+        distance[n_rounds] = np.abs(np.subtract(slopes, [2.0, -1.0])).max()
     assert distance[1] > 0.5
     assert distance[3] < 0.5 * distance[1]
     assert distance[60] < 1e-6
@@ -61,15 +58,11 @@ def test_what_the_parts_do_not_have_is_said(rng):
             method(X)
 
 
-def shifted_runs(rng):
+def test_groups_reach_the_part_that_chooses_by_them(rng):
     """A line, and runs of two inputs that are off by so much each: rules would learn them."""
     run = np.repeat(np.arange(12), 12)
     x = np.column_stack([rng.uniform(-1, 1, run.size), rng.uniform(-1, 1, 12)[run]])
-    return x, 3 * x[:, 0] + rng.normal(size=12)[run] + 0.05 * rng.normal(size=run.size), run
-
-
-def test_groups_reach_the_part_that_chooses_by_them():
-    x, y, run = shifted_runs(np.random.default_rng(0))
+    y = 3 * x[:, 0] + rng.normal(size=12)[run] + 0.05 * rng.normal(size=run.size)
     part = make_pipeline(StandardScaler(), ANFISRegressor(partition="grid", max_rules=6))
     model = ResidualRegressor(LinearRegression(), part)
     n_rules = [model.fit(x, y, groups=g).residual_[-1].n_rules_ for g in (None, run)]
@@ -80,18 +73,16 @@ def test_groups_reach_the_part_that_chooses_by_them():
     np.testing.assert_array_equal(model.residual_.predict(x), alone.predict(x))
 
 
-def test_a_base_that_refuses_training_rows_is_refused(data):
-    X, rate = data
+def test_a_base_that_refuses_training_rows_is_refused():
     base = OpenLoopArcsineRegressor(max_phase=0.3, out_of_bounds="nan")
     with pytest.raises(ValueError, match=r"base has no finite prediction for .* training rows"):
-        ResidualRegressor(base, LinearRegression()).fit(X, rate)
+        ResidualRegressor(base, LinearRegression()).fit(X, RATE)
 
 
-def test_a_fit_that_fails_leaves_both_parts_of_the_one_before(data):
-    X, rate = data
-    model = ResidualRegressor(OpenLoopArcsineRegressor(), LinearRegression()).fit(X, rate)
+def test_a_fit_that_fails_leaves_both_parts_of_the_one_before():
+    model = ResidualRegressor(OpenLoopArcsineRegressor(), LinearRegression()).fit(X, RATE)
     before = model.predict(X)
     model.set_params(residual=LinearRegression(positive="no"))
     with pytest.raises(ValueError, match="positive"):
-        model.fit(X, 2.0 * rate)
+        model.fit(X, 2.0 * RATE)
     np.testing.assert_array_equal(model.predict(X), before)
