@@ -29,6 +29,7 @@ from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 from ..quick import quick, with_few_candidates
 from .fis_files import BY_HAND
 
+OPTIONS = {"loss": Huber(), "early_stopping": EarlyStopping()}
 ESTIMATORS = {
     "auto": ANFISRegressor(max_rules=2),
     "own subtractive": quick(partition=SubtractiveClustering(radius=0.6)),
@@ -36,16 +37,9 @@ ESTIMATORS = {
     "clusterer": quick(partition=KMeans(3, random_state=0)),
     "model": quick(partition=parse_fis(BY_HAND)),
     "pipeline": make_pipeline(StandardScaler(), quick()),
-    "words as objects": quick(
-        solver=Hybrid(),
-        loss=Huber(),
-        early_stopping=EarlyStopping(),
-        out_of_bounds=LinearExtrapolation(),
-    ),
+    "words as objects": quick(solver=Hybrid(), out_of_bounds=LinearExtrapolation(), **OPTIONS),
     **{name: quick(solver=solver()) for name, solver in SOLVERS.items()},
-    "constrained": quick(
-        constraints=[OutputLimits(-50.0, 50.0), FixedPoint([5.0, 0.5], [-0.4, 2.5])]
-    ),
+    "constrained": quick(constraints=[OutputLimits(-50, 50), FixedPoint([5.0, 0.5], [-0.4, 2.5])]),
     **{mf: quick(mf=mf) for mf in MEMBERSHIPS},
 }
 X = np.random.default_rng(0).uniform(0.0, [10.0, 1.0], (60, 2))
@@ -63,16 +57,12 @@ def fitted(estimator):
 
 def compensator():
     """Of a gyro: what its log does not say, a law, and rules for what the law leaves."""
-    g = np.random.default_rng(1)
-    log = np.column_stack([np.arange(60.0), 20.0 + np.arange(60.0) / 60.0, g.uniform(-1, 1, 60)])
+    time, output = np.arange(60.0), np.random.default_rng(1).uniform(-1, 1, 60)
+    log = np.column_stack([time, 20.0 + time / 60.0, output])
+    columns = [("rate", ThermalRate(30.0, time=0), [0, 1]), ("log", "passthrough", [0, 1, 2])]
     law = OpenLoopArcsineRegressor(output=-1, temperature=1)
-    pipeline = make_pipeline(
-        ColumnTransformer(
-            [("rate", ThermalRate(30.0, time=0), [0, 1]), ("log", "passthrough", [0, 1, 2])]
-        ),
-        ResidualRegressor(law, quick(n_mfs=1)),
-    )
-    return pipeline.fit(log, log[:, 2] + 0.1 * log[:, 2] ** 3), log
+    pipeline = make_pipeline(ColumnTransformer(columns), ResidualRegressor(law, quick(n_mfs=1)))
+    return pipeline.fit(log, output + 0.1 * output**3), log
 
 
 # What makes an estimator, and rows for it.

@@ -30,6 +30,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::skanfis.exceptions.OutOfBoundsW
 
 COUNTS = -27_000.0  # per deg/s
 MIN_COVERAGE = 0.2
+LAW = OpenLoopArcsineRegressor("output", "temperature")
 
 
 @cache
@@ -41,15 +42,10 @@ def simulated():
 
 
 @cache
-def fitted_whole():
-    law = OpenLoopArcsineRegressor("output", "temperature")
-    X = simulated()[["time", "output", "temperature"]]
-    return ResidualRegressor(law, quick(n_mfs=2)).fit(X, simulated()["rate"]), X
-
-
 def whole():
     """Both parts on all columns, by name."""
-    return deepcopy(fitted_whole())
+    X = simulated()[["time", "output", "temperature"]]
+    return ResidualRegressor(LAW, quick(n_mfs=2)).fit(X, simulated()["rate"]), X
 
 
 @cache
@@ -67,7 +63,7 @@ def everything():
 
 
 def silent():
-    model, X = whole()
+    model, X = deepcopy(whole())
     model.base_.set_params(out_of_bounds="nan")
     model.residual_.set_params(out_of_bounds="nan")
     return model, X
@@ -161,8 +157,7 @@ def test_answers_as_predict(case, dtype, limit, std, tmp_path):
     scale = np.abs(wanted[bits == 0] if "cubic" in case.__name__ else simulated()["rate"]).max()
     assert off[bits == 0].max() < limit * scale
     assert off[answered].max() < limit * np.abs(wanted[answered]).max()
-    is_silent = case in (silent, *RAISE, silent_cubic)
-    assert (answered < sure).any() == is_silent
+    assert (answered < sure).any() == (case in (silent, *RAISE, silent_cubic))
     silence = y[np.append(answered < sure, [True] * 3), 0]
     nothing = np.nan if "silent" in case.__name__ and std == "c99" else UNTOUCHED
     np.testing.assert_array_equal(silence, nothing)
@@ -224,9 +219,6 @@ def test_of_misra_c_is_kept_what_the_header_says(tmp_path):
     assert found <= set(re.findall(r"\d+\.\d+", named))
 
 
-LAW = OpenLoopArcsineRegressor("output", "temperature")
-
-
 @pytest.mark.parametrize(
     ("parts", "error", "message"),
     [
@@ -246,7 +238,7 @@ def test_refuses_what_it_cannot_write(parts, error, message):
 def test_refuses_what_is_no_composition():
     with pytest.raises(TypeError, match="fitted ResidualRegressor"):
         export_c_physics(ANFISRegressor(n_mfs=1), name="gyro")
-    model, _ = whole()
+    model, _ = deepcopy(whole())
     with pytest.raises(ValueError, match="at most 14 in all"):
         export_c_physics(model, name="gyroscope_number")
     model.base_.amplitude_ = model.base_.amplitude_ * 1e40

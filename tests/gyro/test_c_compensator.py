@@ -1,12 +1,12 @@
 """A compensator as C: what its header says of the output, the units, and how inputs are made."""
 
-from skanfis.gyro import GyroCompensator, OpenLoopArcsineRegressor, ResidualRegressor
+from skanfis.gyro import GyroCompensator, ResidualRegressor
 from skanfis.gyro.c_compensator import export_c_compensator
 from skanfis.gyro.compensator import features
 
 from ..export.c_compiler import told
 from ..quick import quick
-from .test_c_code import COUNTS, simulated
+from .test_c_code import COUNTS, LAW, simulated
 
 
 def test_header_of_a_compensator_says_units_and_how_inputs_are_made(tmp_path):
@@ -33,8 +33,7 @@ def test_header_of_a_compensator_says_units_and_how_inputs_are_made(tmp_path):
         "MISRA C:2012",
     ):
         assert part in text
-    law = OpenLoopArcsineRegressor("output", "temperature")
-    model = ResidualRegressor(law, quick([1, 1, 1, 1])).fit(X, log["rate"])
+    model = ResidualRegressor(LAW, quick([1, 1, 1, 1])).fit(X, log["rate"])
     compensator = GyroCompensator(model, inputs, "rate", COUNTS, "counts", 25.0)
     text = told(export_c_compensator(compensator, tmp_path / "gyro", std="c99").header)
     assert "compensated rate: take it in the place of the raw rate" in text

@@ -109,12 +109,11 @@ def test_the_nearest_cubic_of_a_fourth_power_by_chebyshev(autopilot):
     np.testing.assert_allclose(off, np.cos(4.0 * np.arccos(x)) / 8.0, atol=1e-4)
 
 
-def test_a_range_is_no_wider_for_two_digits_and_no_parameter_has_an_exponent():
+@pytest.mark.parametrize(("autopilot", "name"), [("px4", "TC_G1_"), ("ardupilot", "INS_TCAL1_")])
+def test_a_range_is_no_wider_for_two_digits_and_no_parameter_has_an_exponent(autopilot, name):
     error = Within(error_of("rules", 1), np.array([(-19.996, 59.994)]))
-    for autopilot in ("px4", "ardupilot"):
-        text = Cubic(error, autopilot).text([], "x", "1")
-        found = parameters(text)
-        name = "TC_G1_" if autopilot == "px4" else "INS_TCAL1_"
-        assert (found[f"{name}TMIN"], found[f"{name}TMAX"]) == ("-19.99", "59.99")
-        assert not any("e" in value for value in found.values())
-        assert ("# TC_G1_ID is missing, " in text) == (autopilot == "px4")
+    text = Cubic(error, autopilot).text([], "x", "1")
+    found = parameters(text)
+    assert (found[f"{name}TMIN"], found[f"{name}TMAX"]) == ("-19.99", "59.99")
+    assert not any("e" in value for value in found.values())
+    assert ("# TC_G1_ID is missing, " in text) == (autopilot == "px4")
