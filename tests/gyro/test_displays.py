@@ -17,6 +17,7 @@ from skanfis.gyro import (
     ScaleFactorErrorDisplay,
 )
 from skanfis.gyro.displays import three_digits
+from skanfis.gyro.metrics import rms
 
 from ..quick import quick
 
@@ -59,17 +60,15 @@ def drawn(display):
 
 @pytest.mark.parametrize("kind", WANTS)
 def test_draws_with_units_on_the_axes_given(kind, log):
-    display = display_of(kind, log, ax=Figure(dpi=30))
-    display.figure_.canvas.draw()
+    figure = Figure(dpi=30)
+    display = display_of(kind, log, ax=figure)
+    assert display.figure_ is figure
+    figure.canvas.draw()
     assert display.axes_[-1].get_xlabel().endswith("]")
     assert all("deg" not in axes.get_xlabel() + axes.get_ylabel() for axes in display.axes_)
     assert display.axes_[0].get_ylabel().endswith(("]", "group"))
     axes = np.atleast_1d(Figure().subplots(len(display.axes_)))
-    again = display.plot(axes)
-    assert again is display
-    assert list(display.axes_) == list(axes)
-    empty = Figure()
-    assert display.plot(empty).figure_ is empty
+    assert list(display.plot(axes).axes_) == list(axes)
     with pytest.raises(ValueError, match=f"ax has 3 axes; this picture needs {len(axes)}"):
         display.plot(ax=Figure().subplots(3))
 
@@ -91,11 +90,9 @@ def test_tables_hold_what_is_drawn_in_the_unit(unit, log):
     table = loop.tables()["bias"]
     expected = [table.iloc[:, [0, k]] for k in (1, 2, 3, 4)]
     np.testing.assert_allclose(drawn(loop), np.concatenate(expected), rtol=1e-12)
-
     groups = display_of(GroupResidualDisplay, log, unit=unit)
     table = groups.tables()["groups"].iloc[:, 1:]
     np.testing.assert_allclose(drawn(groups)[:, 0], table.to_numpy().T.ravel(), rtol=1e-12)
-
     surface = display_of(ResidualSurfaceDisplay, log, unit=unit)
     cells = surface.tables()["cells"]
     mesh = np.ma.filled(surface.axes_[0].collections[0].get_array().astype(float), np.nan)
@@ -133,8 +130,7 @@ def test_error_band_keeps_every_peak_and_leaves_gaps_open(log):
     assert bands["smallest error after [deg/s]"].min() == pytest.approx(-7.0)
     gap = bands[(bands["time [s], from"] > 1100) & (bands["time [s], to"] < 2900)]
     assert gap["largest error after [deg/s]"].isna().all()
-    rms = np.sqrt(np.mean((log["output"] - log["rate"]) ** 2))
-    assert whole["RMS error [deg/s]"][0] == pytest.approx(rms)
+    assert whole["RMS error [deg/s]"][0] == pytest.approx(rms(log["output"] - log["rate"]))
     assert "7.00 °/s" in display.axes_[1].get_title(loc="left")
     refused = display_of(ErrorDisplay, log.assign(after=log["after"].where(log.index >= 100)))
     assert refused.tables()["whole"]["RMS error [deg/s]"][1] == pytest.approx(0.001, rel=0.1)

@@ -220,9 +220,8 @@ def test_the_error_of_an_allan_deviation_is_its_spread(n_runs, rng):
 
 @needs_allantools
 def test_runs_too_short_for_an_allan_deviation_are_refused():
-    for time, run in ((np.arange(18.0), np.repeat([0, 1], 9)), (np.zeros(18), None)):
-        with pytest.raises(ValueError, match="nowhere do 10 rows in range follow evenly"):
-            allan_deviation(np.zeros(18), time, run)
+    with pytest.raises(ValueError, match="nowhere do 10 rows in range follow evenly"):
+        allan_deviation(np.zeros(18), np.arange(18.0), np.repeat([0, 1], 9))
 
 
 RISING = {name: [1, 2] for name in ("rate", "output", "error", "temperature")}
