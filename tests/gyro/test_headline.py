@@ -16,15 +16,11 @@ from .planted import NOISE, calibrated, evaluated, log_of
 pytestmark = pytest.mark.usefixtures("given_weights", "few_rivals")
 
 
-def of_rules(slope, gain, **options):
-    """Rules for an error that is a line of the temperature, and a scale factor."""
-    log = log_of(lambda t, r: 0.005 + slope * t + (gain - 1.0) * r, n_runs=12, n_rows=40, seed=3)
-    return calibrated(log, n_folds=4, write="rules", terms=(1, 1), **options)
-
-
 @cache
-def a_line():
-    return of_rules(1e-3, 1.001)
+def a_line(gain=1.001, **options):
+    """Rules for an error that is a line of the temperature, and a scale factor."""
+    log = log_of(lambda t, r: 0.005 + 1e-3 * t + (gain - 1.0) * r, n_runs=12, n_rows=40, seed=3)
+    return calibrated(log, n_folds=4, write="rules", terms=(1, 1), **options)
 
 
 def test_largest_compensation_of_a_line_is_that_of_its_corner():
@@ -87,8 +83,7 @@ def test_flagged_rows_are_counted_by_the_input_to_blame():
 @pytest.mark.parametrize(("unit", "gain"), [("deg/s", -0.5), ("counts", -131.0)])
 def test_rate_goes_with_the_output_or_is_not_proven(unit, gain):
     """An axis mounted the other way round: its scale factor's sign is found of counts alone."""
-    calibration = of_rules(1e-3, gain, output_unit=unit)
-    assert proven_bounds(calibration)[1] is (unit == "counts")
+    assert proven_bounds(a_line(gain, output_unit=unit))[1] is (unit == "counts")
 
 
 def computed(text, columns):

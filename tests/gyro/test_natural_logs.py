@@ -84,10 +84,12 @@ def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth
 
 def test_the_columns_of_a_rate_table_with_all_that_confuses(tmp_path, truth):
     pytest.importorskip("pyarrow")
-    table = pd.DataFrame({"seq": range(len(truth)), "sweep_start_temp_c": 20.5})
-    table["gyro_counts"], table["temp_c"] = -27_000.0 * truth["output"], truth["temperature"]
-    table["rate_true_rad_s"], table["rate_true_deg_s"] = np.radians(truth["rate"]), truth["rate"]
-    table["author_fit_residual_rad_s"], table["temp_trend"] = 1e-4, np.where(table.seq % 2, 1, -1)
+    names = {"temperature": "temp_c", "rate": "rate_true_deg_s"}
+    table = truth[["temperature", "rate"]].rename(columns=names)
+    table.insert(0, "rate_true_rad_s", np.radians(truth["rate"]))
+    table.insert(0, "gyro_counts", -27_000.0 * truth["output"])
+    table = table.assign(seq=range(len(truth)), temp_trend=np.where(truth.index % 2, 1, -1))
+    table = table.assign(sweep_start_temp_c=20.5, author_fit_residual_rad_s=1e-4)
     table.to_parquet(tmp_path / "log.parquet")
     for reading in (found_in(tmp_path, table), found(tmp_path / "log.parquet")):
         assert list(reading.log) == ["temperature", "output", "rate"]

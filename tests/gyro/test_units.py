@@ -25,13 +25,13 @@ def read_table(tmp_path, table, require=PARTS, paths=1):
     return read(found, Request(require=require, guess=True))
 
 
-def reading(tmp_path, truth, names, scales, offsets=(0.0,) * 4, paths=1):
+NAMES = ("time", "temp", "gyro", "rate")
+
+
+def reading(tmp_path, truth, scales=(1, 1, 1, 1), offsets=(0, 0, 0, 0), names=NAMES, paths=1):
     """What is read of time, temp, gyro and rate in other units, without a word on them."""
     table = truth[["time", *PARTS]] * list(scales) + list(offsets)
     return read_table(tmp_path, table.set_axis(names, axis=1), paths=paths)
-
-
-NAMES = ("time", "temp", "gyro", "rate")
 
 
 @pytest.mark.parametrize(
@@ -53,7 +53,7 @@ NAMES = ("time", "temp", "gyro", "rate")
     ],
 )
 def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offsets, units):
-    found = reading(tmp_path, truth, NAMES, scales, offsets)
+    found = reading(tmp_path, truth, scales, offsets)
     parts = ("time", *PARTS)
     assert tuple(found.units[part] for part in parts) == units
     assert set(found.assumed) == set(parts)
@@ -67,15 +67,15 @@ def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offset
 def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, truth):
     turn, options = np.pi / 180, "output=deg/s rate=deg/s or --units output=rad/s rate=rad/s"
     with pytest.raises(UsageError, match=rf"may be in deg/s \(-1\..* {options}"):
-        reading(tmp_path, truth, NAMES, (1, 1, turn, turn))
+        reading(tmp_path, truth, (1, 1, turn, turn))
     # The name of one column tells the other.
-    found = reading(tmp_path, truth, ("time", "temp", "gyro", "rate_rad_s"), (1, 1, turn, turn))
+    found = reading(tmp_path, truth, (1, 1, turn, turn), names=(*NAMES[:3], "rate_rad_s"))
     assert (found.units["output"], found.units["rate"]) == ("rad/s", "rad/s")
     assert "rate" not in found.assumed
 
 
 def test_a_wrong_unit_of_the_output_is_not_made_good_by_a_rate_that_no_gyro_has(tmp_path, truth):
-    found = reading(tmp_path, truth, ("time", "temp", "gyro_rad_s", "rate"), (1, 1, 1, 1))
+    found = reading(tmp_path, truth, names=("time", "temp", "gyro_rad_s", "rate"))
     assert (found.units["output"], found.units["rate"]) == ("rad/s", "deg/s")
     with pytest.raises(LogError, match=r"changes by 56.* is the output in deg/s\?"):
         check_log(found.log, units=found.units, inputs=PARTS[:2])
@@ -84,7 +84,7 @@ def test_a_wrong_unit_of_the_output_is_not_made_good_by_a_rate_that_no_gyro_has(
 @pytest.mark.parametrize(("slower", "ways"), [(60, "time=s or .*time=min"), (0.03, "s or .*=ms")])
 def test_a_clock_that_may_be_two_is_asked_for(tmp_path, truth, slower, ways):
     with pytest.raises(UsageError, match=ways):
-        reading(tmp_path, truth, NAMES, (1 / slower, 1, 1, 1))
+        reading(tmp_path, truth, (1 / slower, 1, 1, 1))
 
 
 # As warm as a room in degF alone, in degC alone, and in either.
@@ -92,7 +92,7 @@ def test_a_clock_that_may_be_two_is_asked_for(tmp_path, truth, slower, ways):
 def test_a_temperature_in_either_scale_is_asked_for(tmp_path, truth, low, high):
     heat = np.linspace(low, high, len(truth))
     with pytest.raises(UsageError, match="temperature=degC or --units temperature=degF"):
-        reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
+        reading(tmp_path, truth.assign(temperature=heat))
 
 
 @pytest.mark.parametrize("mark", [9999.0, -9999.0])
@@ -100,7 +100,7 @@ def test_marks_of_no_value_tell_no_unit_and_are_refused(tmp_path, truth, mark):
     heat = truth["temperature"].where(np.arange(len(truth)) % 20 != 7, mark)
     told = rf"line 9, column 'temp' .*: {mark} degC .*; leave cells that hold no value empty"
     with pytest.raises(LogError, match=told):
-        reading(tmp_path, truth.assign(temperature=heat), NAMES, (1, 1, 1, 1))
+        reading(tmp_path, truth.assign(temperature=heat))
 
 
 def test_round_levels_of_a_rate_table_tell_its_unit(tmp_path, truth):
@@ -108,21 +108,21 @@ def test_round_levels_of_a_rate_table_tell_its_unit(tmp_path, truth):
     log = truth.iloc[: rate.size].assign(rate=rate, output=1.01 * rate)
     turn = np.pi / 180
     for scale, unit in ((1.0, "deg/s"), (turn, "rad/s")):
-        found = reading(tmp_path, log, NAMES, (1, 1, scale, scale))
+        found = reading(tmp_path, log, (1, 1, scale, scale))
         assert (found.units["output"], found.units["rate"]) == (unit, unit)
     with pytest.raises(UsageError, match="output=rad/s rate=rad/s"):
-        reading(tmp_path, log.assign(rate=1.03 * rate), NAMES, (1, 1, 1, 1))
+        reading(tmp_path, log.assign(rate=1.03 * rate))
 
 
 def test_all_files_tell_what_the_first_leaves_open(tmp_path, truth):
     """A first file that is hot throughout, and a last one that is cold."""
     log = truth.assign(temperature=np.linspace(50.0, 10.0, len(truth)))
-    found = reading(tmp_path, log, NAMES, (1, 1, 1, 1), paths=4)
+    found = reading(tmp_path, log, paths=4)
     assert found.units["temperature"] == "degC"
     assert "taken as degC (10 to 50; degF?" in found.assumed["temperature"]
     # The last one hot: all is read again, in another unit than that of the first.
     hotter = log.assign(temperature=log["temperature"].to_numpy()[::-1] + 5.0)
-    fahrenheit = reading(tmp_path, hotter, NAMES, (1, 1.8, 1, 1), (0, 32, 0, 0), paths=4)
+    fahrenheit = reading(tmp_path, hotter, (1, 1.8, 1, 1), (0, 32, 0, 0), paths=4)
     assert fahrenheit.units["temperature"] == "degF"
     assert "taken as degF (59 to 131; degC?" in fahrenheit.assumed["temperature"]
     np.testing.assert_allclose(fahrenheit.log["temperature"], hotter["temperature"], atol=1e-9)
