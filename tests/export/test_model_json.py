@@ -39,8 +39,9 @@ def assert_same(read, model):
         assert_array_equal(read, model)
 
 
-# A tree without one rule has two terms of the first input, where others have other inputs.
-A_REST = build(MODELS["tree, order 1, 2 outputs"].antecedent.without_rules([1])[0])
+A_TREE = MODELS["tree, order 1, 2 outputs"]
+# Without one rule it has two terms of the first input, where others have other inputs.
+A_REST = build(A_TREE.antecedent.without_rules([1])[0])
 
 
 @pytest.mark.parametrize("model", [*EVERY_PAIR.values(), A_REST], ids=[*EVERY_PAIR, "a rest"])
@@ -108,9 +109,6 @@ REFUSED = [
     (_set("rules", 0, "consequents", 0, [1.0, 2.0]), r"\[0\]: \[1\.0, 2\.0\] is not a list of 4"),
     (_set("rules", 1, "consequents", [[1.0], [1.0]]), "other numbers of terms or coefficients"),
 ]
-
-
-A_TREE = MODELS["tree, order 1, 2 outputs"]
 
 
 def _without(place):

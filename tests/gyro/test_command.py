@@ -480,12 +480,10 @@ def test_a_scale_factor_needs_rates_that_the_output_follows_whatever_the_inputs(
     assert (rates - 50.0).abs().max() < 0.5
 
 
-def test_the_axis_of_an_autopilot_is_that_of_the_output(tmp_path, run):
-    log = make_ofog(n_devices=1, n_runs=4, duration=600.0, random_state=0)
+def test_the_axis_of_an_autopilot_is_that_of_the_output(log, run):
     noise = np.random.default_rng(0).normal(size=len(log))
-    table = log[["time", "temperature", "rate"]].assign(gyro_x=noise, gyro_y=log["output"])
-    table.to_csv(tmp_path / "log.csv", index=False)
-    code, _, said = run(tmp_path / "log.csv", "--terms 1,1,2 --target table px4:x")
+    table = log.drop(columns="output").assign(gyro_x=noise, gyro_y=log["output"])
+    code, _, said = run(table, "--terms 1,1,2 --target table px4:x")
     assert (code, "px4:x: the output was taken from 'gyro_y'" in said) == (2, True)
 
 

@@ -23,6 +23,7 @@ from skanfis.gyro.metrics import rms
 from skanfis.inspection import readability
 
 from ..outline import Outline
+from .planted import with_few_rivals
 
 pytestmark = pytest.mark.usefixtures("given_weights", "coarse_report")
 
@@ -106,11 +107,12 @@ def test_physics_shows_its_law(few_rivals, no_pictures):
         assert sentence in section
 
 
-def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(calibration, no_pictures):
-    cubic, none = (
-        text_of(calibration_of(calibration.log, ("output",), terms=(1,), write=write))
-        for write in ("cubic", "none")
-    )
+def test_a_cubic_is_held_beyond_its_range_and_has_bounds_of_its_own(
+    calibration, no_pictures, monkeypatch
+):
+    cubic = text_of(calibration_of(calibration.log, ("output",), terms=(1,), write="cubic"))
+    with_few_rivals(monkeypatch)
+    none = text_of(calibration_of(calibration.log, ("output",), terms=(1,), write="none"))
     assert "is flagged (status 1): the value at the edge is held" in cubic
     assert "addition to the arcsine law" not in cubic
     assert "Nothing is subtracted, so there is nothing to bound." in none
