@@ -315,14 +315,8 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
 
 
 HOSTILE = [
-    "*/ int x; /*",
-    "??/",
-    "???/",
-    'quote " and \\',
-    "line\nbreak\r\n#error",
-    "x" * 5000,
-    "//\\",
-    "\x00\x1b[31m °C 陀螺",
+    *("*/ int x; /*", "??/", "???/", 'quote " and \\', "line\nbreak\r\n#error", "//\\"),
+    *("x" * 5000, "\x00\x1b[31m °C 陀螺"),
 ]
 
 

@@ -12,8 +12,6 @@ from skanfis.export.fis.reader import parse_fis
 
 from .fis_files import BY_HAND, with_line
 
-GAUSS = "MF{0}='t{0}':'gaussmf',[1 {0}]"
-
 
 def system(n_terms, rules, n_outputs=1):
     """A file with Gaussian terms at 1, 2, ... on every input and the rule's number as output."""
@@ -22,7 +20,7 @@ def system(n_terms, rules, n_outputs=1):
     lines[4:7] = [f"NumInputs={n_inputs}", f"NumOutputs={n_outputs}", f"NumRules={n_rules}"]
     for j, n in enumerate(n_terms):
         lines += [f"[Input{j + 1}]", f"Name='x{j}'", "Range=[0 4]", f"NumMFs={n}"]
-        lines += [GAUSS.format(k + 1) for k in range(n)]
+        lines += [f"MF{k}='t{k}':'gaussmf',[1 {k}]" for k in range(1, n + 1)]
     for k in range(n_outputs):
         lines += [f"[Output{k + 1}]", f"Name='y{k}'", "Range=[0 9]", f"NumMFs={n_rules}"]
         lines += [f"MF{r + 1}='r':'constant',[{r + 1}]" for r in range(n_rules)]

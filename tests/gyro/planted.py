@@ -24,15 +24,12 @@ def log_of(error, n_runs=8, n_rows=60, seed=0):
     return pd.DataFrame(columns)
 
 
-def split_of(log, n_folds=2):
-    """Whole runs held out."""
+def calibrated(log, inputs=("temperature", "output"), n_folds=2, **options):
+    """With whole runs held out."""
     labels = log["run"].astype(str).to_numpy(dtype=object)
     folds = list(GroupKFold(n_folds).split(log, groups=log["run"]))
-    return Split("run", folds, labels, "runs held out")
-
-
-def calibrated(log, inputs=("temperature", "output"), n_folds=2, **options):
-    return calibrate(log, split_of(log, n_folds), Recipe(inputs, **options), lambda text: None)
+    split = Split("run", folds, labels, "runs held out")
+    return calibrate(log, split, Recipe(inputs, **options), lambda text: None)
 
 
 def with_few_rivals(patch):

@@ -22,8 +22,6 @@ from ..quick import quick
 INPUTS = ("time", "temperature", "temperature_rate", "output")
 FACTOR = -27_000.0  # counts per deg/s
 LAG = 60.0  # s
-# Next to none, for data next to without noise.
-WEIGHTS = {"agreement": 1e-8, "alpha": 1e-9}
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +34,9 @@ def log():
 
 def fitted(log, **options):
     X = features(log, INPUTS, LAG)
-    model = make_pipeline(StandardScaler(), quick([1, 2, 1, 3], **WEIGHTS, **options))
+    # Next to no weights, for data next to without noise.
+    rules = quick([1, 2, 1, 3], agreement=1e-8, alpha=1e-9, **options)
+    model = make_pipeline(StandardScaler(), rules)
     model.fit(X, log["output"] / FACTOR - log["rate"])
     return GyroCompensator(model, INPUTS, scale_factor=FACTOR, output_unit="counts")
 

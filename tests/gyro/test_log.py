@@ -252,16 +252,6 @@ def test_however_many_temperatures_are_glitches_and_a_step_is_none():
     assert glitches(log[1:].assign(temperature=soak[1:], run=np.arange(1, len(log)) // 2)) == []
 
 
-def test_the_sentence_on_a_glitch_says_what_is_odd():
-    log = simulated().assign(rate=0.0)
-    log["output"] = 0.01 * np.random.default_rng(0).normal(size=len(log))
-    log.loc[7, "output"] = 99.0
-    log.loc[8, "temperature"] = 150.0
-    odd, hot = find_glitches(log, log["output"].to_numpy())
-    assert odd == (7, "the output of 99 at a rate of 0 deg/s")
-    assert hot == (8, "the temperature of 150 degC")
-
-
 @pytest.mark.parametrize(
     "options", [{}, {"profile": "ramps"}, {"profile": "ramps", "rates": [-100, 0, 100]}]
 )
