@@ -230,6 +230,8 @@ def test_coverage_is_that_of_the_estimator(rng):
     assert level.iloc[:, 1].nunique() == 96
     with pytest.raises(ValueError, match="'output' is no column of X, which has temperature, time"):
         CoverageDisplay.from_estimator(pipeline, X.drop(columns="output"))
+    with pytest.raises(ValueError, match="StandardScaler has no method 'coverage'"):
+        CoverageDisplay.from_estimator(pipeline[0], X)
 
 
 def test_allan_curve_of_white_noise_and_drift(rng):
