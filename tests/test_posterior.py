@@ -87,13 +87,15 @@ def dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=0):
 
 @pytest.mark.theory
 @pytest.mark.parametrize("is_learnt", [False, True], ids=["fixed premises", "with the premises"])
-@pytest.mark.parametrize("kind", ["grid", "scattered", "table, one slope", "order 0"])
+@pytest.mark.parametrize("kind", ["grid", "tree", "scattered", "table, one slope", "order 0"])
 def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, rng):
     monkeypatch.setattr("skanfis.model.BLOCK_BYTES", 1)  # 64 rows
     rows = oracles.bumpy_rows(rng, 200, 2, 1, weighted=False)
     inputs, order = None, int(kind != "order 0")
     if kind == "scattered":
         antecedent = oracles.random_scattered(rng, Bell, 3, [0, 1])
+    elif kind == "tree":
+        antecedent = oracles.random_tree(rng, 4, (0, 1))
     elif kind == "table, one slope":
         antecedent, inputs = oracles.random_table(rng, inputs=2), np.array([1])
     else:

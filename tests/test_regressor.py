@@ -57,25 +57,6 @@ def textbook_strengths(estimator, memberships, data):
     return oracles.textbook_strengths(memberships, estimator.rules_, names, data)
 
 
-def planted(data):
-    """A known TSK model: two terms per input, four rules."""
-    centers, width = np.array([[-1.2, 0.9], [-0.8, 1.1]]), 0.9
-    mu = np.exp(-((data[:, :, None] - centers) ** 2) / (2 * width**2))
-    strengths = np.einsum("ni,nj->nij", mu[:, 0], mu[:, 1]).reshape(-1, 4)
-    strengths /= strengths.sum(axis=1, keepdims=True)
-    consequents = np.array([[1, 2, -1], [-2, 0.5, 1], [3, -1, 0.3], [0, 1, 2]])
-    return (strengths * (consequents[:, 0] + data @ consequents[:, 1:].T)).sum(axis=1)
-
-
-def test_planted_model_is_found(rng):
-    train, check = rng.uniform(-2, 2, (400, 2)), rng.uniform(-2, 2, (400, 2))
-    model = ANFISRegressor(n_mfs=2).fit(train, planted(train))
-    check = check[model.in_bounds(check)]
-    truth = planted(check)
-    # Found within 1e-10; the fit stops at a relative decrease of 1e-4 of a cost near zero.
-    assert_allclose(model.predict(check), truth, rtol=0, atol=1e-6 * np.ptp(truth))
-
-
 @pytest.mark.parametrize("alpha", [1e-12, 1e-6, 1e-2, 1.0])
 @pytest.mark.parametrize("weighted", [False, True])
 def test_one_rule_is_ridge_regression_of_standardised_data(alpha, weighted):
@@ -162,20 +143,6 @@ def test_one_column_of_targets_is_the_vector_in_another_shape():
     flat, column = (quick().fit(X, y) for y in (Y, Y[:, None]))
     assert_array_equal(column.predict(X), flat.predict(X)[:, None])
     assert_array_equal(column.consequents_, flat.consequents_[:, :, None])
-
-
-def test_outputs_share_the_premises_and_have_their_own_consequents():
-    targets = np.column_stack([Y, -5e6 * Y + 1.0, np.cos(X[:, 1] / 40.0)])
-    model = ANFISRegressor(n_mfs=2, **FREE).fit(X, targets)
-    assert len(model.memberships_) == 6
-    # The linear part is solved for each output: given the memberships, it is least squares.
-    design = np.einsum("nr,ni->nri", model.strengths(X), np.column_stack([np.ones(len(X)), X]))
-    solution = np.linalg.lstsq(design.reshape(len(X), -1), targets, rcond=None)[0]
-    expected = design.reshape(len(X), -1) @ solution
-    error = (model.predict(X) - expected) / np.ptp(targets, axis=0)
-    assert np.abs(error).max() < 1e-6
-    for found in (model, quick().fit(X, targets)):
-        assert_allclose(found.predict(X)[:, 1], -5e6 * found.predict(X)[:, 0] + 1.0, rtol=1e-9)
 
 
 @pytest.mark.filterwarnings("ignore::sklearn.exceptions.ConvergenceWarning")

@@ -61,7 +61,8 @@ def test_check_is_switched_off_with_that_of_scikit_learn():
 def test_a_missing_group_is_named_whatever_stands_for_it(missing):
     with pytest.raises(ValueError, match="no value for 1 of 3 rows, first at row 1"):
         group_numbers([1, missing, 2], 3)
-    assert group_numbers([7, 5, 7], 3).tolist() == [1, 0, 1]
+    for groups in ([7, 5, 7], ["b", "a", "b"]):
+        assert group_numbers(groups, 3).tolist() == [1, 0, 1]
 
 
 def test_a_warning_points_at_the_line_of_the_user_however_deep_it_arises():

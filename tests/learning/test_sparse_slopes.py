@@ -110,11 +110,6 @@ class TestFit:
         costs = [one["reading_cost"] for one in model.structures_ if one["chosen"]]
         assert costs == [model.readability_.reading_cost]
 
-    def test_a_weight_that_is_given_leaves_every_rule_its_slopes(self, rng):
-        model = self.model(rng, alpha=1e-3)
-        assert not model.model_.common_slopes.any()
-        assert model.consequents_.all()
-
     def test_partial_fit_keeps_them(self, rng):
         X, y = planted(rng)
         model = ANFISRegressor(partition="tree").partial_fit(X[:500], y[:500])
