@@ -119,6 +119,10 @@ REFUSED = {
         ["y holds values of type int in column 'error', first at row 59", "too large"],
     ),
     "missing group": ({"groups": [None] * N_ROWS}, ["groups has no value for 60 of 60 rows"]),
+    "two X of one name": (
+        {"X": FRAME.set_axis(["rate", "time", "rate"], axis=1)},
+        ["X has 2 columns of the name 'rate'", "rename or drop"],
+    ),
     "no columns": ({"X": FRAME[[]]}, ["X has no columns", "at least one"]),
     "no columns of y": ({"y": FRAME[[]]}, ["y has no columns"]),
     "MATLAB": ({"mf": "gbellmf"}, ["'gbellmf' is MATLAB's name", "mf='bell'"]),
@@ -194,14 +198,6 @@ def test_column_that_is_no_number_is_named(rate, said):
         with pytest.raises((TypeError, ValueError)) as refusal:
             act(bad, *[Y] * (act not in (explained, frozen)))
         assert re.search(".*".join(map(re.escape, said)), str(refusal.value))
-
-
-def test_two_columns_of_one_name():
-    twice = FRAME.set_axis(["rate", "time", "rate"], axis=1)
-    with refused(ValueError, "X has 2 columns of the name 'rate'", "rename or drop"):
-        ANFISRegressor().fit(twice, Y)
-    with refused(ValueError, "X has 2 columns of the name 'rate'"):
-        ANFISRegressor(**QUICK).fit(FRAME, Y).predict(twice)
 
 
 def test_masked_values_are_not_taken_for_what_lies_beneath():

@@ -147,6 +147,7 @@ def test_sides_that_follow_from_others_are_left_out(cuts, widths, left):
         path = [(node, is_above) for node in range(len(cuts))]
         others = [[*path[:k], (k, not is_above)] for k in range(len(cuts))]
         found = TreeAntecedent.build([0] * len(cuts), theta * [[sign], [1.0]], [path, *others])
+        assert found.without_implied(0.0) is found
         shorter = found.without_implied(0.011)
         kept = [t % len(cuts) for t in shorter.rule_terms[0] if t >= 0]
         assert kept == left
@@ -158,8 +159,3 @@ def test_cuts_any_number_of_widths_apart_are_told_from_one_another():
     theta = np.array([[-1e4, 1e4], [0.0, 0.0]])
     found = TreeAntecedent.build([0, 0], theta, [[(0, False), (1, False)], [(0, True)]])
     assert found.without_implied(0.01).rule_terms[0].tolist().count(-1) == 1
-
-
-def test_what_says_no_less_is_the_same_tree():
-    whole = tree(5)
-    assert whole.without_implied(0.0) is whole

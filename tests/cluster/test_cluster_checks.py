@@ -37,13 +37,8 @@ def test_errors_name_the_row_and_the_column(clusterer, rng):
     for method in (clone(clusterer).fit, fitted.predict):
         with pytest.raises(ValueError, match="X contains NaN in column 'x1', first at row 3"):
             method(bad)
-    frame = pd.DataFrame(X, columns=["a", "b"])
     with pytest.raises(ValueError, match="X holds text in column 'b', first at row 0"):
-        clone(clusterer).fit(frame.assign(b="warm"))
-    with pytest.raises(ValueError, match="X has no columns"):
-        clone(clusterer).fit(frame[[]])
-    with pytest.raises(ValueError, match="Input sample_weight holds text, first at row 0"):
-        clone(clusterer).fit(X, sample_weight=["heavy"] * 10)
+        clone(clusterer).fit(pd.DataFrame(X, columns=["a", "b"]).assign(b="warm"))
     with pytest.raises(ValueError, match="Negative values in sample_weight: -2 at row 1"):
         clone(clusterer).fit(X, sample_weight=[1, -2, *[1] * 8])
     with pytest.raises(ValueError, match=r"weight.*zero"):

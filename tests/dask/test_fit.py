@@ -238,12 +238,6 @@ def test_whole_numbers_in_one_partition_are_read_as_floats():
     assert_array_equal(found.consequents_, single.consequents_)
 
 
-def with_text():
-    table = frame(300)
-    lazy = parts_of(table[NAMES][:100], table[NAMES][100:].assign(rate="fast"))
-    return lazy, da.from_array(table["error"].to_numpy(), chunks=((100, 200),))
-
-
 def with_unknown_chunks():
     X, y = cut(100, *data(300))
     return X[X[:, 0] > -1e9], y[(y > 0.0)]
@@ -263,7 +257,6 @@ def weighted(weight):
     [
         (with_nan, ValueError, r"Partition 2: .*NaN in column 'rate', first at row 12"),
         (with_other_columns, ValueError, r"Partition 1: .*has the columns temperature, Rate"),
-        (with_text, ValueError, r"Partition 1: .*holds text in column 'rate'"),
         (with_unknown_chunks, ValueError, r"Partition \d: X has 100 rows and y \d+"),
         (lambda: cut(100, data(300)[0], data(299)[1]), ValueError, "Partition 2: .*100 .* y 99"),
         (of_other_partitions, ValueError, "y has npartitions=2, X 3"),

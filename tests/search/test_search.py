@@ -57,18 +57,10 @@ def test_a_replicated_table_is_fitted_as_if_its_inputs_were_a_hair_apart(rng):
     assert_allclose(errors[0], errors[1], rtol=0.05)
 
 
-DRAWS = {
-    "lognormal": lambda g, shape: g.lognormal(size=shape),
-    "clusters": lambda g, shape: (
-        g.choice([-4.0, 0.0, 3.0], size=shape) + 0.2 * g.standard_normal(shape)
-    ),
-    "integers": lambda g, shape: g.integers(0, 5, size=shape).astype(float),
-}
-
-
-@pytest.mark.parametrize("draw", DRAWS)
-def test_terms_of_a_grid_mean_something(rng, draw):
-    X = DRAWS[draw](rng, (300, 3))
+def test_terms_of_a_grid_mean_something(rng):
+    """Of an input with a long tail, one with gaps, and whole numbers."""
+    clusters = rng.choice([-4.0, 0.0, 3.0], 300) + 0.2 * rng.standard_normal(300)
+    X = np.column_stack([rng.lognormal(size=300), clusters, rng.integers(0, 5, 300)])
     scale = X.std(axis=0)
     y = np.tanh(2.0 * X[:, 0] / scale[0]) + 0.5 * np.sin(2.0 * X[:, 1] / scale[1])
     y += 0.1 * rng.standard_normal(300)
