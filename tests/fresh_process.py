@@ -75,12 +75,7 @@ def pyplot_of_pictures():
     return [name for name in sys.modules if name == "matplotlib.pyplot"]
 
 
-STEPS = [
-    digests,
-    matplotlib_of_the_command,
-    backend_that_does_not_exist,
-    pyplot_of_pictures,
-]
+STEPS = [digests, matplotlib_of_the_command, backend_that_does_not_exist, pyplot_of_pictures]
 
 
 def outcome(step):

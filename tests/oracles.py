@@ -9,12 +9,7 @@ from itertools import product
 
 import numpy as np
 
-from skanfis.antecedent import (
-    GridAntecedent,
-    RuleTableAntecedent,
-    TermGroup,
-    TreeAntecedent,
-)
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent, TermGroup, TreeAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import Bell, Gaussian
 from skanfis.support import RuleSupport
@@ -239,12 +234,8 @@ class DenseProblem:
     def _centers(self):
         """Mean of the consequents' inputs where each rule fires at the start."""
         firing = strengths(self.antecedent, self.antecedent.parameters, self.Z) * self.weight
-        return np.array(
-            [
-                [np.average(z, weights=w) if w.sum() > 1e-12 else 0.0 for z in self.basis[1:]]
-                for w in firing
-            ]
-        ).reshape(self.n_rules, len(self.basis) - 1)
+        total = firing.sum(axis=1, keepdims=True)
+        return np.where(total > 1e-12, firing @ self.basis[1:].T / np.maximum(total, 1e-12), 0.0)
 
     def _extent(self):
         """How far from its centre each rule stands for the rows at the start, at least one."""
@@ -343,11 +334,8 @@ def bumpy_rows(rng, n_rows=300, n_inputs=2, n_outputs=1, weighted=False):
     """Rows in odd units, with a target that no small model fits exactly."""
     X = rng.normal(size=(n_rows, n_inputs)) * 10.0 ** np.arange(n_inputs) + 3.0
     z = (X - X.mean(axis=0)) / X.std(axis=0)
-    bumps = [
-        np.sin((1.5 + k) * z[:, 0]) * np.cos(z[:, -1]) + 0.3 * z.sum(axis=1)
-        for k in range(n_outputs)
-    ]
-    y = np.stack(bumps, axis=1) + 0.1 * rng.normal(size=(n_rows, n_outputs))
+    bumps = np.sin(np.outer(z[:, 0], 1.5 + np.arange(n_outputs))) * np.cos(z[:, [-1]])
+    y = bumps + 0.3 * z.sum(axis=1, keepdims=True) + 0.1 * rng.normal(size=(n_rows, n_outputs))
     return StandardisedData.of(X, y, rng.uniform(0.2, 3.0, n_rows) if weighted else None)
 
 
@@ -362,9 +350,8 @@ def even_grid(families, counts, low, high, overlap):
     thetas = []
     for j, (family, count) in enumerate(zip(families, counts, strict=True)):
         spacing = (high[j] - low[j]) / (count - 1)
-        thetas.append(
-            family.start(np.linspace(low[j], high[j], count), np.full(count, spacing), overlap)
-        )
+        centers = np.linspace(low[j], high[j], count)
+        thetas.append(family.start(centers, np.full(count, spacing), overlap))
     return GridAntecedent.build(list(families), list(range(len(counts))), thetas)
 
 

@@ -18,6 +18,7 @@ from skanfis.learning import GradientDescent, Hybrid, VariableProjection
 from skanfis.options import EarlyStopping, Huber, LinearExtrapolation
 
 from .memory import traced
+from .test_validation import NOT_FINITE
 
 NAMES = ["time", "temperature", "rate"]
 N_ROWS = 60
@@ -56,9 +57,7 @@ def line(as_frame=False):
     return ANFISRegressor(**QUICK).fit(FRAME if as_frame else X, Y)
 
 
-@pytest.mark.parametrize(
-    ("value", "kind"), [(np.nan, "NaN"), (np.inf, "infinity"), (-np.inf, "infinity")]
-)
+@NOT_FINITE
 @pytest.mark.parametrize("as_frame", [False, True])
 def test_entry_of_x_that_is_not_finite(value, kind, as_frame):
     bad = with_entry(X, ([7, 40], [2, 2]), value)
@@ -88,10 +87,7 @@ REFUSED = {
         {"X": FRAME.assign(kind="p", site="q")},
         ["text in column 'kind', first at row 0", "the columns 'site'", "OneHot"],
     ),
-    "text as y": (
-        {"y": np.array(["low", "high"] * 30)},
-        ["y holds text", "'low'", "must be a number"],
-    ),
+    "text as y": ({"y": np.array(LO_HI)}, ["y holds text", "'lo'", "must be a number"]),
     "text in a series as y": (
         {"y": pd.Series(LO_HI, name="error")},
         ["y holds text in column 'error', first at row 0", "'lo'"],
@@ -130,10 +126,7 @@ REFUSED = {
         {"partition": AgglomerativeClustering(n_clusters=2), "sample_weight": np.ones(N_ROWS)},
         ["AgglomerativeClustering", "no sample_weight", "KMeans", "'grid'"],
     ),
-    "negative weight": (
-        {"sample_weight": with_entry(ONES, 4, -2.0)},
-        ["Negative", "sample_weight", "-2 at row 4"],
-    ),
+    "negative weight": ({"sample_weight": with_entry(ONES, 4, -2.0)}, ["Negative", "-2 at row 4"]),
     "no weight": ({"sample_weight": 0.0 * ONES}, ["ample", "eight", "at least"]),
     "weight of one row": (
         {"sample_weight": with_entry(0.0 * ONES, 3, 1.0)},
@@ -141,10 +134,7 @@ REFUSED = {
     ),
     "NaN weight": ({"sample_weight": with_entry(ONES, 4, np.nan)}, ["sample_weight contains NaN"]),
     "other weights": ({"sample_weight": ONES[:-1]}, ["sample_weight.shape == (59,)", "(60,)"]),
-    "text as weights": (
-        {"sample_weight": LO_HI},
-        ["sample_weight holds text, first at row 0", "A weight must be a number"],
-    ),
+    "text as weights": ({"sample_weight": LO_HI}, ["sample_weight holds text, first at row 0"]),
     "2D weights": ({"sample_weight": np.ones((N_ROWS, 2))}, ["Sample weights must be 1D"]),
     "noise": ({"partition": DBSCAN(eps=1e-9)}, ["partition found no cluster", "noise"]),
     "no rules": ({"partition": ANFISRegressor()}, ["has no rules", "not been fitted", "model_"]),
@@ -180,13 +170,13 @@ TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "drop the colum
         (TIMES.to_period(), ["X holds times in column 'rate' (period"]),
         (
             TIMES.date.astype(object),
-            ["values of type date in column 'rate', first at row 0", "of seconds"],
+            ["of type date in column 'rate', first at row 0", "of seconds"],
         ),
         (pd.Categorical(TIMES), ["X holds times in column 'rate' (datetime64", "of seconds"]),
         ([1.5, pd.NA] * 30, ["a missing value in column 'rate', first at row 1", "impute"]),
         (
-            np.array([1, 10**400] * 30, dtype=object),
-            ["values of type int in column 'rate', first at row 1", "too large"],
+            pd.Series([1, 10**400] * 30, dtype=object),
+            ["type int in column 'rate', first at row 1", "too"],
         ),
     ],
 )
@@ -358,11 +348,7 @@ LIMIT = "limit is 1,024 MiB (sklearn.set_config(working_memory"
     ("n_inputs", "settings", "said"),
     [
         # 3^10 rules, with 11 coefficients each.
-        (
-            10,
-            {"n_mfs": 3},
-            ["n_mfs=3 on 10 inputs", "59,049 rules", "649,539", "45,065,222 MiB", LIMIT],
-        ),
+        (10, {"n_mfs": 3}, ["=3 on 10 inputs", "59,049 rules", "649,539", "45,065,222 MiB", LIMIT]),
         (10, {"n_mfs": [9] * 10}, ["on 10 inputs", "3,486,784,401 rules", "10^15 MiB"]),
         (8, {"n_mfs": 3}, ["6,561 rules with 59,049", LIMIT, "n_mfs=2 makes 256 rules"]),
         (400, {"n_mfs": 3}, ["n_mfs=3 on 400 inputs", "10^15 MiB"]),

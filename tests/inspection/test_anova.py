@@ -9,12 +9,7 @@ from numpy.testing import assert_allclose
 
 from skanfis import ANFISRegressor
 from skanfis.antecedent import TreeAntecedent
-from skanfis.inspection.anova import (
-    DrawnAnova,
-    ProductAnova,
-    blocks_of_rows,
-    input_marginals,
-)
+from skanfis.inspection.anova import DrawnAnova, ProductAnova, blocks_of_rows, input_marginals
 from skanfis.learning.data import StandardisedData
 
 from ..export.rule_bases import MODELS, build, rows_of
@@ -27,9 +22,8 @@ PATHS = [
     [(0, False), (3, True)],
     [(0, False), (3, False)],
 ]
-TREE = TreeAntecedent.build(
-    [1, 2, 1, 0], [[0.1, -0.3, 0.6, 0.2], np.log([0.3, 0.2, 0.1, 0.5])], PATHS
-)
+CUTS, LOG_WIDTHS = [0.1, -0.3, 0.6, 0.2], np.log([0.3, 0.2, 0.1, 0.5])
+TREE = TreeAntecedent.build([1, 2, 1, 0], [CUTS, LOG_WIDTHS], PATHS)
 PRODUCTS = {
     name: model for name, model in MODELS.items() if name.startswith(("grid", "one rule, order 1"))
 } | {f"tree, order {order}, {n} outputs": build(TREE, order, n) for order in (0, 1) for n in (1, 2)}

@@ -216,12 +216,8 @@ def test_every_picture_takes_every_name():
         (None, {}, {"day": "Sat", "wet": "no"}, {"day_Sat"}),
         ("first", {}, {"day": "Sat", "wet": "no"}, {"day_Sat"}),
         (["Sat", "no"], {}, {"day": "Sat", "wet": "no"}, set()),
-        (
-            ["Sat", "no"],
-            {"day_Sun": 1, "wet_yes": 1},
-            {"day": "Sun", "wet": "yes"},
-            {"day_Sun", "wet_yes"},
-        ),
+        (["Sat", "no"], {"day_Sun": 1}, {"day": "Sun", "wet": "no"}, {"day_Sun"}),
+        (["Sat", "no"], {"wet_yes": 1}, {"day": "Sat", "wet": "yes"}, {"wet_yes"}),
     ],
 )
 def test_a_category_is_held_at_one_level(drop, held, told, ones, rng):

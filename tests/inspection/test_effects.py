@@ -228,9 +228,7 @@ def test_a_constant_output_has_no_shares():
     assert_allclose(model.feature_importances_, 0.0)
 
 
-@pytest.mark.parametrize(
-    "settings", [{"n_mfs": [3, 2]}, {"n_mfs": 1}, {"partition": "tree"}], ids=str
-)
+@pytest.mark.parametrize("settings", [{"n_mfs": [3, 2]}, {"n_mfs": 1}, {"partition": "tree"}])
 def test_rows_that_are_all_the_same_have_no_shares(settings):
     X = np.random.default_rng(5).uniform(-1.0, 1.0, (60, 2))
     model = quick(**settings).fit(X, 1e5 + np.sin(3.0 * X[:, 0]) * X[:, 1])

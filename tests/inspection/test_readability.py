@@ -119,10 +119,9 @@ def test_rules_that_go_different_ways_beyond_chance(rng):
         "Rules go different ways, beyond chance: by rate up in rule 0 and down in rule 1."
     )
     # Of a slope whose deviation is a hundred times as large nothing can be said.
-    posterior = replace(
-        found.model.posterior, consequents=100.0 * found.model.posterior.consequents
-    )
-    unsure = replace(found, model=replace(found.model, posterior=posterior))
+    model = found.model
+    posterior = replace(model.posterior, consequents=100.0 * model.posterior.consequents)
+    unsure = replace(found, model=replace(model, posterior=posterior))
     assert not [one for one in unsure.findings if "ways" in one]
 
 
@@ -142,8 +141,6 @@ def test_errors_name_the_row_and_the_column(monkeypatch):
     for settings in ({"y": np.ones(39)}, {"sample_weight": np.ones(39)}):
         with pytest.raises(ValueError, match="inconsistent numbers of samples"):
             readability(A_GRID, X, **settings)
-    with pytest.raises(ValueError, match="Negative values in sample_weight: -1 at row 0"):
-        readability(A_GRID, X, sample_weight=-np.ones(40))
     with pytest.raises(ValueError, match=r"X has the shape \(0, 3\)"):
         readability(A_GRID, X[:0])
     with pytest.raises(TypeError, match="must be a fitted ANFIS estimator"):

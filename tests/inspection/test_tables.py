@@ -44,9 +44,8 @@ def test_rules_table_holds_consequents_and_support(model):
 @pytest.mark.parametrize("case", FEWEST, ids=[case.label for case in FEWEST])
 def test_contributions_add_up_to_the_prediction(case):
     """Of all policies; some outputs are held, and some tangents are taken at one place."""
-    model = (
-        case.model.with_out_of_bounds("nan") if case.model.out_of_bounds == "raise" else case.model
-    )
+    model = case.model
+    model = model.with_out_of_bounds("nan") if model.out_of_bounds == "raise" else model
     rows = np.vstack([rows_of(model, 1.0, 10), rows_of(model, 2.0, 30)])
     inside = model.in_bounds(rows)
     assert 0 < inside.sum() < len(rows)

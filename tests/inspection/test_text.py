@@ -146,9 +146,7 @@ def test_the_text_of_a_fit_errs_as_the_last_line_says(partition):
     assert f"\n{cost} numbers; the text as printed errs {told} the" in text
 
 
-@pytest.mark.parametrize(
-    ("name", "said"), [("rate", "no change with rate"), ("on", "no change if on is [01]")]
-)
+@pytest.mark.parametrize(("name", "said"), [("rate", "with rate"), ("on", "if on is [01]")])
 def test_a_rule_without_a_slope_that_the_others_have_says_so(rng, name, said):
     X = np.column_stack([rng.normal(size=(400, 2)), rng.integers(0, 2, 400)])
     y = np.tanh(9.0 * X[:, 0]) + 0.1 * rng.standard_normal(400)
@@ -164,7 +162,7 @@ def test_a_rule_without_a_slope_that_the_others_have_says_so(rng, name, said):
     changes |= {"rule_weights": np.full(3, 1 / 3), "rule_rows": np.full(3, 100.0)}
     model = replace(model, **changes, support=support, posterior=None, term_names=())
     text = export_text(model, precision=17, feature_names=names)
-    assert re.search(said, text.partition("Rule 2,")[2])
+    assert re.search(f"no change {said}", text.partition("Rule 2,")[2])
     assert text.count("no change") == 1
     assert_allclose(predicted(text, X, names), model.predict(X), atol=1e-9)
 
@@ -403,11 +401,8 @@ def test_inputs_that_no_rule_names_are_one_line(rng, n_inputs):
     told = "fibre, x2, x3" if n_inputs == 4 else "29 more inputs"
     text, names = export_text(pipe, precision=17), [f"x{j}" for j in range(n_inputs)]
     listed = text.partition("trained:\n")[2].partition("\nOut")[0].splitlines()
-    assert [line.partition(": ")[0] for line in listed if line[2] != " "] == [
-        "  x0",
-        "  x1",
-        f"  {told}",
-    ]
+    inputs = [line.partition(": ")[0] for line in listed if line[2] != " "]
+    assert inputs == ["  x0", "  x1", f"  {told}"]
     assert listed[-1] == f"  {told}: in no rule"
     assert_allclose(predicted(text, X, names)[:, 0], pipe.predict(table), atol=1e-9)
     # Where nothing is predicted outside, every range counts.
@@ -451,18 +446,14 @@ def test_slopes_that_move_no_digit_are_said_to_be_too_small():
     [
         ({"precision": 0}, ValueError, "precision=0 must be a whole number from 1 to 17"),
         ({"max_shown": 0}, ValueError, "max_shown=0 must be a whole number of 1 or more"),
-        ({"feature_names": ["a"]}, ValueError, "one name for each of .*, all different"),
+        (
+            {"feature_names": ["a"]},
+            ValueError,
+            "feature_names=.* one name for each of .*, all diff",
+        ),
         ({"feature_names": "abc"}, TypeError, "feature_names must be a sequence of str"),
-        (
-            {"feature_names": list("aba")},
-            ValueError,
-            "feature_names=.* one name for each of .*, all different",
-        ),
-        (
-            {"output_names": list("ab")},
-            ValueError,
-            "output_names=.* must hold one name for each of 'y'",
-        ),
+        ({"feature_names": list("aba")}, ValueError, "one name for each of .*, all different"),
+        ({"output_names": list("ab")}, ValueError, "output_names=.* one name for each of 'y'"),
     ],
 )
 def test_parameters_are_checked(settings, error, message):

@@ -33,15 +33,8 @@ class Jang1993:
 
     def premises_at_the_start(self):
         """Bells at the ends of each input that cross in the middle at one half, with b = 2."""
-        low, high = self.X.min(axis=0), self.X.max(axis=0)
-        half = (high - low) / 2
-        return np.stack(
-            [
-                np.array([[a, 2.0, c] for a, c in zip(half, end, strict=True)])
-                for end in (low, high)
-            ],
-            axis=1,
-        )
+        ends = np.stack([self.X.min(axis=0), self.X.max(axis=0)], axis=1)
+        return np.array([[[np.ptp(own) / 2, 2.0, c] for c in own] for own in ends])
 
     def layers_1_to_3(self, premises):
         """Normalised firing strengths of each rule, a column each."""

@@ -51,9 +51,8 @@ def test_widths_go_with_the_mean_distance_to_the_neighbours(antecedent, rng):
         start = locations(antecedent, raw)
         for j, own in moved.items():
             growth = np.log(distances(np.array([t[0] for _, _, t in own])) / distances(start[j]))
-            for (_, family, found), (_, _, expected), widening in zip(
-                own, by_hand[j], growth, strict=True
-            ):
+            every = zip(own, by_hand[j], growth, strict=True)
+            for (_, family, found), (_, _, expected), widening in every:
                 kinds = np.array([p.kind for p in family.parameters])
                 expected = expected + np.where(kinds == "log_width", widening, 0.0)
                 assert_allclose(found[1:], expected[1:], rtol=1e-10, atol=1e-10)

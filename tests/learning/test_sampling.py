@@ -43,9 +43,8 @@ def test_order_and_units_of_rows_and_columns_do_not_matter(rows):
 
 @pytest.mark.parametrize("n_distinct", [300, 2000])
 def test_repeats_are_one_row_of_their_weight(rows, n_distinct, rng):
-    which = np.concatenate(
-        [np.arange(n_distinct), rng.integers(0, n_distinct, N_ROWS - n_distinct)]
-    )
+    more = rng.integers(0, n_distinct, N_ROWS - n_distinct)
+    which = np.concatenate([np.arange(n_distinct), more])
     weight = rng.uniform(0.5, 1.5, N_ROWS)
     repeated = StandardisedData.of(rows.X[which], rows.y[which], weight)
     sample = with_sample(repeated, N_WANTED).sample

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from skanfis.antecedent import GridAntecedent
 from skanfis.learning.data import StandardisedData
+from skanfis.learning.evidence import FREE
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.search import tuning
@@ -22,11 +23,16 @@ def sample_of(X, y, weight=None):
     return search_sample(StandardisedData.of(X, y.reshape(len(X), -1), weight), 20_000)
 
 
+def tuned_on(rows, antecedent, penalty=tuning.FIRST_PENALTY, free=FREE, turns=tuning.MOST_TURNS):
+    """Rules with their weights, after so many turns."""
+    problem = SeparableProblem(rows, antecedent, penalty)
+    premise = Premise.of(antecedent, *rows.inputs.box)
+    return tuning.tune(problem, premise, free, turns)
+
+
 def solved(rows, antecedent):
     """Rules with their consequents, before their premises move."""
-    problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
-    premise = Premise.of(antecedent, *rows.inputs.box)
-    return tuning.tune(problem, premise, ["slope"], turns=0)
+    return tuned_on(rows, antecedent, free=["slope"], turns=0)
 
 
 @pytest.mark.parametrize("told", [[], [(0, 2)], [(0, 3), (2, 2)]])
@@ -51,9 +57,8 @@ def test_scores_of_terms_are_the_formula_term_by_term(rng, count, n_outputs, tol
         share -= np.average(share, axis=0, weights=s)
         return [share[:, k] * basis[:, b] for k in range(count) for b in range(5)]
 
-    known = np.transpose(
-        [function for one in told for function in functions(*one)] or [[0.0] * 150]
-    )
+    known = [function for one in told for function in functions(*one)]
+    known = np.transpose(known or [[0.0] * 150])
     root = np.sqrt(s)
 
     def left(function):

@@ -5,13 +5,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.consequent import basis
 from skanfis.learning.data import StandardisedData
-from skanfis.learning.evidence import FREE
-from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
 from skanfis.membership import Gaussian
-from skanfis.search import conditions, tuning
+from skanfis.search import conditions
 
 from .. import oracles
+from .test_candidates import tuned_on
 
 
 def tuned_rules(rng, n_outputs=1):
@@ -19,10 +18,7 @@ def tuned_rules(rng, n_outputs=1):
     X, weight = rng.normal(size=(200, 3)), rng.uniform(0.5, 2.0, 200)
     y = np.sin(2.0 * X[:, [0]]) * X[:, [1]] + 0.1 * rng.normal(size=(200, n_outputs))
     rows = StandardisedData.of(X, y, weight)
-    antecedent = oracles.random_scattered(rng, Gaussian, 5, [0, 1])
-    problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
-    premise = Premise.of(antecedent, *rows.inputs.box)
-    return tuning.tune(problem, premise, FREE, turns=2)
+    return tuned_on(rows, oracles.random_scattered(rng, Gaussian, 5, [0, 1]), turns=2)
 
 
 def test_what_a_condition_is_worth_is_the_rise_of_the_cost(rng):
@@ -62,8 +58,7 @@ def test_the_condition_that_a_rule_does_not_have_goes(rng):
     y = np.sum(firing * values, axis=0) + 0.1 * rng.normal(size=500)
     rows = StandardisedData.of(X, y[:, None])
     start = rules.change_units(-rows.inputs.offset / rows.inputs.scale, 1.0 / rows.inputs.scale)
-    problem = SeparableProblem(rows, start, tuning.FIRST_PENALTY)
-    tuned = tuning.tune(problem, Premise.of(start, *rows.inputs.box), FREE)
+    tuned = tuned_on(rows, start)
     found = conditions.with_fewer_conditions(tuned)
     assert_array_equal(found.evaluation.antecedent.table, [[0, -1], [1, 2], [3, 4]])
     assert found.expected_error < 1.02 * tuned.expected_error
@@ -74,9 +69,7 @@ def test_every_rule_keeps_a_condition_and_the_evidence_rises(rng):
     # Of noise no condition is worth anything.
     noise = rng.normal(size=tuned.problem.rows.y.shape)
     rows = StandardisedData.of(tuned.problem.rows.X, noise)
-    problem = SeparableProblem(rows, tuned.problem.antecedent, tuned.penalty)
-    premise = Premise.of(problem.antecedent, *rows.inputs.box)
-    tuned = tuning.tune(problem, premise, FREE, turns=1)
+    tuned = tuned_on(rows, tuned.problem.antecedent, tuned.penalty, turns=1)
     found = conditions.with_fewer_conditions(tuned)
     assert found.posterior.minus_twice_log < tuned.posterior.minus_twice_log
     assert_array_equal((found.evaluation.antecedent.table >= 0).sum(axis=1), 1)

@@ -78,9 +78,8 @@ class TestSplits:
         assert_array_equal(np.unique(rows.groups[np.concatenate([j for _, j in folds])]), [1, 2, 3])
         # Of three runs most rows are at an end: the search cannot do without.
         rows = dealt(X[groups < 3], y[groups < 3], groups=groups[groups < 3])
-        assert_array_equal(
-            np.sort(np.concatenate([j for _, j in judging_folds(rows)[0]])), np.arange(300)
-        )
+        judges = np.concatenate([judge for _, judge in judging_folds(rows)[0]])
+        assert_array_equal(np.sort(judges), np.arange(300))
 
     def test_rounding_neither_parts_rows_nor_takes_them_out_of_range(self, rng):
         X, y = measured(rng, 120)

@@ -39,9 +39,10 @@ def sine(x):
 
 def test_of_rules_that_are_given_simplicity_raises_the_agreement(rng):
     """What is told is the error before; an agreement that is given stays."""
-    starts = [
-        of_grid(3, sine, np.random.default_rng(1), 0.3, simplicity=s)[1] for s in (0.0, 0.2, 0.5)
-    ]
+    starts = []
+    for simplicity in (0.0, 0.2, 0.5):
+        rng = np.random.default_rng(1)
+        starts.append(of_grid(3, sine, rng, 0.3, simplicity=simplicity)[1])
     assert len({start.candidates[0]["expected_error"] for start in starts}) == 1
     assert not starts[0].agreement_is_raised
     assert all(start.agreement_is_raised for start in starts[1:])

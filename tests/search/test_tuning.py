@@ -16,17 +16,13 @@ from skanfis.search import tuning
 from skanfis.search.grid import Spacing, grid_antecedent
 
 
-def problem_of(X, y, count):
-    """A problem with so many terms on every input, and its premise."""
-    rows, n_inputs = StandardisedData.of(X, y), X.shape[1]
-    antecedent = grid_antecedent(n_inputs * [Gaussian], n_inputs * [count], Spacing(rows))
+def two_rules_of_a_sine(rng, noise):
+    """Their problem, and its premise."""
+    x = rng.uniform(-1.0, 1.0, (100, 1))
+    rows = StandardisedData.of(x, np.sin(3.0 * x) + noise * rng.normal(size=(100, 1)))
+    antecedent = grid_antecedent([Gaussian], [2], Spacing(rows))
     problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
     return problem, Premise.of(antecedent, *rows.inputs.box)
-
-
-def two_rules_of_a_sine(rng, noise):
-    x = rng.uniform(-1.0, 1.0, (100, 1))
-    return problem_of(x, np.sin(3.0 * x) + noise * rng.normal(size=(100, 1)), 2)
 
 
 @pytest.fixture

@@ -36,9 +36,10 @@ def test_clusterer_that_takes_weights_is_given_them(rng):
 WEIGHTS = ("agreement_", "alpha_", "slope_alpha_", "stiffness_")
 
 
-@pytest.mark.parametrize(
-    "settings", [{"n_mfs": 2}, {"partition": "grid", "max_rules": 4, "simplicity": 0.5}]
-)
+SEARCHED = {"partition": "grid", "max_rules": 4, "simplicity": 0.5}
+
+
+@pytest.mark.parametrize("settings", [{"n_mfs": 2}, SEARCHED])
 def test_weights_given_are_obeyed(settings):
     X, y = data()
     given = {"agreement": 1e-3, "alpha": 0.02, "solver": VariableProjection(stiffness=1e-3)}

@@ -138,9 +138,8 @@ def test_rows_of_weight_are_rows_repeated_where_outliers_are_many(seed):
     """
     rng = np.random.default_rng(seed)
     X = rng.uniform(-1.0, 1.0, (125, 1))
-    y = np.concatenate(
-        [np.sin(3.0 * X[:60, 0]) + 0.05 * rng.normal(size=60), rng.uniform(-8.0, 8.0, 65)]
-    )
+    signal = np.sin(3.0 * X[:60, 0]) + 0.05 * rng.normal(size=60)
+    y = np.append(signal, rng.uniform(-8.0, 8.0, 65))
     weight = np.repeat([6, 1], [60, 65])
     model = ANFISRegressor(loss="huber", partition="grid", max_rules=4)
     weighted = clone(model).fit(X, y, sample_weight=weight)
