@@ -16,13 +16,14 @@ SHORT = {"n_mfs": 2, "solver": VariableProjection(tol=0.1)}
 
 @cache
 def plain_predictions():
-    return ANFISRegressor(**SHORT).fit(X, Y).predict(X)
+    """And their deviations."""
+    return ANFISRegressor(**SHORT).fit(X, Y).predict(X, return_std=True)
 
 
 @pytest.mark.parametrize("weight", [5e-324, 1e-310, 1e-300, 1e300, 1e308])
 def test_weights_that_are_all_alike_are_none(weight):
     weighted = ANFISRegressor(**SHORT).fit(X, Y, np.full(len(Y), weight))
-    assert_allclose(weighted.predict(X), plain_predictions(), rtol=0, atol=1e-9)
+    assert_allclose(weighted.predict(X), plain_predictions()[0], rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -45,8 +46,11 @@ def test_what_floats_do_not_hold_is_refused(x_scale, y_scale, message, settings)
 @pytest.mark.parametrize("x_scale", [1e-97, 1e97])
 @pytest.mark.parametrize("y_scale", [1e-97, 1e97])
 def test_what_floats_hold_is_learnt(x_scale, y_scale):
-    found = ANFISRegressor(**SHORT).fit(X * x_scale, Y * y_scale).predict(X * x_scale)
-    assert_allclose(found / y_scale, plain_predictions(), rtol=0, atol=1e-6 * np.ptp(Y))
+    model = ANFISRegressor(**SHORT).fit(X * x_scale, Y * y_scale)
+    found, deviation = model.predict(X * x_scale, return_std=True)
+    expected, of_plain = plain_predictions()
+    assert_allclose(found / y_scale, expected, rtol=0, atol=1e-6 * np.ptp(Y))
+    assert_allclose(deviation / y_scale, of_plain, rtol=1e-5)
 
 
 @pytest.mark.theory

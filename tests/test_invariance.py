@@ -212,10 +212,12 @@ def test_row_without_weight_is_absent(case):
 def assert_weights_are_repeats_in_any_units(model):
     X, y = gyro()
     weight = np.random.default_rng(2).integers(1, 5, len(y))
-    weighted = model.fit(X, y, weight).predict(X)
+    weighted, deviation = model.fit(X, y, weight).predict(X, return_std=True)
     *units, unit = alternating(3, 6)
-    found = model.fit(*repeated(X * units, y * unit, weight)).predict(X * units) / unit
-    assert_allclose(found, weighted, rtol=0, atol=TOLERANCE * np.ptp(y))
+    other = model.fit(*repeated(X * units, y * unit, weight))
+    found, of_other = other.predict(X * units, return_std=True)
+    assert_allclose(found / unit, weighted, rtol=0, atol=TOLERANCE * np.ptp(y))
+    assert_allclose(of_other / unit, deviation, rtol=1e-5)
 
 
 def test_rows_that_stand_for_many_are_chosen_by_weight(monkeypatch):
