@@ -67,14 +67,19 @@ def assert_same_model(one, other, rtol):
         assert_allclose(a[2], b[2], rtol=0.0, atol=10.0 * rtol)
 
 
-def test_coefficients_are_those_of_one_process(few_are_many):
-    X, y = data()
-    single = ANFISRegressor(n_mfs=3).fit(X, y)
+@pytest.mark.parametrize("weighted", [False, True])
+def test_coefficients_are_those_of_one_process(few_are_many, weighted):
+    """Of weights that are no copies as many rows count as their spread leaves, however small."""
+    whole = data()
+    if weighted:
+        whole += (1e-4 * np.random.default_rng(1).uniform(0.5, 1.5, N_ROWS),)
+    single = ANFISRegressor(n_mfs=3).fit(*whole)
     # One partition, even ones, odd and empty ones.
     for chunks in (N_ROWS, 700, (1, 0, N_ROWS - 2, 1, 0)):
-        spread = DaskANFISRegressor(n_mfs=3).fit(*cut(chunks, X, y))
+        spread = DaskANFISRegressor(n_mfs=3).fit(*cut(chunks, *whole))
         assert_same_model(spread, single, 1e-10)
-        assert spread.n_iter_ == single.n_iter_
+        assert (spread.alpha_, spread.n_iter_) == (single.alpha_, single.n_iter_)
+        assert_allclose(spread.noise_std_, single.noise_std_, rtol=1e-10)
         assert spread.readability_.line == single.readability_.line
 
 
@@ -90,17 +95,6 @@ def test_search_by_groups_with_weights_is_that_of_one_process(few_are_many, monk
     errors = [[one["expected_error"] for one in model.structures_] for model in (found, single)]
     assert_allclose(*errors, rtol=1e-9)
     assert_same_model(found, single, 1e-10)
-
-
-def test_weights_that_are_no_copies_count_as_in_one_process(few_are_many):
-    """As many rows as their spread leaves, however small all of them are."""
-    X, y = data()
-    weight = 1e-4 * np.random.default_rng(1).uniform(0.5, 1.5, len(y))
-    single = ANFISRegressor(n_mfs=3).fit(X, y, weight)
-    spread = DaskANFISRegressor(n_mfs=3).fit(*cut(700, X, y, weight))
-    assert spread.alpha_ == single.alpha_
-    assert_allclose(spread.noise_std_, single.noise_std_, rtol=1e-10)
-    assert_same_model(spread, single, 1e-10)
 
 
 def test_few_rows_are_fetched_and_trained_on_as_ever():
