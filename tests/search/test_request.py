@@ -94,11 +94,7 @@ class TestImported:
             ({"n_mfs": 3}, slice(None), r"n_mfs=3 .* for the imported rules"),
             ({"premise_features": ["rate"]}, slice(None), "premise_features=.* has no effect on"),
             ({"order": 0, "max_iter": 0}, slice(None), "order=0 has no effect with max_iter=0"),
-            (
-                {"consequent_features": [2], "max_iter": 0},
-                slice(None),
-                "consequent.* no effect with",
-            ),
+            ({"consequent_features": [2], "max_iter": 0}, slice(None), "consequent_.*no effect"),
         ],
     )
     def test_what_imported_rules_cannot_heed_is_refused(
@@ -134,8 +130,8 @@ TOO_MANY = ", more than max_rules=5.*fewer, or leave max_rules at None"
         ({"max_rules": 5, "n_mfs": [3, 2, 1]}, rf"n_mfs=\[3, 2, 1\] makes 6 rules{TOO_MANY}"),
         ({"max_rules": 5, "n_mfs": 60}, f"n_mfs=60 makes 216,000 rules{TOO_MANY}"),
         (
-            {"max_rules": 5, "partition": KMeans(6, n_init=1)},
-            rf"KMeans\(.*\) makes 6 rules{TOO_MANY}",
+            {"max_rules": 5, "partition": KMeans(6)},
+            rf"partition=KMeans\(.*\) makes 6 rules{TOO_MANY}",
         ),
         ({"max_rules": 0}, "'max_rules' parameter"),
         ({"simplicity": -1}, "'simplicity' parameter"),
