@@ -218,9 +218,10 @@ def with_nan():
     return lazy[NAMES], lazy["error"]
 
 
-def with_other_columns():
+def with_other(change):
+    """Of two partitions the second one is another."""
     table = frame(300)
-    lazy = parts_of(table[:100], table[100:].rename(columns={"rate": "Rate"}))
+    lazy = parts_of(table[NAMES][:100], change(table[NAMES][100:]))
     return lazy, da.from_array(table["error"].to_numpy(), chunks=((100, 200),))
 
 
@@ -250,7 +251,16 @@ def weighted(weight):
     ("make", "error", "message"),
     [
         (with_nan, ValueError, r"Partition 2: .*NaN in column 'rate', first at row 12"),
-        (with_other_columns, ValueError, r"Partition 1: .*has the columns temperature, Rate"),
+        (
+            lambda: with_other(lambda part: part.rename(columns={"rate": "Rate"})),
+            ValueError,
+            r"Partition 1: .*has the columns temperature, Rate",
+        ),
+        (
+            lambda: with_other(lambda part: part.assign(rate="fast")),
+            ValueError,
+            r"Partition 1: .*holds text in column 'rate'",
+        ),
         (with_unknown_chunks, ValueError, r"Partition \d: X has 100 rows and y \d+"),
         (lambda: cut(100, data(300)[0], data(299)[1]), ValueError, "Partition 2: .*100 .* y 99"),
         (of_other_partitions, ValueError, "y has npartitions=2, X 3"),

@@ -141,6 +141,8 @@ def test_errors_name_the_row_and_the_column(monkeypatch):
     for settings in ({"y": np.ones(39)}, {"sample_weight": np.ones(39)}):
         with pytest.raises(ValueError, match="inconsistent numbers of samples"):
             readability(A_GRID, X, **settings)
+    with pytest.raises(ValueError, match="Negative values in sample_weight: -1 at row 0"):
+        readability(A_GRID, X, sample_weight=-np.ones(40))
     with pytest.raises(ValueError, match=r"X has the shape \(0, 3\)"):
         readability(A_GRID, X[:0])
     with pytest.raises(TypeError, match="must be a fitted ANFIS estimator"):

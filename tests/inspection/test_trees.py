@@ -128,3 +128,5 @@ def test_what_cannot_be_drawn_is_refused(rng):
         TreeDisplay.from_estimator(A_TREE, kind="plane")
     with pytest.raises(ValueError, match="kind"):
         TreeDisplay.from_estimator(A_TREE, kind="forest")
+    with pytest.raises(ValueError, match="'y2' is no output"):
+        TreeDisplay.from_estimator(A_TREE, output="y2")
