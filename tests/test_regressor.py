@@ -75,8 +75,6 @@ def test_one_rule_is_ridge_regression_of_standardised_data(alpha, weighted):
 
 
 SETTINGS = {
-    "gaussian grid": {"n_mfs": [3, 2, 1]},
-    "bell grid": {"n_mfs": 2, "mf": "bell"},
     "constant rules": {"n_mfs": 2, "order": 0},
     "clusters": {"partition": KMEANS},
     "clusters of bells": {"partition": KMEANS, "mf": "bell"},

@@ -47,12 +47,8 @@ def test_two_rules_of_order_zero_are_a_sigmoid():
     theta[1] = np.log(SCALE[0])
     group = TermGroup(Gaussian, np.zeros(2, dtype=int), theta)
     antecedent = replace(model.antecedent, groups=(group,), table=np.array([[0], [1]]))
-    model = replace(
-        model,
-        antecedent=antecedent,
-        coefficients=np.array([2.0, 5.0]).reshape(2, 1, 1),
-        term_names=("a", "b"),
-    )
+    values = np.array([2.0, 5.0]).reshape(2, 1, 1)
+    model = replace(model, antecedent=antecedent, coefficients=values, term_names=("a", "b"))
     z = np.array([-0.7, 0.4])
     found = bounds(model, {"time": tuple(OFFSET[0] + SCALE[0] * z)}, tol=1e-6)
     assert_allclose([found.lower[0], found.upper[0]], 2.0 + 3.0 / (1.0 + np.exp(-2.0 * z)), 1e-6)

@@ -241,11 +241,8 @@ def test_rows_that_are_all_the_same_have_no_shares(settings):
 def test_of_draws_what_no_rule_names_has_no_share_at_all(rng):
     X = rng.normal(size=(300, 3))
     y = np.tanh(2.0 * X[:, 0]) + X[:, 1] + 0.1 * rng.standard_normal(300)
-    model = quick(
-        partition=KMeans(3, n_init=1, random_state=0),
-        premise_features=[0],
-        consequent_features=[0, 1],
-    ).fit(X, y)
+    features = {"premise_features": [0], "consequent_features": [0, 1]}
+    model = quick(partition=KMeans(3, n_init=1, random_state=0), **features).fit(X, y)
     table = effects(model, X).table
     assert_allclose(table.loc[[name for name in table.index if "x2" in name]], 0.0, atol=1e-12)
     assert table.loc["x1", "sobol"] > 0.2

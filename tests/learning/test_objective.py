@@ -183,13 +183,8 @@ def test_blocks_and_chunks_change_rounding_alone(case, monkeypatch):
     monkeypatch.setattr(blocks, "FEWEST_ROWS", 8)
     monkeypatch.setattr(blocks, "BLOCK_BYTES", 1)
     monkeypatch.setattr(rows, "_BLOCKS_PER_CHUNK", 3)
-    split = Case(
-        case.problem.antecedent,
-        case.order,
-        case.rows,
-        case.penalty,
-        consequent_inputs=case.problem.consequent_inputs,
-    )
+    inputs = {"consequent_inputs": case.problem.consequent_inputs}
+    split = Case(case.problem.antecedent, case.order, case.rows, case.penalty, **inputs)
     assert len(split.rows.chunks(split.problem._block_rows)) > 10
     for one, other in zip(arrays(*split.at_point()), whole, strict=True):
         assert_all_close(one, other, 1e-9)

@@ -189,10 +189,8 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
 def assert_is_as_planted(rows, premise, truth, beta, evaluation):
     """At new rows."""
     Z = np.random.default_rng(9).uniform(-1.5, 1.5, (len(rows.X.T), 100))
-    expected, phi = (
-        oracles.dense_design(premise.antecedent, parameters, Z, 1)
-        for parameters in (truth, evaluation.antecedent.parameters)
-    )
+    every = truth, evaluation.antecedent.parameters
+    expected, phi = (oracles.dense_design(premise.antecedent, own, Z, 1) for own in every)
     found = rows.targets.offset + rows.targets.scale * (phi @ evaluation.coefficients)
     assert_allclose(found, expected @ beta, atol=1e-6 * rows.targets.scale[0])
 

@@ -30,13 +30,8 @@ HDBSCAN_TAKES_COPY = "copy" in signature(HDBSCAN).parameters
 
 def surface(n_rows=300, seed=0):
     g = np.random.default_rng(seed)
-    frame = pd.DataFrame(
-        {
-            "time": g.uniform(0, 600, n_rows),
-            "temperature": g.uniform(-40, 60, n_rows),
-            "rate": g.uniform(-100, 100, n_rows),
-        }
-    )
+    ranges = {"time": (0, 600), "temperature": (-40, 60), "rate": (-100, 100)}
+    frame = pd.DataFrame({name: g.uniform(*ends, n_rows) for name, ends in ranges.items()})
     y = 0.01 * frame["rate"] * np.sin(frame["temperature"] / 20) + np.exp(-frame["time"] / 200)
     return frame, y + 0.01 * g.normal(size=n_rows)
 
@@ -171,11 +166,8 @@ def test_rules_that_are_given_are_one_candidate(data):
         assert left < told["expected_error"] < 1.3 * left
     # A line says more than the mean, and rules of noise less.
     assert told["rules_beat_mean"]
-    (told,) = (
-        ANFISRegressor(n_mfs=2, alpha=1e-9)
-        .fit(X, np.random.default_rng(0).normal(size=len(y)))
-        .structures_
-    )
+    noise = np.random.default_rng(0).normal(size=len(y))
+    (told,) = ANFISRegressor(n_mfs=2, alpha=1e-9).fit(X, noise).structures_
     assert not told["rules_beat_mean"]
 
 

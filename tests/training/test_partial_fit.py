@@ -373,10 +373,8 @@ def test_a_constant_target_at_first_settles_nothing():
 def test_an_input_that_rounding_alone_changes_has_no_slope_to_leave_out(rng):
     X, y = surface(300)
     wobble = np.where(rng.random(300) < 0.5, 0.3, 0.1 + 0.2)
-    models = [
-        in_chunks(ANFISRegressor(max_rules=2), np.column_stack([still, X]), y, [100, 200])
-        for still in (np.full(300, 0.3), wobble)
-    ]
+    tables = [np.column_stack([still, X]) for still in (np.full(300, 0.3), wobble)]
+    models = [in_chunks(ANFISRegressor(max_rules=2), table, y, [100, 200]) for table in tables]
     exact, found = (model.predict(np.column_stack([wobble, X])) for model in models)
     np.testing.assert_allclose(found, exact, atol=1e-9)
 

@@ -95,12 +95,8 @@ class TestCallbacks:
         pytest.importorskip("rich")
         monitor = ScoringMonitor(scoring="neg_mean_squared_error")
         inner = quick().set_callbacks(monitor)
-        search = GridSearchCV(
-            make_pipeline(StandardScaler(), inner),
-            {"anfisregressor__n_mfs": [2, 3]},
-            cv=2,
-            n_jobs=1,
-        )
+        pipeline = make_pipeline(StandardScaler(), inner)
+        search = GridSearchCV(pipeline, {"anfisregressor__n_mfs": [2, 3]}, cv=2, n_jobs=1)
         search.set_callbacks(ProgressBar())
         search.fit(X, Y)
         assert "GridSearchCV" in capsys.readouterr().out
