@@ -164,8 +164,9 @@ def _check_time(log, unit, runs):
         raise LogError(
             f"time does not increase within a run: {time[row]:.13g} s after {before[row]:.13g} s "
             f"({counted(bad.size, 'such row')}). Rows must be in the order of time, each with a "
-            "time of its own; if several runs follow each other, say which column tells them apart "
-            "(run=NAME).",
+            "time of its own. Runs that follow each other, also if a counter begins again between "
+            "them, need different labels in a column. If none was found, add one, or say which "
+            "column tells them apart (run=NAME).",
             "time",
             row,
         )

@@ -361,6 +361,13 @@ def test_a_counter_of_32_bits_that_begins_again_goes_on(tmp_path, truth, name, u
     assert told in "; ".join(reading.notes)
 
 
+def test_a_counter_that_begins_again_in_a_pause_needs_labels_of_runs(tmp_path, truth):
+    table = truth[PARTS[1:]].assign(t_us=2e7 * np.arange(300) % 2**32).drop(index=range(100, 240))
+    with pytest.raises(LogError, match=r"line 102.*if a counter begins again.*need .* labels"):
+        found_in(tmp_path, table)
+    assert found_in(tmp_path, table.assign(run=table.index // 100)).log["run"].nunique() == 2
+
+
 @pytest.mark.parametrize("n_runs", [1, 5])
 def test_rows_from_the_last_to_the_first_are_turned_round(tmp_path, truth, n_runs):
     """Also where the clock of every run begins anew: it jumps up from one to the next then."""
