@@ -257,7 +257,7 @@ def _check_plausible(values, part, unit):
     row = int(np.argmax(bad))
     raise LogError(
         f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
-        f"are outside {low:g} to {high:g}){advice}.",
+        f"outside {low:g} to {high:g}){advice}.",
         part,
         row,
     )

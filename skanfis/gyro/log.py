@@ -313,11 +313,12 @@ class LogFile:
         lacking, bad = missing.sum(), missing.any(axis=1)
         names = {self.layout.name(part): n for part, n in lacking[lacking > 0].items()}
         counts = ", ".join(f"{name!r} in {n:,}" for name, n in names.items())
-        said = f"{self.path}: {bad.sum():,} of {bad.size:,} rows lack a value ({counts})"
+        lack = "lacks" if bad.sum() == 1 else "lack"
+        said = f"{self.path}: {bad.sum():,} of {bad.size:,} rows {lack} a value ({counts})"
         if 2 * bad.sum() > bad.size:
             raise LogError(f"{said}: too many to leave out. Fill them in, or name other columns.")
         place = self.source.place_of(int(bad.idxmax()))
-        self.notes.append(f"{said}; they are left out, the first of them {place}")
+        self.notes.append(f"{said}; left out, first at {place}")
 
     def _numbers(self, column, part):
         numbers = as_numbers(column, self.source.decimal)

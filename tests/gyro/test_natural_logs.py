@@ -383,7 +383,7 @@ def test_rows_from_the_last_to_the_first_are_turned_round(tmp_path, truth, n_run
     [
         ("0,21.5,1.0,1.0", 300, "the clock jumps; what follows, 1 row, is left out"),
         ("9e6,21.5,1.0,1.0", 300, "the clock jumps; what follows, 1 row, is left out"),
-        ("3000,21.", 300, "1 of 301 rows lack a value"),
+        ("3000,21.", 300, "1 of 301 rows lacks a value"),
         ("{same}", 300, "1 repeated row left out"),
     ],
 )
