@@ -222,19 +222,20 @@ class LogFile:
             log = self._in_order(log)
         missing = log.isna()
         missing[[part for part in self._optional if part in log]] = False
+        every = log = log.assign(**{part: "" for part in LABELS if part not in log})
         # Rows that lack another value stay for now: their times still belong to the clock.
-        log = log[~missing[[part for part in ("time", *LABELS) if part in log]].any(axis=1)]
-        log = log.assign(**{part: "" for part in LABELS if part not in log})
+        log = log[~missing[[part for part in ("time", *LABELS) if part in missing]].any(axis=1)]
         if self._is_command and "time" in log and "run" not in self.layout.places and len(log):
             runs = self._told_by_clock(log["time"].to_numpy())
-            log = log[: len(runs)].assign(run=runs)
+            every = log = log[: len(runs)].assign(run=runs)
         if "time" in log:
             # From all rows, also those that lack a value.
-            log["power_on"] = log.groupby(list(LABELS), observed=True)["time"].transform("first")
+            by_run = log.groupby(list(LABELS), observed=True)["time"]
+            log = log.assign(power_on=by_run.transform("first"))
         is_whole = ~missing.any(axis=1)
         if not is_whole.all():
-            self._note_gaps(missing)
             log = log[is_whole[log.index]]
+            self._note_gaps(missing, every, log)
         return log
 
     def _converted(self):
@@ -309,7 +310,7 @@ class LogFile:
         )
         return pd.Categorical.from_codes(code, [str(k + 1) for k in range(code[-1] + 1)])
 
-    def _note_gaps(self, missing):
+    def _note_gaps(self, missing, *logs):
         lacking, bad = missing.sum(), missing.any(axis=1)
         names = {self.layout.name(part): n for part, n in lacking[lacking > 0].items()}
         counts = ", ".join(f"{name!r} in {n:,}" for name, n in names.items())
@@ -318,7 +319,10 @@ class LogFile:
         if 2 * bad.sum() > bad.size:
             raise LogError(f"{said}: too many to leave out. Fill them in, or name other columns.")
         place = self.source.place_of(int(bad.idxmax()))
-        self.notes.append(f"{said}; left out, first at {place}")
+        runs, left = (log.groupby(list(LABELS), observed=True).size().index for log in logs)
+        lost = [" / ".join(filter(None, labels[::-1])) for labels in runs if labels not in left]
+        of_runs = f"; no row is left of run {', '.join(map(repr, lost))}" if lost else ""
+        self.notes.append(f"{said}; left out, first at {place}{of_runs}")
 
     def _numbers(self, column, part):
         numbers = as_numbers(column, self.source.decimal)

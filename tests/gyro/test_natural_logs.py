@@ -77,6 +77,12 @@ def test_rows_that_lack_a_value_are_counted_and_lines_stay_right(tmp_path, truth
         assert reading.name_row(row).endswith(f"line {kept.index[row] + 2}")
     with pytest.raises(LogError, match="line 212, column 'time': the value is missing"):
         found(tmp_path / "log.csv", guess=False)
+    # A run of which nothing is left is named.
+    labels = {"run": truth["run"] + 1, "device": "A"}
+    for part, lost, run in (("output", table, "2"), ("time", table.assign(**labels), "A / 2")):
+        lost = lost.assign(**{part: lost[part].mask(labels["run"] == 2)})
+        told = f"; left out, first at line 7; no row is left of run {run!r}"
+        assert found_in(tmp_path, lost).notes[-1].endswith(told)
     table.loc[100:, "rate"] = ""
     with pytest.raises(LogError, match=r"rows lack a value .* too many to leave out"):
         found_in(tmp_path, table)
