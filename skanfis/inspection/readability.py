@@ -159,6 +159,8 @@ class Readability:
         is_poor = found.rule_errors > np.maximum(GREATEST_ERROR * found.rule_spreads, _ROUNDING)
         # On a few rows, even a constant may be exact: these rules are not compared.
         is_poor &= ~self._is_on_few[:, None]
+        if self.is_of_chunk:
+            is_poor &= (found.rule_rows >= self._said.n_numbers)[:, None]
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
             both = found.rule_errors[r, k], found.rule_spreads[r, k]

@@ -98,6 +98,9 @@ def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
     assert readability(of_one_row, X, y).findings == [
         "Strongest on fewer rows than its sentence has numbers: rule 1 (rows: 1, numbers: 2)."
     ]
+    for n_rows, told in ((1, False), (2, True)):
+        chunk = readability(poor.model, X[-n_rows:], y[-n_rows:])
+        assert ("constant" in str(replace(chunk, is_of_chunk=True))) == told
 
 
 def test_rows_are_counted_whatever_the_unit_of_the_weights(rng):
