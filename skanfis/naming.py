@@ -129,6 +129,13 @@ def default_output_names(n_outputs):
     return ("y",) if n_outputs == 1 else tuple(f"y{k}" for k in range(n_outputs))
 
 
+def target_names(y, n_outputs):
+    """The name of a Series or names of a frame's columns, if all are str; else the default ones."""
+    names = list(getattr(y, "columns", [getattr(y, "name", None)]))
+    is_named = len(names) == n_outputs and all(isinstance(name, str) and name for name in names)
+    return tuple(names) if is_named else default_output_names(n_outputs)
+
+
 def given_term_names(model, names):
     """Names of all terms, given for every input or by input; ValueError if they do not fit."""
     antecedent, input_names = model.antecedent, model.input_names

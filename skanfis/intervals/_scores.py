@@ -30,7 +30,7 @@ from .._validation import (
 )
 from ..exceptions import OutOfBoundsWarning
 from ..export.folding import final_step
-from ..naming import default_output_names
+from ..naming import target_names
 
 # Least deviation, relative to the target's range: that of an exact fit is zero.
 _LEAST_DEVIATION = 1e-12
@@ -66,7 +66,7 @@ def checked_targets(y, sample_weight, groups):
     if not targets.size:
         raise ValueError("y has no rows: at least 2 are needed, one of them to be held out.")
     by_output = targets.reshape(len(targets), -1)
-    check_finite(by_output, "y", default_output_names(by_output.shape[1]))
+    check_finite(by_output, "y", target_names(y, by_output.shape[1]))
     if sample_weight is not None:
         with named_refusals(sample_weight=sample_weight):
             sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)

@@ -21,7 +21,7 @@ from ..learning.data import StandardisedData, check_scales
 from ..learning.objective import Evaluation, SeparableProblem
 from ..learning.premise import Premise
 from ..model import TSKModel
-from ..naming import default_output_names
+from ..naming import target_names
 from ..search import Start
 
 # scikit-learn's checks of numbers. Whether they are finite is checked here, to name the column.
@@ -67,7 +67,7 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
     """The data, checked, without rows of weight zero; ``is_chunk`` if other chunks may precede."""
     refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
     is_first = not (is_chunk and hasattr(estimator, "model_"))
-    output_names = _target_names(y)
+    given = y
     with named_refusals(X=X, y=y):
         X, y = validate_data(
             estimator,
@@ -83,8 +83,7 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
     if is_first:
         estimator._single_output = y.ndim == 1
     targets = y.reshape(-1, 1) if y.ndim == 1 else y
-    if output_names is None or len(output_names) != targets.shape[1]:
-        output_names = default_output_names(targets.shape[1])
+    output_names = target_names(given, targets.shape[1])
     numbered = [f"x{j}" for j in range(X.shape[1])]
     names = tuple(map(str, getattr(estimator, "feature_names_in_", numbered)))
     check_finite(X, "X", names)
@@ -109,13 +108,6 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
         estimator.monotonic_cst, estimator.constraints, names, targets.shape[1]
     )
     return ValidatedData(X, targets, sample_weight, groups, names, output_names, keep, constraints)
-
-
-def _target_names(y):
-    """The name of a Series or names of a frame's columns, if all are str; else None."""
-    names = getattr(y, "columns", None)
-    names = [getattr(y, "name", None)] if names is None else list(names)
-    return tuple(names) if all(isinstance(name, str) and name for name in names) else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -242,8 +242,10 @@ def test_levels_and_missing_numbers_are_refused_by_name():
     X, y = bent(np.random.default_rng(0), 24)
     with pytest.raises(ValueError, match="y has no rows: at least 2 are needed"):
         ConformalRegressor(RULES).fit(X[:0], y[:0])
-    with pytest.raises(ValueError, match="Input y contains NaN in column 'y', first at row 3"):
-        ConformalRegressor(RULES).fit(X, np.where(np.arange(24) == 3, np.nan, y))
+    for name in ("y", "drift"):
+        bad = pd.Series(np.where(np.arange(24) == 3, np.nan, y), name=name)
+        with pytest.raises(ValueError, match=f"y contains NaN in column '{name}', first at row 3"):
+            ConformalRegressor(RULES).fit(X, bad)
     model = ConformalRegressor(RULES, cv=4).fit(X, y)
     with pytest.raises(ValueError, match=r"coverage=90 must be a number between 0 and 1"):
         model.predict_interval(X, 90)
