@@ -55,10 +55,10 @@ def judging_folds(rows: StandardisedData):
     n_rows, every = rows.n_rows, np.arange(rows.n_rows)
     if n_rows == 1:
         return [(every, every)], True
-    is_grouped = n_groups(rows) > 1
-    is_half = not is_grouped and n_rows >= FOLDS * ENOUGH
+    n_apart = n_groups(rows)
+    is_half = n_apart == 1 and n_rows >= FOLDS * ENOUGH
     found = [(every[1::2], every[::2])] if is_half else folds(rows)
-    times_enough = n_groups(rows) / ENOUGH_GROUPS if is_grouped else n_rows / ENOUGH
+    times_enough = n_apart / ENOUGH_GROUPS if n_apart > 1 else n_rows / ENOUGH
     found = found[: int(np.ceil(len(found) / times_enough))]
     inside = [(grow, _in_range(rows.X, grow, judge)) for grow, judge in found]
     left_out, in_range = (sum(judge.size for _, judge in part) for part in (found, inside))
