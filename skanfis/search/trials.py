@@ -229,7 +229,10 @@ class Trials:
         n_inputs, targets = seen.X.shape[1], unit_scale(seen.y)
         target = TargetRange(targets.minimum, targets.maximum, targets.scale)
         inputs, order = tuned.problem.consequent_inputs, self.plan.order
-        noise = np.sqrt(tuned.posterior.noise_variance)
+        # As in the final model, every output has a noise of its own.
+        squares = np.maximum(tuned.solved.mean_squares, np.finfo(float).tiny)
+        shares = squares / squares.sum() * tuned.posterior.n_outputs
+        noise = np.sqrt(tuned.posterior.noise_variance * shares)
         model = TSKModel(
             antecedent=antecedent,
             initial_antecedent=antecedent,

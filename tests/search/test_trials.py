@@ -45,6 +45,7 @@ def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order)
     rows = dealt_rows(StandardisedData.of(X, y, rng.integers(1, 4, 200).astype(float)))
     is_left = (np.arange(200) % 4 == 0) | (rows.X[:, 0] > 1.5)
     fold, rest = rows.part(~is_left), rows.part(is_left)
+    rest = replace(rest, X=np.where(rest.X > 1.5, 10.0 * rest.X, rest.X))
     trials = Trials(fold, plan_of(3, 200.0, order=order))
     tuned = trials.tuned(trials.larger(kind, trials.larger(kind, trials.one_rule)))
     # Premises have moved, and the last weights are those of the consequents.
@@ -56,7 +57,11 @@ def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order)
     coefficients = dense.coefficients(antecedent.parameters)
     # As predict answers: beyond the range along the tangent, and not far from the target's.
     nearest = np.clip(rest.X, fold.X.min(axis=0), fold.X.max(axis=0))
-    limit = float(f"{1.0 / np.sqrt(tuned.posterior.noise_variance):.3g}")
+    # As far as the output with the most noise supports it.
+    fitted = oracles.dense_design(antecedent, antecedent.parameters, fold.X.T, order) @ coefficients
+    squares = np.average((fitted - fold.y) ** 2, axis=0, weights=fold.weights)
+    most = tuned.posterior.noise_variance * squares.max() / squares.mean()
+    limit = float(f"{1.0 / np.sqrt(most):.3g}")
     way = np.clip(rest.X - nearest, -limit, limit)
 
     def answer(t):
@@ -68,7 +73,7 @@ def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order)
     answers = np.clip(answers, fold.y.min(axis=0) - margin, fold.y.max(axis=0) + margin)
     expected = ((answers - rest.y) ** 2).sum(axis=1)
     assert_allclose(trials.squared_errors(tuned, rest, None), expected, rtol=1e-4, atol=1e-6)
-    assert way.any()
+    assert (way == limit).any()
 
 
 class TestSequences:
