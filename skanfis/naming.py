@@ -94,8 +94,8 @@ def _written(group, own, low, high, fewest):
     names: dict[tuple, str] = {}
     for digits in range(fewest, most + 1):
         written = {}
-        for place, length, is_alone in terms:
-            at = rounded(place, length, digits)
+        ats = rounded(places, lengths, digits)
+        for (place, length, is_alone), at in zip(terms, ats, strict=True):
             # Rounding must not move a cut between rows to where it is beyond all rows.
             if per_width > 1.0 and low < place < high and not low < at < high and digits < most:
                 continue
