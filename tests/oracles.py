@@ -318,9 +318,13 @@ class DenseProblem:
         return complex_step(self.cost, parameters)
 
     def gauss_newton(self, parameters):
-        """Schur complement of J'J, J the Jacobian of all residuals by theta and beta together."""
+        """Schur complement of J'J, J the Jacobian of the residuals by theta and beta together.
+
+        By theta that of the rows alone: the disagreement's is left out.
+        """
         beta = self.coefficients(parameters)
         by_theta = complex_step(lambda p: self.residual_matrix(p) @ beta, parameters)
+        by_theta[len(self.y) :] = 0.0
         orthogonal, _ = np.linalg.qr(self.residual_matrix(parameters))
         total = 0.0
         for k in range(self.y.shape[1]):

@@ -45,7 +45,8 @@ def dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=0):
     The first ``n_known`` of them are known for certain: observed a great many times.
 
     The joint precision is J' J of every residual that the cost is made of, by complex steps, and
-    inverted whole; the noise is what the residual leaves after the trace of the smoother.
+    inverted whole; by the premises that of the rows alone. The noise is what the residual leaves
+    after the trace of the smoother.
     """
     antecedent, inputs = problem.antecedent, problem.consequent_inputs
     order = int(problem.n_basis > 1)
@@ -54,6 +55,7 @@ def dense_deviation(problem, premise, evaluation, new, is_learnt, n_known=0):
     n, p = problem.rows.n_rows, beta.size
     by_beta = dense.residual_matrix(theta)
     by_theta = oracles.complex_step(lambda t: dense.residual_matrix(t) @ beta, theta)
+    by_theta[n:] = 0.0
     x = premise.displacement(theta)
     to_theta = oracles.central_difference(premise.parameters, x)
     jacobian = np.hstack([by_beta, by_theta @ to_theta])

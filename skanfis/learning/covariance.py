@@ -3,7 +3,7 @@ r"""The posterior at the end of a fit, by Laplace's method.
 The precision of consequents and displacements x of the premises is (docs/mathematics.rst)
 
     n / sigma^2  [ M   C' ]        M = Phi' S Phi / W + P ,
-                 [ C   J  ] ,      J = (D' S D + lambda K) / W + kappa I .
+                 [ C   J  ] ,      J = D' S D / W + kappa I .
 
 M is factored first, as in the fit; the Schur complement of J is H + kappa I, H the reduced
 Gauss-Newton matrix. Every output has a sigma of its own for its noise and its consequents; the

@@ -8,9 +8,9 @@ where Q is the matrix of the disagreement V of rules that fire together, and A t
 penalties on the consequents (see ``penalty``). With r the residual and D = (d Phi / d theta) beta,
 
     grad F = [- D' S r + lambda/2 dV] / W ,
-    H      = [D' S D + lambda K - C (Phi' S Phi + W P)^-1 C'] / W ,    C = D' S Phi + lambda L .
+    H      = [D' S D - C (Phi' S Phi + W P)^-1 C'] / W ,    C = D' S Phi .
 
-docs/mathematics.rst derives them, and dV, K and L, the derivatives of V.
+docs/mathematics.rst derives them, and dV, the derivative of V.
 
 One iteration takes two passes over the rows (``passes``). :meth:`SeparableProblem.evaluate` sums
 Phi' S [Phi, r] and gives cost and beta, which is all that a rejected step needs.
@@ -32,7 +32,7 @@ from ..blocks import BLOCK_BYTES, fitting_rows
 from ..consequent import LocalBasis, NormalFactor, outputs_of_rules, rule_masses
 from .data import StandardisedData
 from .gram import DesignMoments
-from .passes import Design, FirstPass, JointPass, SecondPass, own_parameters
+from .passes import Design, FirstPass, JointPass, SecondPass
 from .penalty import CommonLine, Penalty, disagreement_matrix
 
 # Least 1 - h: for a row with a rule to itself it is a rounding error, and r / (1 - h) unbounded.
@@ -118,14 +118,11 @@ class SeparableProblem:
         self.n_basis = 1 + self.consequent_inputs.size
         self.n_columns = antecedent.n_rules * self.n_basis
         self.n_outputs = rows.y.shape[1]
-        self._design = Design(
-            self.consequent_inputs,
-            DesignMoments(antecedent.share_counts, self.n_basis),
-            own_parameters(antecedent),
-        )
+        moments = DesignMoments(antecedent.share_counts, self.n_basis)
+        self._design = Design(self.consequent_inputs, moments)
         self._block_rows = fitting_rows(
             sum(self._design.moments.shape)
-            + 2 * (self.n_columns + self._design.own_parameters.size)
+            + self.n_columns
             + 6 * antecedent.parameters.size
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )

@@ -324,8 +324,8 @@ class TestPremises:
         rough, exact = np.array(errors).T
         assert max(sizes) > 5.0
         assert_allclose(exact, 0.0, atol=0.05)
-        # That of Gauss and Newton leaves out what residuals and disagreement bring.
-        assert_allclose(rough, 0.0, atol=1.0)
+        # The curvature leaves out what residuals and the disagreement bring.
+        assert_allclose(rough, 0.0, atol=2.0)
 
     @pytest.mark.parametrize("seed", [1, 2, 8])
     def test_weight_is_reestimated_where_its_own_evidence_is_largest(self, seed):
