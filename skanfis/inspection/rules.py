@@ -10,9 +10,7 @@ from numpy.typing import ArrayLike
 from .._validation import check_count
 from ..digits import MOST_DIGITS
 from ..export import fold, fold_with_rows
-from ..export.columns import Level
 from ..export.folding import last_step
-from .labels import in_one_line
 from .sentences import Sentences
 
 
@@ -102,21 +100,6 @@ def rename(model, feature_names, output_names):
             )
         model = replace(model, **{kind: tuple(names)})
     return model
-
-
-def with_names_in_one_line(model):
-    """The model with names that stand in one line, and show what they hold."""
-    levels = {
-        in_one_line(name): Level(
-            in_one_line(column), in_one_line(level), tuple(map(in_one_line, others))
-        )
-        for name, (column, level, others) in model.levels.items()
-    }
-    names = {
-        key: tuple(map(in_one_line, getattr(model, key)))
-        for key in ("input_names", "output_names", "term_names")
-    }
-    return replace(model, levels=levels, **names)
 
 
 def rules_table(estimator: Any) -> Any:

@@ -23,6 +23,7 @@ from ..export import fold
 from ..export.columns import categories, columns_of
 from ..learning.data import never_changes
 from ..policies import SILENT, policy_in_words
+from .labels import in_one_line
 from .rules import (
     condition,
     has_training_data,
@@ -31,7 +32,6 @@ from .rules import (
     readability_in_training,
     rename,
     shown_rules,
-    with_names_in_one_line,
 )
 from .sentences import PRECISION, Sentences
 
@@ -192,27 +192,30 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
     for k, name in enumerate(model.output_names):
         cells["then", name] = [_conclusion(said, r, k) for r in chosen]
     with pd.option_context("display.max_colwidth", None):
-        table = pd.DataFrame(cells, index=chosen)
+        table = pd.DataFrame(cells, index=chosen).map(in_one_line).rename(columns=in_one_line)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{counted(model.n_rules, 'rule')}</b>, {_inputs_and_rows(model)}"
-    first = [counts, *map(escape, _deviations(model, found))]
-    parts = [*(f"<div>{line}</div>" for line in first), table]
-    lines = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
+    below = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
     if len(chosen) < model.n_rules:
-        lines.append(f"and {_left_out(model, chosen)}")
+        below.append(f"and {_left_out(model, chosen)}")
     numbers, *findings = _last_lines(said, found)
-    parts += [f"<div>{escape(line)}</div>" for line in [*lines, numbers]]
+    parts = [f"<div>{counts}</div>", _divs(_deviations(model, found)), table]
+    parts.append(_divs([*below, numbers]))
     if findings:
-        told = "".join(f"<div>{escape(line)}</div>" for line in findings)
+        told = _divs(findings)
         parts.append(f"<details><summary>Can they be read one by one?</summary>{told}</details>")
     style = "font-family:sans-serif;font-size:90%;margin:0.5em 0"
     return f'<div style="{style}">{"".join(parts)}</div>'
 
 
+def _divs(lines):
+    return "".join(f"<div>{escape(in_one_line(line))}</div>" for line in lines)
+
+
 def _said(estimator, precision=PRECISION, feature_names=None, output_names=None):
     """The sentences of the rules, and the readability that the fit has found, or None."""
     check_count("precision", precision, 1, MOST_DIGITS)
-    model = with_names_in_one_line(rename(fold(estimator), feature_names, output_names))
+    model = rename(fold(estimator), feature_names, output_names)
     return Sentences.of(model, precision), readability_in_training(estimator, model)
 
 
@@ -344,8 +347,10 @@ def _inputs(said, named):
             continue
         range_of = range_in_digits(model.minimum[j], model.maximum[j], _DIGITS_OF_RANGE)
         lines.append(wrapped(f"{name}: {range_of}", "  ", 6 * " "))
-        width = max((len(term["name"]) for term in terms), default=0)
-        lines += [f"    {term['name'] + ':':<{width + 1}} {_term_text(term, at)}" for term in terms]
+        heads = [f"{in_one_line(term['name'])}:" for term in terms]
+        width = max(map(len, heads), default=0)
+        for head, term in zip(heads, terms, strict=True):
+            lines.append(f"    {head:<{width}} {_term_text(term, at)}")
     lists = categories(model, listed)
     for name, one in lists.items():
         levels = ", ".join([*one.levels, *one.others])
@@ -389,7 +394,7 @@ def _left_out(model, chosen):
 
 def wrapped(text, first="", later=""):
     """The text in lines, with indents for the first and the later ones; no line breaks at a ±."""
-    text = text.replace(" ± ", _UNBROKEN)
+    text = in_one_line(text).replace(" ± ", _UNBROKEN)
     lines = fill(text, _WIDTH, initial_indent=first, subsequent_indent=later)
     return lines.replace(_UNBROKEN, " ± ")
 
