@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from ..blocks import add_each
 from ..bounds.constraints import Constraints
-from ..inspection.measures import measures_of, rule_sums
+from ..inspection.measures import measure_rows
 from ..inspection.readability import Readability
-from ..inspection.sentences import Sentences
 from ..learning.data import column_statistics
 from ..learning.sampling import is_many
 from ..regressor import ANFISRegressor
@@ -145,14 +143,7 @@ class DaskANFISRegressor(ANFISRegressor):
     def _readability(self, data):
         if not isinstance(data, ClusterData):
             return super()._readability(data)
-        rows = data.rows()
-        # The posterior is not needed, and is most of a model's bytes.
-        printed = Sentences.of(self.model_).printed
-        model, printed = (replace(one, posterior=None) for one in (self.model_, printed))
-        sums = rows.reduce(
-            lambda own: rule_sums(model, printed, own.targets, own.X, own.y, own.weights), add_each
-        )
-        return Readability(self.model_, measures_of(rows.targets, sums))
+        return Readability(self.model_, measure_rows(self.model_, data.rows()))
 
 
 def _predicted(block, model, names, is_deviation):

@@ -9,14 +9,14 @@ The error of a rule is that of its f_r to the target, on the rows on which it is
 spread is the standard deviation of the target there. Means are by the rows' weights.
 """
 
-from dataclasses import dataclass
-from functools import reduce
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ..antecedent import strongest_rules
-from ..blocks import LARGE_BLOCK_ROWS, add_each, fitting_rows, row_blocks
-from ..learning.data import column_statistics
+from ..blocks import add_each, fitting_rows, row_blocks
+from ..learning.data import StandardisedData
 from .sentences import Sentences
 
 
@@ -39,37 +39,53 @@ def measure(model, X, y=None, sample_weight=None):
     """Measure the rules on rows; if y is None, the predictions are the target."""
     if y is None:
         y = model.with_out_of_bounds("clip").predict(X)
-    y = np.asarray(y, dtype=float)
-    weight = np.ones(len(X)) if sample_weight is None else np.asarray(sample_weight, dtype=float)
-    target = column_statistics(y[weight > 0.0], weight[weight > 0.0])
+    if sample_weight is not None and not np.all(sample_weight):
+        kept = sample_weight > 0.0
+        X, y, sample_weight = X[kept], y[kept], sample_weight[kept]
+    return measure_rows(model, StandardisedData.of(X, y, sample_weight))
+
+
+def measure_rows(model, rows):
+    """Measure the rules on ``StandardisedData``, or on rows that stay on a cluster."""
     printed = Sentences.of(model).printed
-    sums = (
-        rule_sums(model, printed, target, X[part], y[part], weight[part])
-        for part in row_blocks(len(X), LARGE_BLOCK_ROWS)
+    # The posterior is not needed, and is most of the bytes that a cluster is sent.
+    model, printed = (replace(one, posterior=None) for one in (model, printed))
+    of_rows = partial(_sums, model=model, printed=printed, target=rows.targets)
+    weight, mass, lead, alone, rule_errors, first, second, errors, printed_errors = rows.reduce(
+        of_rows, add_each
     )
-    return measures_of(target, reduce(add_each, sums))
+    n_led = lead[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return Measures(
+            deviation=rows.targets.scale,
+            rule_weights=mass / weight,
+            rule_rows=lead,
+            rule_alone=np.sqrt(alone / n_led),
+            alone=np.sqrt(alone.sum(axis=0) / weight),
+            rule_errors=np.sqrt(rule_errors / n_led),
+            rule_spreads=np.sqrt(np.maximum(second - first**2 / n_led, 0.0) / n_led),
+            errors=np.sqrt(errors / weight),
+            printed_errors=np.sqrt(printed_errors / weight),
+        )
 
 
-def rule_sums(model, printed, target, rows, y, weight):
-    """The sums that :func:`measures_of` takes, over some rows; those of more rows are added.
-
-    ``target`` is the scale of all of them; ``printed`` the model as it is printed.
-    """
-    kept, scale = weight > 0.0, target.scale
-    rows, y, weight = rows[kept], y[kept], weight[kept]
-    by_rule, by_printed = (_standardised(one, target.offset, scale) for one in (model, printed))
+def _sums(rows, model, printed, target):
+    """The sums over some rows; ``target`` is the scale of all, ``printed`` the model as printed."""
+    offset, scale, weight = target.offset, target.scale, rows.weights
+    by_rule, by_printed = (_standardised(one, offset, scale) for one in (model, printed))
     mass, lead = np.zeros((2, model.n_rules))
     alone, rule_errors, first, second = np.zeros((4, model.n_rules, model.n_outputs))
     errors, printed_errors = np.zeros((2, model.n_outputs))
-    for part in row_blocks(len(rows), fitting_rows(8 * model.n_rules + model.antecedent.n_terms)):
-        Z, s = np.array(rows[part].T, dtype=float, order="C"), weight[part]
+    n_values = 8 * model.n_rules + model.antecedent.n_terms
+    for part in row_blocks(rows.n_rows, fitting_rows(n_values)):
+        Z, s = np.array(rows.X[part].T, dtype=float, order="C"), weight[part]
         np.clip(Z, model.minimum[:, None], model.maximum[:, None], out=Z)
         strengths, basis = model.antecedent.strengths(Z), model.basis(Z)
         as_printed = printed.antecedent.strengths(Z)
         mass += strengths @ s
         strongest = s * (np.arange(model.n_rules)[:, None] == strongest_rules(strengths))
         lead += strongest.sum(axis=1)
-        for k, of_target in enumerate(((y[part] - target.offset) / scale).T):
+        for k, of_target in enumerate(((rows.y[part] - offset) / scale).T):
             values, output = _outputs(by_rule[k], strengths, basis)
             alone[:, k] += np.einsum("rn,rn->r", strongest, (values - output) ** 2)
             rule_errors[:, k] += np.einsum("rn,rn->r", strongest, (values - of_target) ** 2)
@@ -79,25 +95,7 @@ def rule_sums(model, printed, target, rows, y, weight):
             told = _outputs(by_printed[k], as_printed, basis)[1]
             printed_errors[k] += s @ (told - of_target) ** 2
     sums = [mass, lead, alone, rule_errors, first, second, errors, printed_errors]
-    return [float(weight.sum()), *sums]
-
-
-def measures_of(target, sums):
-    """The :class:`Measures` from the sums over all rows."""
-    weight, mass, lead, alone, rule_errors, first, second, errors, printed_errors = sums
-    rows = lead[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return Measures(
-            deviation=target.scale,
-            rule_weights=mass / weight,
-            rule_rows=lead,
-            rule_alone=np.sqrt(alone / rows),
-            alone=np.sqrt(alone.sum(axis=0) / weight),
-            rule_errors=np.sqrt(rule_errors / rows),
-            rule_spreads=np.sqrt(np.maximum(second - first**2 / rows, 0.0) / rows),
-            errors=np.sqrt(errors / weight),
-            printed_errors=np.sqrt(printed_errors / weight),
-        )
+    return [rows.total_weight, *sums]
 
 
 def _standardised(model, offset, scale):

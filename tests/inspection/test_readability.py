@@ -12,7 +12,7 @@ from sklearn.preprocessing import StandardScaler
 
 from skanfis import ANFISRegressor
 from skanfis.digits import in_digits
-from skanfis.inspection import explain, export_text, measures, readability
+from skanfis.inspection import explain, export_text, readability
 from skanfis.inspection.readability import readability_of_rows
 
 from ..export.rule_bases import MODELS, rows_of
@@ -128,9 +128,8 @@ def test_rules_that_go_different_ways_beyond_chance(rng):
     assert not [one for one in unsure.findings if "ways" in one]
 
 
-def test_errors_name_the_row_and_the_column(monkeypatch):
+def test_errors_name_the_row_and_the_column():
     X = rows_of(A_GRID, 1.0)
-    monkeypatch.setattr(measures, "LARGE_BLOCK_ROWS", 10)
     bad = X.copy()
     bad[33, 1] = np.nan
     with pytest.raises(ValueError, match="'chip temperature', first at row 33; 1 of its 40 values"):
