@@ -101,7 +101,7 @@ def effects(
     x1         0.129 0.129
     x0 and x1  0.742 0.742
     """
-    study = Study.of(estimator, X, groups, output)
+    study = Study.of(estimator, X, output, groups)
     anova, labels = study.anova, study.labels
     ones = [(g,) for g in range(len(labels))]
     subsets = [*ones, *study.pairs()]
@@ -220,12 +220,11 @@ class Study:
     labels: list[str]
     blocks: list[Block]
     levels: dict[str, list[str]]  # by category; the last joins all levels without an indicator
-    is_shown: list[bool]  # whether pictures show a block: if it is one input, or a category
     rows: np.ndarray | None
     anova: ProductAnova | DrawnAnova
 
     @classmethod
-    def of(cls, estimator, X, groups, output):
+    def of(cls, estimator, X, output, groups=None):
         """From an estimator; ValueError as of :func:`effects`."""
         model, rows = fold_with_rows(estimator, X)
         k = checked_position(output, model.output_names, "output")
@@ -263,9 +262,8 @@ class Study:
         taken = {j for inputs in found.values() for j in inputs}
         found |= {name: (j,) for j, name in enumerate(model.input_names) if j not in taken}
         labels, inputs = map(list, zip(*sorted(found.items(), key=itemgetter(1)), strict=True))
-        is_shown = [len(found[label]) == 1 or label not in (groups or {}) for label in labels]
         blocks = _known(model, inputs, rows)
-        return cls(model, k, labels, blocks, levels, is_shown, rows, _anova(model, k, blocks))
+        return cls(model, k, labels, blocks, levels, rows, _anova(model, k, blocks))
 
     def pairs(self):
         """Pairs of blocks by their positions, without those that are zero for want of terms."""

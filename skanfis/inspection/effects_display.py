@@ -1,6 +1,5 @@
 """A picture of the effects of every input, and of the strongest pairs, on the output."""
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Self
 
@@ -37,12 +36,12 @@ class EffectsDisplay:
         The strongest first: "input", "points" (of a category 0, 1, ...), "levels" or None, "share"
         of the variance (Sobol's, of this input alone), "mean" and its "deviation", 0 if not known,
         (n_points,); "terms", the memberships, (n_terms, n_points); "edges" and "counts" of the
-        histogram of the data. Groups of several columns have no curve.
+        histogram of the data.
     pairs : list of dict
         "inputs", "points", "levels" of both, "share", and "effect" (n_points up, n_points across).
     output_name : str
     n_more : int, default=0
-        Inputs, and groups of several columns, that have no curve.
+        Inputs that have no curve.
 
     Examples
     --------
@@ -65,7 +64,6 @@ class EffectsDisplay:
         estimator: Any,
         X: ArrayLike | None = None,
         *,
-        groups: Mapping[str, Sequence[int | str]] | None = None,
         output: int | str = 0,
         max_shown: int = 7,
         ax: Any = None,
@@ -74,7 +72,7 @@ class EffectsDisplay:
 
         Parameters
         ----------
-        estimator, X, groups, output : fitted estimator, array-like, dict, int or str
+        estimator, X, output : fitted estimator, array-like, int or str
             As of :func:`effects`.
         max_shown : int, default=7
             Most curves: those of the largest total shares are shown.
@@ -82,13 +80,8 @@ class EffectsDisplay:
             One for each curve, then one for each pair; None makes a figure.
         """
         check_count("max_shown", max_shown, 1)
-        study = Study.of(estimator, X, groups, output)
-        ones = [(g,) for g in np.flatnonzero(study.is_shown).tolist()]
-        if not ones:
-            raise ValueError(
-                "groups holds every column, and groups have no curves, so there is nothing to draw."
-            )
-        pairs = [(g, h) for g, h in study.pairs() if study.is_shown[g] and study.is_shown[h]]
+        study = Study.of(estimator, X, output)
+        ones, pairs = [(g,) for g in range(len(study.labels))], study.pairs()
         share = dict(zip([*ones, *pairs], study.sobol([*ones, *pairs]), strict=True))
         totals = study.anova.totals()
         ones = sorted(ones, key=lambda one: -totals[one[0]])[:max_shown]

@@ -81,8 +81,6 @@ def test_terms_are_memberships_and_the_strongest_inputs_are_shown():
     assert note.endswith(f"without a curve: {len(display.curves) - 1} more inputs")
     with pytest.raises(ValueError, match="max_shown"):
         EffectsDisplay.from_estimator(model, X, max_shown=0)
-    with pytest.raises(ValueError, match="groups holds every column, and groups have no curves"):
-        EffectsDisplay.from_estimator(model, X, groups={"all": range(3)})
 
 
 @pytest.mark.parametrize(("drop", "levels"), [(None, "abc"), (["a"], "bca"), ("if_binary", "ba")])
