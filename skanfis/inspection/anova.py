@@ -180,33 +180,24 @@ class ProductAnova:
         found = [_times_both(a, b)[1, 1].sum() for a, b in zip(products, own, strict=True)]
         return np.maximum(found, 0.0)
 
-    def _conditionals(self, subsets, X):
-        """E[y | x_v] at rows X in the box, less the mean, (n_subsets, n_rows)."""
-        Z = self.scale.apply(X.T)
-        factors, parts = self.antecedent.factors(Z), {}
-        for g in {g for subset in subsets for g in subset}:
-            inputs, sets, by = self.parts[g]
-            parts[g] = by @ _functions(factors, sets, Z[inputs])
-        found = np.empty((len(subsets), len(X)))
-        for one, subset in zip(found, subsets, strict=True):
-            others = self._others(subset)[:, :, None]
-            one[:] = reduce(_times, (parts[g] for g in subset), others)[1].sum(axis=0)
+    def curve(self, subset, X):
+        """E[y | x_v] at rows X in the box, less the mean."""
+        others, found = self._others(subset)[:, :, None], np.empty(len(X))
+        for part in row_blocks(len(X), fitting_rows(4 * (1 + len(subset)) * self.n_rules)):
+            Z = self.scale.apply(X[part].T)
+            factors = self.antecedent.factors(Z)
+            of_blocks = (
+                by @ _functions(factors, sets, Z[inputs])
+                for inputs, sets, by in (self.parts[g] for g in subset)
+            )
+            found[part] = reduce(_times, of_blocks, others)[1].sum(axis=0)
         return found
 
     def covariances(self, subsets, X):
         """Covariances of E[y | x_v] and y over rows X in the box, and the variance of y there."""
-        subsets = [range(self.n_blocks), *subsets]
-        sums = products = np.zeros(len(subsets))
-        n_values = 4 * self.n_blocks * self.n_rules + len(subsets)
-        for part in row_blocks(len(X), fitting_rows(n_values)):
-            found = self._conditionals(subsets, X[part])
-            sums, products = sums + found.sum(axis=1), products + found @ found[0]
-        found = products / len(X) - sums * sums[0] / len(X) ** 2
-        return found[1:], float(found[0])
-
-    def curve(self, subset, X):
-        """E[y | x_v] at rows X in the box, less the mean."""
-        return self._conditionals([subset], X)[0]
+        y = self.curve(range(self.n_blocks), X)
+        y -= y.mean()
+        return np.array([y @ self.curve(v, X) / len(X) for v in subsets]), float(y.var())
 
 
 def _times(one, other):
