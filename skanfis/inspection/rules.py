@@ -193,38 +193,31 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
         raise ValueError(model.describe_out_of_bounds(rows))
     nearest = np.clip(rows, model.minimum, model.maximum)
     strengths = model.strengths(nearest)
-    values = np.einsum("bn,rbo->nro", model.basis(nearest.T), model.coefficients)
+    values = np.einsum("bn,rbo->nor", model.basis(nearest.T), model.coefficients)
     if model.out_of_bounds == "nan":
         values[~inside] = np.nan
-    n_rows, (n_rules, n_inputs) = len(rows), (model.n_rules, model.n_inputs)
-    way, slopes = np.zeros((n_rows, n_inputs)), np.zeros((n_rows, n_inputs, model.n_outputs))
+    contributions = strengths[:, None] * values
+    row, output, rule = map(np.ravel, np.indices(values.shape))
+    premises = np.array(premise_texts(Sentences.of(model).model), dtype=object)
+    lines = {"row": row, "output": output, "rule": rule, "if": premises[rule]}
+    lines |= {"strength": strengths[row, rule], "value": values.ravel()}
+    tables, said = [lines | {"contribution": contributions.ravel()}], contributions.sum(axis=2)
     if model.out_of_bounds == "linear" and not inside.all():
-        way, slopes = model.way_out(rows), model.tangent_slopes(nearest)
-    beyond = way[:, :, None] * slopes
-    said = np.einsum("nr,nro->no", strengths, values) + beyond.sum(axis=1)
+        way, slopes = model.way_out(rows), model.tangent_slopes(nearest).transpose(0, 2, 1)
+        changes = way[:, None] * slopes
+        row, output, j = np.nonzero(np.broadcast_to(way[:, None] != 0.0, slopes.shape))
+        lines = {"row": row, "output": output, "value": slopes[row, output, j]}
+        lines["if"] = [f"beyond {model.input_names[k]}" for k in j]
+        tables.append(lines | {"contribution": changes[row, output, j]})
+        said += changes.sum(axis=2)
     held = np.nan_to_num(np.clip(said, *model.output_limits) - said)
-    # All possible lines of a row: the rules, the way beyond each input, and "held".
-    strength = np.hstack([strengths, np.full((n_rows, n_inputs + 1), np.nan)])
-    value = np.hstack([values, slopes, np.full((n_rows, 1, model.n_outputs), np.nan)])
-    contribution = np.hstack([strengths[:, :, None] * values, beyond, held[:, None]])
-    has_line = np.ones(contribution.shape, dtype=bool)
-    has_line[:, n_rules:-1] = way[:, :, None] != 0.0
-    has_line[:, -1] = held != 0.0
+    if held.any():
+        row, output = np.nonzero(held)
+        lines = {"row": row, "output": output, "if": "held"}
+        tables.append(lines | {"contribution": held[row, output]})
     # The strongest rule first; lines without a strength last.
-    order = np.argsort(-strength, axis=1, kind="stable")
-    has_line = np.take_along_axis(has_line, order[:, :, None], axis=1)
-    row, output, place = np.nonzero(has_line.transpose(0, 2, 1))
-    source = order[row, place]
-    beyond_names = [f"beyond {name}" for name in model.input_names]
-    texts = [*premise_texts(Sentences.of(model).model), *beyond_names, "held"]
-    return pd.DataFrame(
-        {
-            "row": row,
-            "output": np.array(model.output_names, dtype=object)[output],
-            "rule": pd.Series(source, dtype="Int64").where(source < n_rules),
-            "if": np.array(texts, dtype=object)[source],
-            "strength": strength[row, source],
-            "value": value[row, source, output],
-            "contribution": contribution[row, source, output],
-        }
+    table = pd.concat(map(pd.DataFrame, tables)).sort_values(
+        ["row", "output", "strength"], ascending=[True, True, False], ignore_index=True
     )
+    names = np.array(model.output_names, dtype=object)
+    return table.assign(output=names[table["output"]], rule=table["rule"].astype("Int64"))

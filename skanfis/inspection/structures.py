@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
+import pandas as pd
 
 from ..export.folding import last_step
 from ..search.choice import tolerated
@@ -85,35 +86,32 @@ class StructureDisplay:
         """Draw the candidates on ``ax``, as of :meth:`from_estimator`."""
         ax = self.ax_ = axes_or_new(ax)
         self.figure_ = ax.figure
-        structures = sorted(self.structures, key=lambda one: one["reading_cost"])
-        for kind in dict.fromkeys(one["kind"] for one in structures):
-            own = _places([one for one in structures if one["kind"] == kind])
+        table = pd.DataFrame(self.structures).sort_values("reading_cost", kind="stable")
+        costs, errors = table["reading_cost"], table["expected_error"]
+        for kind, own in table.groupby("kind", sort=False).groups.items():
             color, marker = _KINDS[kind]
-            ax.plot(*own, "-", marker=marker, color=color, linewidth=0.8, label=kind)
-        if poor := [one for one in structures if not one["rules_beat_mean"]]:
+            line = {"marker": marker, "color": color, "linewidth": 0.8, "label": kind}
+            ax.plot(costs[own], errors[own], "-", **line)
+        poor = ~table["rules_beat_mean"]
+        if poor.any():
             label = "rules worse than the mean, one by one"
-            ax.plot(*_places(poor), "x", color="black", markersize=8, label=label)
-        (chosen,) = [one for one in self.structures if one["chosen"]]
-        rules = "one rule" if chosen["rules"] == 1 else f"{chosen['rules']} rules"
+            ax.plot(costs[poor], errors[poor], "x", color="black", markersize=8, label=label)
+        chosen = table["chosen"]
+        n_rules = table["rules"][chosen].item()
+        label = "chosen: one rule" if n_rules == 1 else f"chosen: {n_rules} rules"
         ring = {"markersize": 13, "markerfacecolor": "none", "markeredgecolor": "black"}
-        ax.plot(*_places([chosen]), "o", **ring, label=f"chosen: {rules}")
+        ax.plot(costs[chosen], errors[chosen], "o", **ring, label=label)
         label = f"tolerated, simplicity={self.simplicity:g}"
         ax.axhline(self.tolerance, linestyle="--", color="0.5", linewidth=1, label=label)
-        errors = [one["expected_error"] for one in structures]
         ax.set_xlabel("reading cost, numerals in the rules")
         ax.set_ylabel("error expected of new rows,\nsd of the target")
         _on_logarithms(ax.set_xscale, ax.xaxis)
-        if 0.0 < _FAR_APART * min(errors) < max(errors):
+        if 0.0 < _FAR_APART * errors.min() < errors.max():
             _on_logarithms(ax.set_yscale, ax.yaxis)
         # Above the picture, where it hides no candidate.
         place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.1}
         ax.legend(ncols=2, fontsize="small", frameon=False, **place)
         return self
-
-
-def _places(structures):
-    """Reading costs and errors."""
-    return [[one[key] for one in structures] for key in ("reading_cost", "expected_error")]
 
 
 def _on_logarithms(set_scale, axis):
