@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..options import policy_of
 from ._families import FORMULAS
 from ._numbers import Numbers
+from .folding import fold
 
 # The first version with Softmax along one axis, and ReduceSum with axes as an input.
 _OLDEST_OPSET = 13
@@ -73,8 +73,7 @@ def _convert(scope, node, container):
             f"target_opset={container.target_opset} is too old for an ANFIS: it takes "
             f"{_OLDEST_OPSET} or newer."
         )
-    estimator = node.raw_operator
-    model = estimator.model_.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
+    model = fold(node.raw_operator)
     if model.out_of_bounds == "raise":
         raise ValueError(
             "out_of_bounds='raise' has no counterpart in ONNX, where no value makes a graph fail: "
