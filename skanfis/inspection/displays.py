@@ -155,6 +155,8 @@ class ResponseSurfaceDisplay:
         Value of every other input by its name; the level of a category by its column's.
     points : ndarray of shape (n_samples, 2), default=None
         Rows of data on these inputs.
+    strongest : ndarray of shape (grid_resolution, grid_resolution), default=None
+        The rule that is the strongest at each point; lines show where it changes.
 
     Examples
     --------
@@ -175,6 +177,7 @@ class ResponseSurfaceDisplay:
     output_name: str
     held: dict[str, Any]
     points: np.ndarray | None = None
+    strongest: np.ndarray | None = None
 
     @classmethod
     def from_estimator(
@@ -186,6 +189,7 @@ class ResponseSurfaceDisplay:
         held: dict[str, Any] | None = None,
         output: int | str = 0,
         grid_resolution: int = 60,
+        show_rules: bool = False,
         ax: Any = None,
     ) -> Self:
         """Draw the prediction of a fitted estimator over the range of two inputs.
@@ -201,6 +205,8 @@ class ResponseSurfaceDisplay:
             of a category or of an input that is 0 or 1; which output.
         grid_resolution : int, default=60
             Points on each axis, 2 or more.
+        show_rules : bool, default=False
+            Whether lines show where another rule becomes the strongest.
         ax : matplotlib Axes, default=None
             None makes a figure.
         """
@@ -224,6 +230,7 @@ class ResponseSurfaceDisplay:
         k = checked_position(output, model.output_names, "output")
         (xx0, xx1), rows, others = section_over(model, both, grid_resolution, held)
         coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
+        strongest = model.strengths(rows).argmax(axis=1).reshape(xx0.shape) if show_rules else None
         display = cls(
             xx0=xx0,
             xx1=xx1,
@@ -233,6 +240,7 @@ class ResponseSurfaceDisplay:
             output_name=model.output_names[k],
             held=others,
             points=None if points is None else points[:, both],
+            strongest=strongest,
         )
         return display.plot(ax=ax)
 
@@ -253,6 +261,9 @@ class ResponseSurfaceDisplay:
         white = np.ones((*self.coverage.shape, 4))
         white[..., 3] = 0.85 * np.clip(1.0 - self.coverage, 0.0, 1.0)
         ax.pcolormesh(x, y, white, zorder=1.5)
+        if self.strongest is not None and np.ptp(self.strongest) > 0:
+            borders = np.unique(self.strongest)[1:] - 0.5
+            ax.contour(x, y, self.strongest, levels=borders, colors="black", linewidths=1.0)
         if self.points is not None:
             ax.plot(*self.points.T, ".", color="black", markersize=2, alpha=0.5)
         first, second = map(on_axis, self.input_names)

@@ -1,16 +1,16 @@
-"""Pictures of a tree: its cuts and leaves, or the plane of two inputs that it cuts."""
+"""A picture of a tree: its cuts, and at each leaf the value of a rule."""
 
 from dataclasses import dataclass
 from typing import Any, Self, cast
 
 import numpy as np
 
-from .._validation import check_choice, checked_position
+from .._validation import checked_position
 from ..antecedent import TreeAntecedent
-from ..digits import counted, percent, plain, rounded
+from ..digits import counted, percent, plain
 from ..export import fold
 from ..model import TSKModel
-from .displays import ResponseSurfaceDisplay, axes_or_new, section_over
+from .displays import axes_or_new
 from .labels import as_label
 from .rules import condition, parts_led
 from .sentences import Sentences
@@ -19,18 +19,13 @@ from .sentences import Sentences
 _LETTER, _LEAF, _MARGIN = 0.082, 0.42, 0.3
 # Line width, in points, of a branch that no row takes, and how much wider one is that all take.
 _THIN, _THICK = 0.6, 6.0
-# Points of the plane along each input; digits of values, and the part of it where they may stand.
-_N_POINTS, _DIGITS, _INSIDE = 200, 3, (0.06, 0.94)
 
 
 @dataclass(kw_only=True, eq=False, repr=False)
 class TreeDisplay:
     """A tree of rules: its cuts, and at each leaf the rule's value and part of the rows.
 
-    A branch is thicker if more rows take it. With ``kind="plane"``, the picture is the prediction
-    over the two inputs that are cut, as :class:`ResponseSurfaceDisplay` draws it. Lines show where
-    another rule becomes the strongest, and each rule's value stands in the middle of its rows.
-    ``ax_`` and ``figure_`` are matplotlib's, once drawn.
+    A branch is thicker if more rows take it. ``ax_`` and ``figure_`` are matplotlib's, once drawn.
 
     Parameters
     ----------
@@ -38,7 +33,6 @@ class TreeDisplay:
         Its rule base is a tree.
     output : int, default=0
         The output whose values stand at the leaves.
-    kind : {"tree", "plane"}, default="tree"
 
     Examples
     --------
@@ -53,21 +47,15 @@ class TreeDisplay:
 
     model: TSKModel
     output: int = 0
-    kind: str = "tree"
 
     @classmethod
-    def from_estimator(
-        cls, estimator: Any, *, kind: str = "tree", output: int | str = 0, ax: Any = None
-    ) -> Self:
+    def from_estimator(cls, estimator: Any, *, output: int | str = 0, ax: Any = None) -> Self:
         """Draw the tree of a fitted estimator.
 
         Parameters
         ----------
         estimator : fitted estimator or TSKModel
             As :func:`skanfis.export.fold` takes it; scalers are folded into the cuts.
-        kind : {"tree", "plane"}, default="tree"
-            "plane" is for trees that cut two inputs; the others are held as in
-            :class:`ResponseSurfaceDisplay`.
         output : int or str, default=0
             Which output, by position or name.
         ax : matplotlib Axes, default=None
@@ -76,24 +64,16 @@ class TreeDisplay:
         Raises
         ------
         ValueError
-            If the rules are no tree, or the plane is asked of one that cuts more or fewer inputs.
+            If the rules are no tree.
         """
-        check_choice("kind", kind, ("tree", "plane"))
         model = fold(estimator)
         if not isinstance(model.antecedent, TreeAntecedent):
             raise ValueError(
                 f"The model has {counted(model.n_rules, 'rule')} and is not a tree, so there are "
                 "no cuts to draw. partition='tree' makes a tree if it finds two rules or more."
             )
-        inputs = np.unique(model.antecedent.term_inputs)
-        if kind == "plane" and inputs.size != 2:
-            names = ", ".join(repr(model.input_names[j]) for j in inputs)
-            raise ValueError(
-                f"kind='plane' needs a tree that cuts two inputs, but this tree cuts {names}: use "
-                "kind='tree'."
-            )
         place = checked_position(output, model.output_names, "output")
-        return cls(model=model, output=place, kind=kind).plot(ax=ax)
+        return cls(model=model, output=place).plot(ax=ax)
 
     @property
     def _said(self):
@@ -111,13 +91,7 @@ class TreeDisplay:
         return [f"{plain(value)}  ({percent(share)})" for value, share in both]
 
     def plot(self, *, ax: Any = None) -> Self:
-        """Draw on ``ax``, as of :meth:`from_estimator`."""
-        draw = self._draw_tree if self.kind == "tree" else self._draw_plane
-        draw(ax)
-        self.figure_ = self.ax_.figure
-        return self
-
-    def _draw_tree(self, ax):
+        """Draw the tree on ``ax``, as of :meth:`from_estimator`."""
         model, tree = self.model, cast(TreeAntecedent, self.model.antecedent)
         (order, ends), n_rules = tree.walk, model.n_rules
         # Conditions above and below each node.
@@ -138,6 +112,7 @@ class TreeDisplay:
         last = _LETTER * max(map(len, self.leaves)) + _MARGIN
         size = step * depth.max() + last + _MARGIN, _LEAF * n_rules + _MARGIN
         ax = self.ax_ = axes_or_new(ax, size)
+        self.figure_ = ax.figure
         for k, pair in enumerate(ends):
             start = depth[n_rules + k], height[n_rules + k]
             for end, text in zip(pair, words[k], strict=True):
@@ -153,25 +128,4 @@ class TreeDisplay:
         ax.set_axis_off()
         name = as_label(model.output_names[self.output])
         ax.set_title(f"{name}: what each rule says (its rows)", fontsize="small", loc="left")
-
-    def _draw_plane(self, ax):
-        model, both = self.model, np.unique(self.model.antecedent.term_inputs)
-        surface = ResponseSurfaceDisplay.from_estimator(
-            model, features=both, output=self.output, grid_resolution=_N_POINTS, ax=ax
-        )
-        ax, response = surface.ax_, surface.response
-        self.ax_ = ax
-        axes, rows, _ = section_over(model, both, _N_POINTS, None)
-        strongest = model.strengths(rows).argmax(axis=1).reshape(response.shape)
-        borders = np.arange(model.n_rules - 1) + 0.5
-        ax.contour(*axes, strongest, levels=borders, colors="black", linewidths=1.0)
-        box = {"facecolor": "white", "alpha": 0.7, "linewidth": 0, "boxstyle": "round"}
-        said, low, high = self._said, model.minimum[both], model.maximum[both]
-        # Move each rule's value from the middle of its rows to where the other inputs are held.
-        away = rows[0] - said.places
-        away[:, both] = 0.0
-        values = self.values + np.sum(away * said.slopes[:, :, self.output], axis=1)
-        values = rounded(values, np.ptp(response) or 1.0, _DIGITS)
-        inside = np.clip(said.places[:, both], *low + np.outer(_INSIDE, high - low))
-        for value, center in zip(values, inside, strict=True):
-            ax.text(*center, plain(value), fontsize="small", ha="center", va="center", bbox=box)
+        return self

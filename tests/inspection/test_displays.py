@@ -94,6 +94,27 @@ class TestSurface:
         rise = np.linspace(0.0, 2.0, 49).reshape(7, 7)
         assert np.ptp(self.surface_of(1e12 + rise).surface_.levels) < 3.0
 
+    def test_lines_show_where_another_rule_becomes_the_strongest(self):
+        plain, display = (
+            drawn(ResponseSurfaceDisplay.from_estimator(A_GRID, show_rules=one))
+            for one in (False, True)
+        )
+        others = np.full(display.xx0.size, display.held["rate"])
+        rows = np.column_stack([display.xx0.ravel(), display.xx1.ravel(), others])
+        assert plain.strongest is None
+        assert_array_equal(display.strongest.ravel(), A_GRID.strengths(rows).argmax(axis=1))
+        assert len(display.ax_.collections) == 1 + len(plain.ax_.collections)
+        # A single rule has no borders.
+        model = MODELS["one rule, order 1, 1 outputs"]
+        one = drawn(ResponseSurfaceDisplay.from_estimator(model, show_rules=True))
+        assert not one.strongest.any()
+
+    def test_an_input_of_two_values_is_held_at_the_commoner(self, rng):
+        X = rng.uniform(size=(60, 3))
+        X[:, 2] = rng.random(60) < 0.3
+        display = ResponseSurfaceDisplay.from_estimator(quick([2, 2, 1]).fit(X, X.sum(axis=1)))
+        assert display.held == {"x2": 0.0}
+
     def test_of_a_pipeline_over_its_data(self, fitted):
         pipe, X = fitted
         target = TransformedTargetRegressor(pipe, transformer=MinMaxScaler())

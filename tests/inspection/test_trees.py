@@ -1,4 +1,4 @@
-"""Pictures of a tree whose shape, values and shares are known."""
+"""The picture of a tree whose shape, values and shares are known."""
 
 import re
 
@@ -85,48 +85,12 @@ def test_of_a_category_leaves_say_the_value_of_the_text(rng):
     assert {int(r): float(value) for r, value in told} == dict(enumerate(values))
 
 
-def plane(rng, n_rows=300):
-    X = rng.uniform(-1.0, 1.0, (n_rows, 3))
-    y = np.where(X[:, 0] > 0.2, np.where(X[:, 2] > -0.3, 2.0, 1.0), -1.0)
-    return X, y + 0.01 * rng.normal(size=n_rows)
-
-
-def test_plane_has_the_cuts_and_the_values(rng):
-    X, y = plane(rng)
-    settings = {"premise_features": [0, 2], "order": 0, "max_rules": 3, "simplicity": 0}
-    model = quick(partition="tree", **settings).fit(X, y)
-    display = TreeDisplay.from_estimator(model, kind="plane", ax=plt.figure().add_subplot())
-    values = {round(float(text)) for text in texts(display)}
-    assert values == {-1, 1, 2}
-    for text, place in texts(display).items():
-        row = np.array([[place[0], 0.0, place[1]]])
-        assert abs(model.predict(row)[0] - float(text)) < 0.2
-    assert (display.ax_.get_xlabel(), display.ax_.get_ylabel()) == ("x0", "x2")
-    assert "x1 = " in display.ax_.get_title(loc="left")
-    # A value is that of the plane as it is drawn, and stands in it: the commonest of 0 and 1 is 0.
-    X[:, 1] = rng.random(300) < np.where(X[:, 0] > 0.2, 0.7, 0.2)
-    X[:, 2] = rng.random(300) < 0.5
-    y = X[:, 2] + 4.0 * X[:, 1] * (X[:, 0] > 0.2) + 0.01 * rng.normal(size=300)
-    model = quick(partition="tree", premise_features=[0, 2], max_rules=4, simplicity=0).fit(X, y)
-    display = TreeDisplay.from_estimator(model, kind="plane")
-    assert display.ax_.get_title(loc="left").partition(";")[0] == "x1 = 0"
-    assert display.values.max() > 3.0
-    for text, place in texts(display).items():
-        assert 0.05 < place[1] < 0.95
-        row = np.array([[place[0], 0.0, round(place[1])]])
-        assert abs(model.predict(row)[0] - float(text)) < 0.2
-
-
 def test_what_cannot_be_drawn_is_refused(rng):
-    X, y = plane(rng)
+    X = rng.uniform(-1.0, 1.0, (300, 3))
+    y = np.where(X[:, 0] > 0.2, np.where(X[:, 2] > -0.3, 2.0, 1.0), -1.0)
     with pytest.raises(ValueError, match="The model has 4 rules and is not a tree, so there"):
         TreeDisplay.from_estimator(quick(n_mfs=[2, 1, 2]).fit(X, y))
     with pytest.raises(ValueError, match=r"has 1 rule and is not a tree, .* two rules or more"):
         TreeDisplay.from_estimator(quick(partition="tree").fit(X, X[:, 0]))
-    names = "'time', 'chip temperature', 'rate'"
-    with pytest.raises(ValueError, match=f"two inputs, but this tree cuts {names}"):
-        TreeDisplay.from_estimator(A_TREE, kind="plane")
-    with pytest.raises(ValueError, match="kind"):
-        TreeDisplay.from_estimator(A_TREE, kind="forest")
     with pytest.raises(ValueError, match="'y2' is no output"):
         TreeDisplay.from_estimator(A_TREE, output="y2")
