@@ -1,12 +1,14 @@
 """Convert membership functions between the .fis format and the families of skanfis.
 
-Every function equals a family's textbook mu, with other parameters. The conversions take and give
-lists of floats, for skanfis the natural parameters (widths, not their logarithms). A function that
-no family can represent raises ValueError.
+Every function equals a family's textbook mu, with other parameters. Those of skanfis are
+the natural ones here: widths, not their logarithms. A function that no family can represent raises
+ValueError.
 """
 
 from collections.abc import Callable
+from functools import partial
 from math import log
+from operator import itemgetter
 
 import numpy as np
 
@@ -31,19 +33,12 @@ def theta_of(name, parameters, low, high):
         raise ValueError(
             f"the membership function {shown(name)} is not supported; {', '.join(_FROM_FILE)} are."
         )
-    family, n_parameters, from_file = _FROM_FILE[name]
+    n_parameters, from_file = _FROM_FILE[name]
     if len(parameters) != n_parameters:
         raise ValueError(f"{name} takes {n_parameters} parameters, found {len(parameters)}.")
     if name in ("trimf", "trapmf", "pimf"):
         parameters = _open_flanks(name, parameters, low, high)
-    natural = from_file(*parameters)
-    if name == "trapmf" and parameters[1] == parameters[2]:
-        family, natural = "triangular", natural[:3]
-    if name == "sigmf":
-        family = SIDES[np.sign(parameters[0])].name
-    if name == "psigmf":
-        left, right = np.sign(_from_the_left(parameters)[0])
-        family = PRODUCTS[left, right].name
+    family, *natural = from_file(*parameters)
     theta = []
     for parameter, value in zip(FAMILIES[family].parameters, natural, strict=True):
         if parameter.kind == "location":
@@ -84,17 +79,31 @@ def _corners(center, left, right, plateau):
     return [shoulder - left, shoulder, other_shoulder, other_shoulder + right]
 
 
-def _from_corners(foot, shoulder, other_shoulder, other_foot):
-    return _about_middle(shoulder - foot, shoulder, other_foot - other_shoulder, other_shoulder)
+def _from_corners(family, foot, shoulder, other_shoulder, other_foot):
+    left, right = shoulder - foot, other_foot - other_shoulder
+    return family, *_about_middle(left, shoulder, right, other_shoulder)
 
 
 def _about_middle(left, shoulder, right, other_shoulder):
     left, right = abs(left), abs(right)
     plateau = other_shoulder - shoulder or _POINT * min(left, right)
-    return [0.5 * (shoulder + other_shoulder), left, right, plateau]
+    return 0.5 * (shoulder + other_shoulder), left, right, plateau
 
 
-def _difference_from_file(slope, place, other_slope, other_place):
+def _sigmoids(*numbers):
+    """One or two sigmoids, given by slope and place in turn; signs of slopes decide the family."""
+    pairs = sorted(zip(numbers[::2], numbers[1::2], strict=True), key=itemgetter(1))
+    slopes, places = np.transpose(pairs)
+    if not slopes.all():
+        raise ValueError("a sigmoid of slope 0 is one half everywhere: leave it out.")
+    signs, widths = np.sign(slopes), [1.0 / abs(slope) for slope in slopes.tolist()]
+    if len(pairs) == 1:
+        return SIDES[signs[0]].name, *places, *widths
+    left, right = places
+    return PRODUCTS[tuple(signs)].name, 0.5 * (left + right), 0.5 * (right - left), *widths
+
+
+def _difference(slope, place, other_slope, other_place):
     if slope != other_slope:
         raise ValueError(
             f"dsigmf with slopes {slope:g} and {other_slope:g} is not supported: they must be the "
@@ -102,22 +111,8 @@ def _difference_from_file(slope, place, other_slope, other_place):
             "psigmf."
         )
     # Only the size of the difference counts: neither sign of the slope nor order matters.
-    return _sides_from_file(slope, place, other_slope, other_place)[:3]
-
-
-def _sides_from_file(*numbers):
-    """Natural parameters of one or two sigmoids, given by slope and place in turn."""
-    slopes, places = _from_the_left(numbers)
-    if 0.0 in slopes:
-        raise ValueError("a sigmoid of slope 0 is one half everywhere: leave it out.")
-    left, *right = places
-    ends = [0.5 * (left + right[0]), 0.5 * (right[0] - left)] if right else [left]
-    return [*ends, *(1.0 / abs(slope) for slope in slopes)]
-
-
-def _from_the_left(numbers):
-    pairs = sorted(zip(numbers[::2], numbers[1::2], strict=True), key=lambda pair: pair[1])
-    return list(zip(*pairs, strict=True))
+    _, center, width, flank, _ = _sigmoids(slope, place, other_slope, other_place)
+    return "sigmoid_difference", center, width, flank
 
 
 def _product_to_file(first, second):
@@ -145,18 +140,17 @@ _TO_FILE: dict[str, tuple[str, Callable]] = {
     "sigmoid_falling": ("sigmf", lambda cut, width: [-1.0 / width, cut]),
     **{one.name: ("psigmf", _product_to_file(*signs)) for signs, one in PRODUCTS.items()},
 }
-# By function: its family, the number of its parameters, and their conversion to the family's. For
-# sigmoids the signs of the slopes decide the family.
-_FROM_FILE: dict[str, tuple[str, int, Callable]] = {
-    "gaussmf": ("gaussian", 2, lambda width, c: [c, abs(width)]),
-    "gbellmf": ("bell", 3, lambda width, slope, c: [c, abs(width), slope]),
-    "trimf": ("triangular", 3, lambda left, peak, right: [peak, peak - left, right - peak]),
-    "trapmf": ("trapezoidal", 4, _from_corners),
-    "pimf": ("pi_shaped", 4, _from_corners),
-    "gauss2mf": ("two_sided_gaussian", 4, _about_middle),
-    "smf": ("s_shaped", 2, lambda foot, top: [top, top - foot]),
-    "zmf": ("z_shaped", 2, lambda top, foot: [top, foot - top]),
-    "dsigmf": ("sigmoid_difference", 4, _difference_from_file),
-    "sigmf": ("", 2, _sides_from_file),
-    "psigmf": ("", 4, _sides_from_file),
+# By function: how many parameters it has, and what turns them into a family and its own.
+_FROM_FILE: dict[str, tuple[int, Callable]] = {
+    "gaussmf": (2, lambda width, c: ("gaussian", c, abs(width))),
+    "gbellmf": (3, lambda width, slope, c: ("bell", c, abs(width), slope)),
+    "trimf": (3, lambda left, peak, right: ("triangular", peak, peak - left, right - peak)),
+    "trapmf": (4, partial(_from_corners, "trapezoidal")),
+    "pimf": (4, partial(_from_corners, "pi_shaped")),
+    "gauss2mf": (4, lambda *numbers: ("two_sided_gaussian", *_about_middle(*numbers))),
+    "smf": (2, lambda foot, top: ("s_shaped", top, top - foot)),
+    "zmf": (2, lambda top, foot: ("z_shaped", top, foot - top)),
+    "dsigmf": (4, _difference),
+    "sigmf": (2, _sigmoids),
+    "psigmf": (4, _sigmoids),
 }
