@@ -228,7 +228,7 @@ class ResponseSurfaceDisplay:
                     f"data (always {model.minimum[j]:g}). Name two inputs that vary."
                 )
         k = checked_position(output, model.output_names, "output")
-        (xx0, xx1), rows, others = section_over(model, both, grid_resolution, held)
+        (xx0, xx1), rows, others = _section(model, both, grid_resolution, held)
         coverage = np.ones(len(rows)) if model.support is None else model.coverage(rows)
         strongest = model.strengths(rows).argmax(axis=1).reshape(xx0.shape) if show_rules else None
         display = cls(
@@ -261,14 +261,16 @@ class ResponseSurfaceDisplay:
         white = np.ones((*self.coverage.shape, 4))
         white[..., 3] = 0.85 * np.clip(1.0 - self.coverage, 0.0, 1.0)
         ax.pcolormesh(x, y, white, zorder=1.5)
-        if self.strongest is not None and np.ptp(self.strongest) > 0:
-            borders = np.unique(self.strongest)[1:] - 0.5
-            ax.contour(x, y, self.strongest, levels=borders, colors="black", linewidths=1.0)
+        # Lines around each rule but the first: the rest is the first's.
+        for rule in () if self.strongest is None else np.unique(self.strongest)[1:]:
+            is_here = 1.0 * (self.strongest == rule)
+            ax.contour(x, y, is_here, levels=[0.5], colors="black", linewidths=1.0)
         if self.points is not None:
             ax.plot(*self.points.T, ".", color="black", markersize=2, alpha=0.5)
         first, second = map(on_axis, self.input_names)
         ax.set(xlabel=first, ylabel=second, xlim=(x[0], x[-1]), ylim=(y[0], y[-1]))
         notes = ["pale: few training data"] if np.any(self.coverage < _COVERED) else []
+        notes += [] if self.strongest is None else ["lines: another rule becomes the strongest"]
         ax.set_title(title_of(self.held, *notes), fontsize="small", loc="left")
         return self
 
@@ -304,7 +306,7 @@ def pyplot():
     return plt
 
 
-def section_over(model, both, n_points, held):
+def _section(model, both, n_points, held):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 
     The others take their value in ``held``, or their mean in training, in few digits. An input that

@@ -103,7 +103,9 @@ class TestSurface:
         rows = np.column_stack([display.xx0.ravel(), display.xx1.ravel(), others])
         assert plain.strongest is None
         assert_array_equal(display.strongest.ravel(), A_GRID.strengths(rows).argmax(axis=1))
-        assert len(display.ax_.collections) == 1 + len(plain.ax_.collections)
+        n_more = np.unique(display.strongest).size - 1
+        assert len(display.ax_.collections) == n_more + len(plain.ax_.collections)
+        assert "lines: another rule" in " ".join(display.ax_.get_title(loc="left").split())
         # A single rule has no borders.
         model = MODELS["one rule, order 1, 1 outputs"]
         one = drawn(ResponseSurfaceDisplay.from_estimator(model, show_rules=True))
