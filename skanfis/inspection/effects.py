@@ -16,8 +16,7 @@ from ..export import fold_with_rows
 from ..export.columns import categories
 from ..model import TSKModel
 from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
-from .labels import in_one_line
-from .text import MOST_NAMED
+from .labels import MOST_NAMED, in_one_line
 
 # A note tells of shares that differ by more, and of outputs held on a larger part of combinations.
 _DIFFERENT, _HELD = 0.1, 0.01

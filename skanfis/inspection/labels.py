@@ -5,6 +5,8 @@ from textwrap import TextWrapper, fill
 
 from ..digits import counted
 
+# A sentence names this many things at most, and counts the others.
+MOST_NAMED = 5
 # Joiners, which some scripts need, and blanks between numbers and units.
 _SHOWN = "\u200c\u200d\u00a0\u202f"
 # Inputs that a title names; letters in a line of a title, which is also the most that a picture

@@ -1,6 +1,6 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,12 @@ from sklearn.utils import check_array, check_consistent_length, column_or_1d
 from .._validation import as_numbers, check_finite, positive_weights
 from ..digits import counted, in_digits
 from ..export import fold_with_rows
+from ..export.folding import last_step
 from ..model import TSKModel
-from .labels import in_one_line
+from .labels import MOST_NAMED, in_one_line
 from .measures import Measures, measure
 from .rules import has_training_data, premise_texts
 from .sentences import Sentences
-from .text import MOST_NAMED
 
 # Largest distance of the strongest rule alone from the model, in deviations of the target: that of
 # a model from a target of which it explains three quarters of the variance.
@@ -251,6 +251,26 @@ def readability(
 def readability_of_rows(model, X, y=None, sample_weight=None):
     """Measure a model on arrays that have been checked."""
     return Readability(model, measure(model, X, y, sample_weight))
+
+
+def readability_in_training(estimator, model):
+    """The fit's ``readability_`` for ``model``, the estimator folded and renamed; None if unknown.
+
+    Behind a scaler, numbers are rounded in other units, so the error of the text is not known.
+    """
+    found = getattr(last_step(estimator), "readability_", None)
+    if found is None:
+        return None
+    scale = 1.0 if model.target is None else model.target.spread / found.model.target.spread
+    measures = replace(found.measures, deviation=scale * found.measures.deviation)
+    # Compare sorted numbers: moving columns does not change them.
+    own, fitted = (
+        np.append(np.sort(one.coefficients, axis=1), np.sort(one.antecedent.parameters))
+        for one in (model, found.model)
+    )
+    if not np.array_equal(own, fitted):
+        measures = replace(measures, printed_errors=np.full(model.n_outputs, np.nan))
+    return replace(found, model=model, measures=measures)
 
 
 def _on_signs(said):

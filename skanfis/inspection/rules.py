@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from .._validation import check_count
 from ..digits import MOST_DIGITS
 from ..export import fold, fold_with_rows
-from ..export.folding import last_step
 from .sentences import Sentences
 
 
@@ -60,26 +59,6 @@ def parts_led(model):
     """Part of the training rows on which each rule is the strongest; without data, its weight."""
     rows = model.rule_rows
     return rows / rows.sum() if has_training_data(model) else model.rule_weights
-
-
-def readability_in_training(estimator, model):
-    """The fit's ``readability_`` for ``model``, the estimator folded and renamed; None if unknown.
-
-    Behind a scaler, numbers are rounded in other units, so the error of the text is not known.
-    """
-    found = getattr(last_step(estimator), "readability_", None)
-    if found is None:
-        return None
-    scale = 1.0 if model.target is None else model.target.spread / found.model.target.spread
-    measures = replace(found.measures, deviation=scale * found.measures.deviation)
-    # Compare sorted numbers: moving columns does not change them.
-    own, fitted = (
-        np.append(np.sort(one.coefficients, axis=1), np.sort(one.antecedent.parameters))
-        for one in (model, found.model)
-    )
-    if not np.array_equal(own, fitted):
-        measures = replace(measures, printed_errors=np.full(model.n_outputs, np.nan))
-    return replace(found, model=model, measures=measures)
 
 
 def rename(model, feature_names, output_names):

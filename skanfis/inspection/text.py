@@ -23,22 +23,13 @@ from ..export import fold
 from ..export.columns import categories, columns_of
 from ..learning.data import never_changes
 from ..policies import SILENT, policy_in_words
-from .labels import in_one_line
-from .rules import (
-    condition,
-    has_training_data,
-    parts_led,
-    premise_texts,
-    readability_in_training,
-    rename,
-    shown_rules,
-)
+from .labels import MOST_NAMED, in_one_line
+from .readability import readability_in_training
+from .rules import condition, has_training_data, parts_led, premise_texts, rename, shown_rules
 from .sentences import PRECISION, Sentences
 
 # Most letters of a line; digits of a range.
 _WIDTH, _DIGITS_OF_RANGE = 96, 4
-# A sentence names this many things at most, and counts the others.
-MOST_NAMED = 5
 _UNBROKEN = "\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}"
 # How to compute a prediction; parts in braces that do not apply are left out.
 _HOW = (
