@@ -1,7 +1,7 @@
 """Convert membership functions between the .fis format and the families of skanfis.
 
-Every function equals a family's textbook mu, with other parameters. Those of skanfis are
-the natural ones here: widths, not their logarithms. A function that no family can represent raises
+Every function equals a family's textbook mu, with other parameters. Those of a family are the
+natural ones here: widths, not their logarithms. A function that no family can represent raises
 ValueError.
 """
 
