@@ -6,7 +6,7 @@ value and its place in the file.
 
 import json
 from functools import partial
-from itertools import groupby
+from itertools import chain, groupby
 from math import inf, nan, prod
 
 import numpy as np
@@ -27,7 +27,8 @@ from ..support import RuleSupport
 from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, numbers, shown
 
 FORMAT = "skanfis-model"
-VERSION = 1
+# Version 1 had no trees.
+VERSION = 2
 KINDS: dict[type[Antecedent], str] = {
     GridAntecedent: "grid",
     RuleTableAntecedent: "table",
@@ -103,11 +104,16 @@ def model_of(document):
     """The model that a file's content describes."""
     if not isinstance(document, dict) or document.get("format") != FORMAT:
         raise ValueError(f'not a model of skanfis: it has no "format": "{FORMAT}".')
-    if document.get("version") != VERSION:
+    version = document.get("version")
+    if type(version) is not int or version < 1:
+        raise ValueError(f'"version" is {shown(version)}, not a whole number from 1 on.')
+    if version > VERSION:
         raise ValueError(
-            f'"version" is {shown(document.get("version"))}, this skanfis reads {VERSION}: upgrade '
-            "skanfis to read a later one."
+            f"the file is of version {shown(version)}, this skanfis reads versions 1 to {VERSION}: "
+            "upgrade skanfis to read it."
         )
+    if version == 1:
+        document = _of_version_1(document)
     file = _members({"posterior": None} | document, _FILE, "the file")
     n_rules, n_terms = len(file["rules"]), len(file["terms"])
     n_inputs, n_outputs = len(file["inputs"]), len(file["outputs"])
@@ -174,6 +180,23 @@ def _check_all(holds, message):
     """Raise ValueError with the first place where a condition does not hold."""
     if not np.all(holds):
         raise ValueError(message.format(np.argmin(holds)))
+
+
+def _of_version_1(document):
+    """The document in the present form: with ``tangent_at``, and a triangle as one list."""
+    found = dict(document)
+    if isinstance(found.get("inputs"), list):
+        no_tangent = {"tangent_at": None}
+        found["inputs"] = [
+            one | no_tangent if isinstance(one, dict) else one for one in found["inputs"]
+        ]
+    posterior = found.get("posterior")
+    if isinstance(posterior, dict) and isinstance(posterior.get("consequents"), list):
+        rows = [row if isinstance(row, list) else [row] for row in posterior["consequents"]]
+        n_outputs = len(_list(found.get("outputs"), "outputs"))
+        triangle = {"consequents": list(chain.from_iterable(rows))}
+        found["posterior"] = {"pinned": [[]] * n_outputs} | posterior | triangle
+    return found
 
 
 def _inputs(inputs):

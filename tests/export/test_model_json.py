@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.export import export_json, read_fis, read_json
 from skanfis.export.json_reader import parse_json
@@ -67,8 +67,7 @@ def _set(*path):
 
 
 REFUSED = [
-    (_set("version", 2), '"version" is 2, this skanfis reads 1: upgrade'),
-    (_set("version", True), "version: True is not a whole number"),
+    (_set("version", 3), "of version 3, this skanfis reads versions 1 to 2: upgrade"),
     (_set("format", "pickle"), "not a model of skanfis"),
     (_set("more", 1), "the file has the unknown key 'more'"),
     (lambda d: d.pop("rules"), "the file has no 'rules'"),
@@ -161,6 +160,15 @@ def test_refuses(model, change, message):
     change(document)
     with pytest.raises(ValueError, match=message):
         parse_json(json.dumps(document))
+
+
+def test_files_of_the_first_version_are_read():
+    # Written by the last skanfis that wrote them, which predicted this.
+    model = read_json(Path(__file__).with_name("version_1.json"))
+    value, deviation = model.predict_with_deviation(np.array([[0.3], [4.0], [11.0]]))
+    assert_allclose(value[:, 0], [3.77747601, 0.4999443, 1.04645844], rtol=1e-8)
+    assert_allclose(deviation[:, 0], [0.09150537, 0.08393119, 0.09278191], rtol=1e-6)
+    assert '"version": 2' in export_json(model)
 
 
 @pytest.mark.parametrize(
