@@ -143,8 +143,9 @@ def summary(results):
 def flagged_error(results):
     """The RMS error of held-out rows out of range, if they have rates; else empty."""
     calibration = results.calibration
-    beyond = ~calibration.inside & np.isfinite(calibration.after)
-    return results.shown(rms((calibration.after - results.rate)[beyond])) if beyond.any() else ""
+    error = calibration.after - calibration.rate
+    beyond = ~calibration.inside & np.isfinite(error)
+    return results.shown(rms(error[beyond])) if beyond.any() else ""
 
 
 def compensations(results):
