@@ -22,7 +22,8 @@ from ..naming import distinct
 from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, settle
-from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_source
+from ._numbers import NO_VALUE, as_numbers, clock_form, dated, going_on
+from ._source import open_source
 from ._units import assumed_text, settle_by_all
 from .errors import LogError
 
