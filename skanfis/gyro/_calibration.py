@@ -19,7 +19,7 @@ from ..digits import counted
 from ..exceptions import OutOfBoundsWarning
 from ._checks import LARGEST_AT_REST, find_glitches
 from ._columns import RATE_UNITS, SIGNALS, ask
-from ._simpler import NAMES, ROUNDS, Simpler, make_law, simpler_compensations
+from ._simpler import NAMES, ROUNDS, Compensation, make_law, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, as_written, features
 from .compose import ResidualRegressor, rules_of
@@ -113,7 +113,7 @@ class Calibration:
     before: np.ndarray
     after: np.ndarray
     inside: np.ndarray
-    simpler: list[Simpler]
+    simpler: list[Compensation]
     verdict: Verdict
     n_fit_rows: int
     warnings: list
@@ -185,7 +185,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
     estimator, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
     predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
-    model = Simpler(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
+    model = Compensation(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
     # All compensations are judged on the same rows: those that the model answered in range.
     judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]

@@ -10,7 +10,7 @@ import pandas as pd
 
 from ._checks import PARTS
 from ._columns import CANONICAL, convert, declared_units, unit_in
-from ._source import CLOCK, as_numbers, clock_form, dated
+from ._numbers import CLOCK, as_numbers, clock_form, dated
 from ._units import settle_units
 from .errors import LogError
 

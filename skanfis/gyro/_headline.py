@@ -32,52 +32,50 @@ _MOST_BOXES = 20_000  # per bound; more boxes would only make it tighter
 
 def headline(calibration, unit):
     """A title, and a sentence that gives its reason; errors in ``unit``."""
-    verdict, most = calibration.verdict, calibration.split.most
-    groups = held_out_groups(calibration)
+    verdict, groups = calibration.verdict, held_out_groups(calibration)
     left = {
         name: f"{three_digits(RATE_UNITS[unit] * error)} {unit}"
         for name, error in verdict.rms.items()
     }
-    name, hint = verdict.recommended, ""
-    if name == verdict.model:
-        simpler = [each for each in verdict.rms if each not in (NOTHING, verdict.model)]
-        name = min(simpler, key=verdict.rms.get)
-    if "law" in name and not calibration.recipe.physics:
-        hint = " Rules can learn what the law leaves: --physics."
-    if verdict.recommended == verdict.model:
-        gain = verdict.gains[name]
+    use = verdict.recommended
+    simpler = [name for name in verdict.rms if name not in (NOTHING, verdict.model)]
+    best = min(simpler, key=verdict.rms.get) if use == verdict.model else use
+    is_law = "law" in best and not calibration.recipe.physics
+    hint = " Rules can learn what the law leaves: --physics." if is_law else ""
+    if use == verdict.model:
+        gain = verdict.gains[best]
         factor, low, high = map(three_digits, (gain.factor, gain.low, gain.high))
         return "The fuzzy rules are worth it", (
-            f"They leave {left[verdict.model]} RMS of {left[NOTHING]} on the held-out rows in "
-            f"range; the best of what is simpler, {ARTICLES[name]}, leaves {left[name]} on the "
-            f"same rows. Over the {groups} that is {factor} times as much in the geometric mean "
-            f"(95 % interval {low} to {high}).{hint}"
+            f"They leave {left[use]} RMS of {left[NOTHING]} on the held-out rows in range; the "
+            f"best of what is simpler, {ARTICLES[best]}, leaves {left[best]} on the same rows. "
+            f"Over the {groups} that is {factor} times as much in the geometric mean (95 % "
+            f"interval {low} to {high}).{hint}"
         )
-    title = f"Use {ARTICLES[name]} instead of the fuzzy rules"
-    if name == NOTHING:
-        title = "Leave the gyro as it is: none that was tried is better beyond chance"
-    if most:
+    title = "Leave the gyro as it is" if use == NOTHING else f"Use {ARTICLES[use]}"
+    if most := calibration.split.most:
         cannot, advice = _CYCLE if most == "constant" else _FEW
-        safe = "Leave the gyro as it is" if name == NOTHING else f"Use {ARTICLES[name]}"
-        title, hint = f"{safe}: {cannot}", ""
+        title += f": {cannot}"
+        why = f"Anything more was learnt and judged on the same {advice}, then calibrate again."
+    else:
+        none = ": none that was tried is better beyond chance"
+        title += none if use == NOTHING else " instead of the fuzzy rules"
+        why = (
+            "Nothing more elaborate that was tried is better by more than the scatter over the "
+            f"{groups} can explain (95 %).{hint}"
+        )
+        if verdict.n_groups == 1:
+            why = (
+                "Only one held-out group has rows in range: how far errors scatter between groups "
+                "is not known, so nothing can be shown to be better. Log more groups that overlap."
+                f"{hint}"
+            )
     what = {
         NOTHING: "Without any compensation the error is",
         "constant": "Subtracting a constant leaves",
-    }.get(name, f"{ARTICLES[name].capitalize()} leaves")
-    why = (
-        "Nothing more elaborate that was tried is better by more than the scatter over the "
-        f"{groups} can explain (95 %)."
-    )
-    if most:
-        why = f"Anything more was learnt and judged on the same {advice}, then calibrate again."
-    elif verdict.n_groups == 1:
-        why = (
-            "Only one held-out group has rows in range: how far errors scatter between groups is "
-            "not known, so nothing can be shown to be better. Log more groups that overlap."
-        )
+    }.get(use, f"{ARTICLES[use].capitalize()} leaves")
     return title, (
-        f"{what} {left[name]} RMS on the held-out rows in range; the fuzzy rules leave "
-        f"{left[verdict.model]} on the same rows. {why}{hint}"
+        f"{what} {left[use]} RMS on the held-out rows in range; the fuzzy rules leave "
+        f"{left[verdict.model]} on the same rows. {why}"
     )
 
 

@@ -97,8 +97,9 @@ class Picture(NamedTuple):
 
 
 class Results:
-    """Data for the sections of the report; rates are NaN on rows out of range.
+    """Data for the sections of the report.
 
+    ``rows`` is a table of the log and its compensation, which is NaN on rows out of range.
     All of these are optional: limits; the command line as typed; name, size [bytes] and SHA-256 of
     files; entries of the page's own table.
     """
@@ -106,22 +107,16 @@ class Results:
     def __init__(self, calibration, *, limits=(), typed="", files=(), **entries):
         self.calibration, self.limits = calibration, limits
         self.typed, self.files, self.entries = typed, files, entries
-        self.log, self.rate = calibration.log, calibration.rate
-        self.in_range = calibration.in_range
-        self.before = np.where(self.in_range, calibration.before, np.nan)
-        self.after = np.where(self.in_range, calibration.after, np.nan)
-        self.temperature = self.log["temperature"].to_numpy()
-        self.time = self.log["time"].to_numpy() if "time" in self.log else None
-        self.run = self.log["run"].astype(str) if "run" in self.log else None
-        self.temperature_rate = None
-        if self.time is not None:
+        log, in_range = calibration.log, calibration.in_range
+        known = [name for name in ("rate", "temperature", "time", "run") if name in log]
+        after = np.where(in_range, calibration.after, np.nan)
+        self.rows = log[known].assign(before=calibration.before, after=after)
+        if "time" in log:
             # Needed even if it is no input: it shows what temperature alone cannot compensate.
-            change = features(
-                self.log, ("temperature_rate",), calibration.compensator.time_constant
-            )
-            self.temperature_rate = _PER_MINUTE * change["temperature_rate"].to_numpy()
+            change = features(log, ("temperature_rate",), calibration.compensator.time_constant)
+            self.rows["temperature_rate"] = _PER_MINUTE * change["temperature_rate"]
         # The unit in which errors do not begin with many zeros.
-        is_large = rms((self.before - self.rate)[self.in_range]) > _SMALL
+        is_large = rms((calibration.before - calibration.rate)[in_range]) > _SMALL
         self.unit = "deg/s" if is_large else "deg/h"
         self.symbol = signs(self.unit)
 
@@ -132,15 +127,9 @@ class Results:
     @cached_property
     def merit(self):
         return gyro_report(
-            self.rate,
-            self.calibration.before,
-            self.after,
-            temperature=self.temperature,
-            temperature_rate=self.temperature_rate,
-            time=self.time,
-            run=self.run,
+            **self.rows,
             # At rest there is no scale factor; any full scale will do.
-            full_scale=np.abs(self.rate).max() or 1.0,
+            full_scale=self.rows["rate"].abs().max() or 1.0,
             rate_unit=self.unit,
             allan=not self.no_allan,
             random_state=0,
@@ -151,10 +140,11 @@ class Results:
         """Why there is no Allan deviation; empty if there is one."""
         if find_spec("allantools") is None:
             return "allantools is not installed (pip install allantools)"
-        if self.time is None:
+        if "time" not in self.rows:
             return "the log has no time"
+        error, run = self.rows["after"] - self.rows["rate"], self.rows.get("run")
         try:
-            allan_deviation(self.after - self.rate, self.time, self.run)
+            allan_deviation(error.to_numpy(), self.rows["time"].to_numpy(), run)
         except ValueError as reason:
             return str(reason)
         return ""
@@ -167,27 +157,28 @@ class Results:
     @cached_property
     def pictures(self):
         """The pictures of the held-out rows that make sense for this log, by name."""
-        heat, change = {"temperature": self.temperature}, self.temperature_rate
-        label = "temperature [degC]"
-        found = {
-            "error-by-temperature": {"position": self.temperature, "position_label": label},
+        rows = self.rows
+        rates = rows["rate"], rows["before"].where(rows["after"].notna()), rows["after"]
+        heat, label = rows[["temperature"]], "temperature [degC]"
+        found: dict = {
+            "error-by-temperature": {"position": rows["temperature"], "position_label": label},
             "held-out-groups": {"groups": self.calibration.split.labels.astype(str)},
         }
-        if self.time is not None:
+        if "time" in rows:
             label = "time since power-on [s]"
-            time = features(self.log, ("time",), time_constant=1.0)["time"]
+            time = features(self.calibration.log, ("time",), time_constant=1.0)["time"]
             found["error-by-time"] = {"position": time, "position_label": label}
-        if np.ptp(self.rate):
+            change = rows["temperature_rate"]
+            if change.min() < -SLOWEST < SLOWEST < change.max():
+                found["hysteresis"] = rows[["temperature", "temperature_rate"]]
+        if np.ptp(rows["rate"]):
             found["scale-factor-error"] = found["residual-surface"] = heat
-        if change is not None and change.min() < -SLOWEST < SLOWEST < change.max():
-            found["hysteresis"] = heat | {"temperature_rate": change}
         if not self.no_allan:
-            found["allan-deviation"] = {"time": self.time, "run": self.run}
+            found["allan-deviation"] = rows[[name for name in ("time", "run") if name in rows]]
         pictures = {}
         for subject, (kind, caption) in _PICTURES.items():
             if subject not in found:
                 continue
-            rates = self.rate, self.before, self.after
             unit = None if kind is ScaleFactorErrorDisplay else self.unit
             figure = _figure()
             display = kind.from_predictions(*rates, unit=unit, ax=figure, **found[subject])

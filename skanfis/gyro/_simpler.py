@@ -35,8 +35,8 @@ NAMES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Simpler:
-    """A simple compensation.
+class Compensation:
+    """A compensation: a simple one, or the model that must beat it.
 
     ``after`` is the compensated rate of every row, by the model of ``fold_models`` that had not
     seen its group; ``estimator`` is fitted to all rows. Both are None if the log does not allow
@@ -73,10 +73,10 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
                         raise ValueError(f"it has no finite prediction for {n_lost} rows")
             except ValueError as error:
                 # Only the law fails: the rate never changes, or it has too few rows.
-                yield Simpler(name, predicts, missing=str(error))
+                yield Compensation(name, predicts, missing=str(error))
                 continue
             after = predicted if predicts == "rate" else before - predicted
-            yield Simpler(name, predicts, after, whole, fold_models=made)
+            yield Compensation(name, predicts, after, whole, fold_models=made)
 
 
 def kinds(inputs, policy):

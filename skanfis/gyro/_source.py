@@ -1,9 +1,10 @@
-"""Read the table in a log file: its header, its rows, and columns as numbers."""
+"""Sources of a log: the table in a text file, or one of Parquet, MATLAB or Excel."""
 
 import codecs
 import contextlib
 import csv
 import re
+from collections.abc import Mapping
 from functools import partial
 from itertools import islice
 
@@ -11,13 +12,14 @@ import numpy as np
 import pandas as pd
 
 from ..digits import counted
-from ._columns import evenly_chosen, unit_in
-from ._tables import EXCEL, HEAD_ROWS, MATLAB, PARQUET, ParquetSource, excel_source, matlab_source
-from .errors import LogError
+from ._columns import unit_in
+from ._numbers import NO_VALUE
+from .errors import LogError, needed
 
-# Marks of missing values that loggers write, beside those that pandas knows.
-NO_VALUE = ["-", "--", "---", "?", "ERR", "Err", "ERROR", "Error", "OVF", "#VALUE!", "#DIV/0!"]
-
+_PARQUET, _MATLAB, _EXCEL = (".parquet", ".pq"), (".mat",), (".xlsx", ".xlsm")
+_HDF5 = b"\x89HDF"
+# Enough for the lines that a logger may write above the header, and a few rows.
+_HEAD_ROWS = 60
 # Longer lines are refused at once: csv would take minutes for one.
 _LONGEST_LINE, _MOST_COLUMNS = 2**22, 10_000
 _HEAD_BYTES = 2**16
@@ -28,30 +30,15 @@ _NO_TEXT = re.compile("[\x00-\x08\x0e-\x1f\x7f]")
 _VALUE = re.compile(r"[+\u2212-]?[.,]?[0-9][0-9.,:/TZeE +-]*([AP]M)?$")
 _FRACTION = re.compile(r"[+\u2212-]?[0-9]*([.,])[0-9]+([eE][+-]?[0-9]+)?$")
 
-CLOCK = "hours:minutes:seconds"
-_DATES = "%d.%m.%Y %d.%m.%y %d-%m-%Y %d-%b-%Y %m/%d/%Y %m/%d/%y %d/%m/%Y %d/%m/%y %Y/%m/%d"
-_FORMATS = [
-    CLOCK,
-    "ISO8601",
-    *(
-        f"{date} {clock}"
-        for date in _DATES.split()
-        for clock in ("%H:%M:%S", "%H:%M:%S.%f", "%I:%M:%S %p", "%H:%M")
-    ),
-]
-_CLOCK_ROWS = 200  # from which the format of a clock is found
-_EPOCH = pd.Timestamp(0, tz="UTC")
-_DAY = 86_400.0  # s
-
 
 def open_source(path):
     """The table in a file; LogError where there is none."""
     name = str(path).lower()
-    if name.endswith(PARQUET):
-        return ParquetSource(path)
-    if name.endswith(MATLAB):
-        return matlab_source(path)
-    return excel_source(path, header_place) if name.endswith(EXCEL) else _TextSource(path)
+    if name.endswith(_PARQUET):
+        return _ParquetSource(path)
+    if name.endswith(_MATLAB):
+        return _matlab_source(path)
+    return _excel_source(path) if name.endswith(_EXCEL) else _TextSource(path)
 
 
 class _TextSource:
@@ -67,7 +54,7 @@ class _TextSource:
         if self._encoding != "utf-8-sig":
             self.notes.append(f"the text is read as {self._encoding.upper()}")
         self._find_separator()
-        head = list(islice(self._records(), HEAD_ROWS))
+        head = list(islice(self._records(), _HEAD_ROWS))
         if not head:
             raise LogError(f"{path}: is empty.")
         self._place_header(head)
@@ -78,7 +65,7 @@ class _TextSource:
         """Take the first separator that is on all lines but a preamble's; else a comma."""
         for sign, name in _SEPARATORS.items():
             self._separator = sign
-            lengths = [len(values) for _, values in islice(self._records(), HEAD_ROWS)]
+            lengths = [len(values) for _, values in islice(self._records(), _HEAD_ROWS)]
             # A comma need only be on the last line: blanks, the next choice, are in any text.
             ends = lengths[len(lengths) // 3 :] if sign != "," else lengths[-1:]
             if min(ends, default=0) > 1:
@@ -96,7 +83,7 @@ class _TextSource:
 
     def _place_header(self, head):
         try:
-            place, first, self.header = header_place([values for _, values in head])
+            place, first, self.header = _header_place([values for _, values in head])
         except LogError as error:
             raise LogError(f"{self.path}, line {head[0][0]}: {error}") from error
         self._n_above = first
@@ -198,7 +185,7 @@ class _TextSource:
             raise _no_text(self.path) from error
 
 
-def header_place(rows):
+def _header_place(rows):
     """Find the header among the first rows: its place, that of the first row below, the names.
 
     The header is the last line before those of numbers. Units may have a line of their own.
@@ -207,7 +194,7 @@ def header_place(rows):
     ends = [k for k, values in enumerate(rows) if values[0].strip() == _END_OF_PREAMBLE]
     start = ends[-1] + 1 if ends else 0
     data = [k >= start and _is_data(values) for k, values in enumerate(rows)]
-    if not any(data) and len(rows) == HEAD_ROWS:
+    if not any(data) and len(rows) == _HEAD_ROWS:
         raise LogError(f"has no row of numbers in its first {len(rows)} lines.")
     # A line of the preamble may hold numbers too, but no three such lines in a row.
     together = [
@@ -256,73 +243,110 @@ def _is_data(values):
     return bool(filled) and 2 * sum(bool(_VALUE.match(cell)) for cell in filled) >= len(filled)
 
 
-def as_numbers(column, decimal=".", form=""):
-    """A column as floats; dates, durations and texts in the format ``form`` in s; else NaN."""
-    if form:
-        return _moments(_plain(column), form)
-    if column.dtype.kind == "M":
-        column = pd.to_datetime(column, utc=True) - _EPOCH
-    if column.dtype.kind == "m":
-        return _in_seconds(column)
-    if column.dtype.kind in "iuf":
-        return column.to_numpy(dtype=float, na_value=np.nan)
-    plain = _texts(column).str.replace(decimal, ".").str.replace("\u2212", "-")  # a true minus
-    return pd.to_numeric(plain, errors="coerce").to_numpy(dtype=float, na_value=np.nan)
+class _TableSource:
+    """A table held in memory, as a source; ``first`` is the number of its first row."""
+
+    decimal = "."
+
+    def __init__(self, path, table, notes, first=0):
+        self.path, self.notes, self.header = path, notes, list(map(str, table.columns))
+        self._table, self._first = table.set_axis(range(table.shape[1]), axis=1), first
+
+    def place_of(self, row):
+        return f"row {row + self._first}"
+
+    def table(self, places, labels=(), n_rows=None):
+        return self._table[list(places)][:n_rows].astype(dict.fromkeys(labels, "string"))
 
 
-def clock_form(column):
-    """The time format of most of a column's texts; empty if they are no times."""
-    # To the last row: the 13th of a month may tell it from the day.
-    texts = column.dropna()
-    texts = _plain(texts.iloc[evenly_chosen(len(texts), _CLOCK_ROWS)]).dropna()
-    fits = {form: np.isfinite(_moments(texts, form)).sum() for form in _FORMATS}
-    best = max(_FORMATS, key=lambda form: fits[form])
-    return best if 2 * fits[best] > len(texts) else ""
+class _ParquetSource(_TableSource):
+    """A table of which only the columns asked for are read."""
+
+    def __init__(self, path):
+        told = f"{path}: Parquet needs pyarrow: pip install 'skanfis[parquet]'"
+        parquet = needed("pyarrow.parquet", told)
+        with open(path, "rb"):
+            pass  # raises the same errors as for any other file
+        with _read_as("Parquet", path):
+            # No buffer: it would keep the data as long as the file is open.
+            self._file = parquet.ParquetFile(path, pre_buffer=False)
+        super().__init__(path, pd.DataFrame(columns=self._file.schema_arrow.names), [])
+        if len(set(self.header)) < len(self.header):
+            raise LogError(f"{path}: two columns have one name; rename one of them.")
+
+    def table(self, places, labels=(), n_rows=None):
+        names = [self.header[place] for place in places]
+        with _read_as("Parquet", self.path):
+            if n_rows and self._file.metadata.num_rows > n_rows:
+                found = next(self._file.iter_batches(n_rows, columns=names))
+            else:
+                found = self._file.read(columns=names)
+            columns = {place: found.column(self.header[place]).to_pandas() for place in places}
+        return pd.DataFrame(columns).astype(dict.fromkeys(labels, "string"))
 
 
-def going_on(time, form, counter):
-    """Unwrap times [s], some NaN, at midnight or where a counter overflows; also return such rows.
+def _matlab_source(path):
+    """The vectors of the commonest length in a .mat file, from variables or fields of structs."""
+    with open(path, "rb") as file:
+        head = file.read(516)
+    with _read_as("MATLAB file", path):
+        if _HDF5 in (head[:4], head[512:]):
+            told = "MATLAB 7.3 needs h5py: pip install 'skanfis[logs]'; or save it with -v7"
+            with needed("h5py", f"{path}: {told}").File(path) as tree:
+                found = dict(_vectors(tree))
+        else:
+            from scipy.io import loadmat
 
-    An overflow goes back by the range ``counter`` [s]; any other step back is a reset, and stays.
-    """
-    known = np.flatnonzero(np.isfinite(time))
-    steps = np.diff(time[known], prepend=time[known[:1]])
-    time, back = time.copy(), steps < 0.0
-    if form:
-        time[known] += _DAY * np.cumsum((steps < -0.5 * _DAY) & (form == CLOCK))
-        return time, known[:0]
-    usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else 0.0
-    is_over = back & (np.abs(steps + counter - usual) <= 3.0 * usual)
-    rounds = np.cumsum(is_over)
-    rounds -= np.maximum.accumulate(np.where(back & ~is_over, rounds, 0))
-    time[known] += counter * rounds
-    return time, known[is_over]
-
-
-def dated(dates, times):
-    """Join a column of dates and one of times of day to one of texts."""
-    return _texts(dates).str.cat(_texts(times), sep=" ")
-
-
-def _plain(column):
-    """Texts with single blanks between words, and decimal points."""
-    return _texts(column).str.replace(r",?\s+", " ", regex=True).str.replace(",", ".")
+            found = dict(_vectors(loadmat(path, simplify_cells=True)))
+    lengths = [len(values) for values in found.values() if len(values) > 1]
+    if not lengths:
+        raise LogError(f"{path}: has no vectors of numbers; save them as variables or a struct.")
+    length = max(set(lengths), key=lengths.count)
+    columns = {name: values for name, values in found.items() if len(values) == length}
+    others = sorted(set(found) - set(columns))
+    notes = [f"variables of another length are skipped: {', '.join(others)}"] if others else []
+    return _TableSource(path, pd.DataFrame(columns), notes, first=1)  # MATLAB counts from 1
 
 
-def _moments(texts, form):
-    if form == CLOCK:
-        clocks = texts.where(
-            texts.str.fullmatch(r"[0-9]{1,6}(:[0-9]{1,2}){2}(\.[0-9]*)?", na=False)
-        )
-        return _in_seconds(pd.to_timedelta(clocks, errors="coerce"))
-    return _in_seconds(pd.to_datetime(texts, format=form, errors="coerce", utc=True) - _EPOCH)
+@contextlib.contextmanager
+def _read_as(kind, path):
+    """Raise LogError if a library cannot read the file as its kind."""
+    try:
+        yield
+    except (ImportError, MemoryError):
+        raise
+    except Exception as error:
+        # Damaged archives, XML and compression raise errors of many types.
+        reason = str(error).strip().partition("\n")[0].removesuffix(".")
+        raise LogError(f"{path}: is no {kind} that can be read: {reason}.") from error
 
 
-def _texts(column):
-    """Texts without blanks at the ends; NaN where there is no value."""
-    texts = column.astype(object)
-    return texts.where(column.notna() & ~column.isin(NO_VALUE)).astype("string").str.strip()
+def _vectors(tree):
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _vectors(value)
+        elif not name.startswith(("__", "#")) and np.asarray(value).dtype.kind in "iufU":
+            vector = np.atleast_1d(np.squeeze(value))
+            if vector.ndim == 1:
+                yield name, vector
 
 
-def _in_seconds(durations):
-    return (durations / pd.Timedelta(seconds=1)).to_numpy(dtype=float).copy()
+def _excel_source(path):
+    """The first sheet that holds a table."""
+    told = f"{path}: Excel needs openpyxl: pip install 'skanfis[logs]'; or save it as CSV"
+    needed("openpyxl", told)
+    with _read_as("Excel file", path):
+        sheets = pd.read_excel(path, sheet_name=None, header=None, engine="openpyxl")
+    name, sheet = next(((k, s) for k, s in sheets.items() if s.size), (None, None))
+    if sheet is None:
+        raise LogError(f"{path}: is empty.")
+    notes = [f"of {len(sheets)} sheets {name!r} is read"] if len(sheets) > 1 else []
+    head = sheet.head(_HEAD_ROWS).astype(object)
+    try:
+        place, first, header = _header_place(head.where(head.notna(), "").astype(str).to_numpy())
+    except LogError as error:
+        raise LogError(f"{path}: {error}") from error
+    if place:
+        notes.append(f"the header is row {place + 1}; what is above it is skipped")
+    table = sheet.iloc[first:].reset_index(drop=True).infer_objects()
+    return _TableSource(path, table.set_axis(header, axis=1), notes, first + 1)

@@ -1,11 +1,12 @@
-"""Write the report of a calibration as one HTML page: verdict, tables, pictures, rules, limits."""
+"""Write the report of a calibration as one HTML page: verdict, tables, pictures, rules, limits.
+
+The sentences of the page are in ``report.html.jinja``; here are the functions that it calls.
+"""
 
 import platform
 from importlib.resources import files as resources
-from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 import scipy
 import sklearn
 
@@ -54,50 +55,22 @@ _TERMS = {
     "bias_instability": "bias instability, B (528, 952)",
     "rate_random_walk": "rate random walk, K (528, 952)",
 }
-_PROOF = (
-    "This holds for the compensator, at every point in the range of the calibration. It does not "
-    "say how well the compensator fits the gyro."
-)
-
-
-class Block(NamedTuple):
-    """Part of a section: text, warn, soft, heading, table, pictures, or details, closed or open."""
-
-    kind: str
-    content: Any
-    title: str = ""
 
 
 def report_page(results, title):
     """The report of a calibration, as the text of an HTML file; ``results`` a Results."""
-    calibration = results.calibration
-    recipe, name = calibration.recipe, calibration.written
-    what = "Arcsine law and fuzzy rules" if recipe.physics else "Fuzzy rules (ANFIS)"
-    what = what if calibration.writes_model else ARTICLES[name].capitalize()
-    target = "rate" if calibration.compensator.predicts == "rate" else "rate error"
-    cautions = [f"Warning: {signs(told)}" for told in calibration.cautions(results.unit)]
-    if recipe.assumed:
-        cautions.append(f"Units assumed: {'; '.join(recipe.assumed.values())}.")
-    sections = (_check, _merit, _pictures, _sure, _written, _use, _log)
-    kept = calibration.verdict.recommended != NOTHING
-    kept = kept and all(check.result == "pass" for check in results.checks)
-    verdict, *reasons = headline(calibration, results.unit)
-    if results.checks:
-        reasons.append(f"Specification: {specification(results.checks)}.")
-    reasons.append(f"The files, and the figures below, are of {written_text(calibration)}.")
+    pictures = dict(results.pictures)
     return _template().render(
-        title=f"Gyro compensation: {title}",
-        subtitle=f"{what}: the gyro's {target} from "
-        f"{', '.join(map(_words, calibration.compensator.inputs))}.",
-        verdict=verdict,
-        verdict_kind="good" if kept else "bad",
-        reasons=map(signs, reasons),
-        cautions=cautions,
-        first=[_summary(results), _identity(results)],
-        sections=[make(results) for make in sections],
-        footer=f"Made by skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
-        f"{np.__version__}, SciPy {scipy.__version__} and Python {platform.python_version()}. "
-        "Figures of merit in the terms of IEEE Std 528-2019, 952 and 1780-2022; see their table.",
+        title=title,
+        results=results,
+        calibration=results.calibration,
+        recipe=results.calibration.recipe,
+        compensator=results.calibration.compensator,
+        first=[pictures.pop(name) for name in (_ON_FIRST_PAGE,) if name in pictures],
+        others=list(pictures.values()),
+        simpler_names=NAMES,
+        versions=f"skanfis {__version__} with scikit-learn {sklearn.__version__}, NumPy "
+        f"{np.__version__}, SciPy {scipy.__version__} and Python {platform.python_version()}",
     )
 
 
@@ -115,11 +88,17 @@ def check_installed(pdf=False):
 
 def _template():
     check_installed()
-    from jinja2 import Environment
+    from jinja2 import Environment, StrictUndefined
 
     environment = Environment(
-        autoescape=True, trim_blocks=True, lstrip_blocks=True, finalize=_without_hidden_signs
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_without_hidden_signs,
+        undefined=StrictUndefined,
     )
+    environment.filters |= {"words": _words, "signs": signs}
+    environment.globals |= {function.__name__: function for function in _CALLED}
     source = resources("skanfis.gyro").joinpath("report.html.jinja").read_text(encoding="utf-8")
     return environment.from_string(source)
 
@@ -141,207 +120,132 @@ def specification(checks):
     return "; ".join(parts)
 
 
-def _summary(results):
-    """For readers of one page: the figures that count, and where they hold."""
-    calibration, figures = results.calibration, results.merit.set_index("figure")
-    known = figures.reindex(_FIRST)[["before", "after", "unit"]].dropna(subset="after")
-    lines = [
-        (_words(name), three_digits(before), three_digits(after), signs(unit))
-        for name, before, after, unit in known.itertuples()
-    ]
-    first = [each for name, each in results.pictures.items() if name == _ON_FIRST_PAGE]
-    blocks = [
-        _table(["figure", "before", "after", "unit"], lines, "On held-out rows in range"),
-        Block("soft", flagged_text(calibration)),
-        _box(calibration, "It may be used from"),
-        Block("pictures", first),
-    ]
-    return "Summary", blocks
+def what(calibration):
+    """What is written, as the subject of a sentence."""
+    if not calibration.writes_model:
+        return ARTICLES[calibration.written].capitalize()
+    return "Arcsine law and fuzzy rules" if calibration.recipe.physics else "Fuzzy rules (ANFIS)"
 
 
-def _identity(results):
-    """What identifies this calibration, and is needed to repeat it."""
-    names = {"serial": "device, serial number", "operator": "operator", "made": "made"}
-    lines = [(name, results.entries.get(key) or "not given") for key, name in names.items()]
-    blocks = [_table(["what", "entry"], lines)]
-    if results.files:
-        blocks.append(_table(["file of the log", "bytes", "SHA-256"], results.files))
-    text = f"Errors and biases are in {results.symbol} throughout, and rates of the table in °/s."
-    blocks.append(Block("soft", text))
-    if results.typed:
-        blocks.append(Block("details", results.typed, "Options of the command"))
-    return "This calibration", blocks
+def is_good(results):
+    """Whether a compensation is recommended, and all limits are kept."""
+    is_kept = all(check.result == "pass" for check in results.checks)
+    return is_kept and results.calibration.verdict.recommended != NOTHING
 
 
-def _check(results):
-    """How the calibration was checked, and simpler compensations on the same rows."""
-    calibration, verdict = results.calibration, results.calibration.verdict
-    text = (
-        "Every row was compensated by a model that had not seen its group: "
-        f"{calibration.split.sentence}. A row outside the range of that model's training data is "
-        "flagged, as it would be on board. All figures and pictures are of the rows in range."
-    )
-    blocks = [Block("text", text)]
-    beyond = ~calibration.inside & np.isfinite(calibration.after)
-    if beyond.any():
-        error = results.shown(rms((calibration.after - results.rate)[beyond]))
-        text = f"On the flagged rows the RMS error after is {error} {results.symbol}."
-        blocks.append(Block("text", text))
-    blocks += [Block("warn", message) for message in calibration.warnings]
-    text = (
-        'All on the same held-out rows in range. "This model" is the fuzzy rules. It is better by '
-        "as many times as the other's RMS error is larger, in the geometric mean over "
-        f"{held_out_groups(calibration)}. Recommended is the simplest compensation that no simpler "
-        "one beats, and no more elaborate one by 2 %, interval included."
-    )
-    blocks += [Block("heading", "Beside simpler compensations"), Block("soft", text)]
-    lines = []
+def summary(results):
+    """Rows on the figures that count, for readers of one page: name, before, after, unit."""
+    known = results.merit.set_index("figure").reindex(_FIRST).dropna(subset="after")
+    for name, before, after, unit in known[["before", "after", "unit"]].itertuples():
+        yield _words(name), three_digits(before), three_digits(after), signs(unit)
+
+
+def flagged_error(results):
+    """The RMS error of held-out rows out of range, if they have rates; else empty."""
+    calibration = results.calibration
+    error = calibration.after - calibration.rate
+    beyond = ~calibration.inside & np.isfinite(error)
+    return results.shown(rms(error[beyond])) if beyond.any() else ""
+
+
+def compensations(results):
+    """Rows on the compensations: name, error, reduction, how much better the model is, use."""
+    verdict = results.calibration.verdict
     for name, error in verdict.rms.items():
-        gain, better, interval = verdict.gains.get(name), "–", ""
+        gain, better, ends = verdict.gains.get(name), "–", ""
         if gain is not None:
-            better, interval = f"{three_digits(gain.factor)} ×", _interval(gain.low, gain.high)
+            better, ends = f"{three_digits(gain.factor)} ×", _interval(gain.low, gain.high)
         use = "recommended" if name == verdict.recommended else ""
         factor = verdict.rms[NOTHING] / error if error else np.inf
-        lines.append(
-            (name, results.shown(error), f"{three_digits(factor)} ×", better, interval, use)
-        )
-    error = f"RMS error [{results.symbol}]"
-    head = ["compensation", error, "reduction", "this model better by", "95 % interval", "result"]
-    missing = [simple for simple in calibration.simpler if simple.missing]
-    notes = [Block("soft", f"{simple.name}: {simple.missing}") for simple in missing]
-    return "How it was checked", [*blocks, _table(head, lines), *notes]
+        yield name, results.shown(error), f"{three_digits(factor)} ×", better, ends, use
 
 
-def _merit(results):
-    table, lines = results.merit, []
+def merit(results):
+    """Rows on the figures that the log gives: name, both values with intervals, unit, term."""
+    table = results.merit
     for _, line in table[table[["before", "after"]].notna().any(axis=1)].iterrows():
         cells = []
         for side in ("before", "after"):
             value, low, high = (line[f"{side}{end}"] for end in ("", "_low", "_high"))
             cells += [three_digits(value), _interval(low, high)]
-        name, unit = line["figure"], signs(line["unit"])
-        lines.append((_words(name), *cells, unit, _TERMS.get(name, "none")))
-    head = ["figure", "before", "95 % interval", "after", "95 % interval", "unit", "IEEE term"]
-    blocks = [_table(head, lines, f"Intervals by resampling {table.attrs['resampled']}")]
+        name = line["figure"]
+        yield _words(name), *cells, signs(line["unit"]), _TERMS.get(name, "none")
+
+
+def merit_notes(results):
+    """Why figures or intervals are missing, one sentence for all with the same reason."""
+    table = results.merit
     for note, part in table[table["note"] != ""].groupby("note", sort=False):
-        blocks.append(Block("soft", f"{', '.join(map(_words, part['figure']))}: {note}"))
-    if results.checks:
-        checks = [
-            (_words(limit.figure), limit.number, three_digits(value), signs(limit.unit), *told)
-            for limit, value, *told in results.checks
-        ]
-        caption = "After compensation, on the held-out rows in range"
-        head = ["figure", "required", "after", "unit", "result", "remark"]
-        blocks += [Block("heading", "Limits of the specification"), _table(head, checks, caption)]
-    return "Figures of merit", blocks
+        yield f"{', '.join(map(_words, part['figure']))}: {note}"
 
 
-def _pictures(results):
-    others = [each for name, each in results.pictures.items() if name != _ON_FIRST_PAGE]
-    blocks = [Block("pictures", others)]
-    if results.no_allan:
-        blocks.append(Block("soft", f"Allan deviation: {results.no_allan}."))
-    return "Pictures", blocks
+def limits(results):
+    """Rows on the limits: figure, limit, value, unit, result, remark."""
+    for limit, value, *told in results.checks:
+        yield _words(limit.figure), limit.number, three_digits(value), signs(limit.unit), *told
 
 
-def _use(results):
-    calibration = results.calibration
-    compensator = calibration.compensator
-    model = rules_of(compensator.estimator).model
-    policy = policy_in_words(model.out_of_bounds, model.max_extrapolation)
-    if compensator.predicts == "rate" and model.out_of_bounds not in SILENT:
-        added = f"; in what is added, {policy}" if model.coefficients.any() else ""
-        policy = f"{LAW_GOES_ON}{added}"
-    text = (
-        f"A row with an input outside its range below is flagged (status 1): {policy}. A row "
-        "near which there are hardly any calibration data "
-        f"(coverage below {compensator.min_coverage:g}) is flagged too (status 4). The C code "
-        "that --c writes flags the same rows with the same numbers."
-    )
-    pictures = Block("pictures", list(results.coverage()))
-    return "Where it may be used", [Block("text", text), _box(calibration), pictures]
-
-
-def _sure(results):
-    calibration = results.calibration
-    largest, rate_rises = proven_bounds(calibration)
-    added = calibration.compensator.predicts == "rate"
+def proven(results):
+    """Rows on what is proven of the compensation; none if it is zero."""
+    largest, rate_rises = proven_bounds(results.calibration)
     if largest == 0.0:
-        what = "added to the arcsine law" if added else "subtracted"
-        text = f"Nothing is {what}, so there is nothing to bound."
-        return "What is proven", [Block("text", text)]
-    what = "addition to the arcsine law" if added else "compensation"
-    proven = [(f"largest {what}, proven", f"{results.shown(largest)} {results.symbol}")]
+        return
+    added = results.calibration.compensator.predicts == "rate"
+    name = "addition to the arcsine law" if added else "compensation"
+    yield f"largest {name}, proven", f"{results.shown(largest)} {results.symbol}"
     if rate_rises is not None:
         told = "proven" if rate_rises else "not proven"
-        proven.append(("the compensated rate rises and falls as the indicated one does", told))
-    table = _table(["in the range of the calibration", "result"], proven)
-    return "What is proven", [table, Block("soft", _PROOF)]
+        yield "the compensated rate rises and falls as the indicated one does", told
 
 
-def _written(results):
-    """The written compensation: a formula, or rules in pictures and text, with cautions."""
-    calibration, name = results.calibration, results.calibration.written
-    if not calibration.writes_model:
-        text = (
-            f"{ARTICLES[name].capitalize()}, fitted to the same rows as the final model. --write "
-            f"chooses another, with a report of its own: rules, {', '.join(NAMES)}."
-        )
-        formula = Block("open", rules_text(calibration), "What to compute")
-        return "What is written", [Block("text", text), formula, _on_board(calibration)]
-    against = against_reading(calibration)
-    n_rules = counted(calibration.rules[-1].n_rules_, "rule")
-    fit = "Nothing measured here speaks against reading the rules one by one."
-    return "The rules", [
-        Block("pictures", list(results.memberships())),
-        Block("details", rules_text(calibration), f"All rules as text ({n_rules})"),
-        _on_board(calibration),
-        Block("heading", "Can the rules be read?"),
-        *([Block("warn", sentence) for sentence in against] or [Block("text", fit)]),
-    ]
+def policy(compensator):
+    """What a row outside the range gets, as a clause."""
+    model = rules_of(compensator.estimator).model
+    told = policy_in_words(model.out_of_bounds, model.max_extrapolation)
+    if compensator.predicts == "error" or model.out_of_bounds in SILENT:
+        return told
+    return LAW_GOES_ON + (f"; in what is added, {told}" if model.coefficients.any() else "")
 
 
-def _on_board(calibration):
-    notes = ["y[0] is the output of the C code.", *notes_on(calibration.compensator)]
-    return Block("details", "\n".join(notes), "What to compute on board")
+def box(calibration):
+    """Rows on the range in which the compensator may be used: input, ends, unit."""
+    X = calibration.X[list(calibration.compensator.inputs)]
+    for name, low, high in X.agg(["min", "max"]).T.itertuples():
+        yield _words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name)
 
 
-def _log(results):
-    calibration, rows = results.calibration, results.log
-    counts = {"rows": len(rows)}
-    if calibration.n_fit_rows < len(rows):
+def log(calibration):
+    """Rows on what the log holds: quantity, value, unit."""
+    table = calibration.log
+    counts = {"rows": len(table)}
+    if calibration.n_fit_rows < len(table):
         counts["rows fitted to, chosen at random"] = calibration.n_fit_rows
-    counts |= {f"{name}s": rows[name].nunique() for name in ("run", "device") if name in rows}
-    lines = [(name, f"{count:,}", "") for name, count in counts.items()]
+    counts |= {f"{name}s": table[name].nunique() for name in ("run", "device") if name in table}
+    for name, count in counts.items():
+        yield name, f"{count:,}", ""
     for name in ("temperature", "rate", "output"):
-        ends = f"{rows[name].min():.5g} to {rows[name].max():.5g}"
-        lines.append((name, ends, _unit_of(calibration, name)))
+        ends = f"{table[name].min():.5g} to {table[name].max():.5g}"
+        yield name, ends, _unit_of(calibration, name)
     if calibration.recipe.output_unit in SIGNALS:
         unit = f"{calibration.recipe.output_unit} per °/s"
-        lines.append(("scale factor", f"{calibration.compensator.scale_factor:.8g}", unit))
-    return "The log", [_table(["quantity", "value", "unit"], lines)]
-
-
-def _box(calibration, caption=""):
-    X = calibration.X[list(calibration.compensator.inputs)]
-    lines = [
-        (_words(name), f"{low:.5g}", f"{high:.5g}", _unit_of(calibration, name))
-        for name, low, high in X.agg(["min", "max"]).T.itertuples()
-    ]
-    return _table(["input", "from", "to", "unit"], lines, caption)
-
-
-def _table(head, lines, caption=""):
-    return Block("table", pd.DataFrame(list(lines), columns=head), caption)
-
-
-def _interval(low, high):
-    return f"[{three_digits(low)}, {three_digits(high)}]" if np.isfinite(low + high) else ""
+        yield "scale factor", f"{calibration.compensator.scale_factor:.8g}", unit
 
 
 def _words(name):
     return name.replace("_", " ")
 
 
+def _interval(low, high):
+    return f"[{three_digits(low)}, {three_digits(high)}]" if np.isfinite(low + high) else ""
+
+
 def _unit_of(calibration, name):
     return signs(input_units(calibration.compensator)[name])
+
+
+# What the template calls, by these names.
+_CALLED = (
+    *(against_reading, box, compensations, counted, flagged_error, flagged_text, headline),
+    *(held_out_groups, is_good, limits, log, merit, merit_notes, notes_on, policy, proven),
+    *(rules_text, specification, summary, what, written_text),
+)

@@ -22,7 +22,8 @@ from ..naming import distinct
 from ._checks import LABELS, RATE_COLUMN, check_rows, check_values
 from ._columns import SIGNALS, convert
 from ._guess import Request, settle
-from ._source import NO_VALUE, as_numbers, clock_form, dated, going_on, open_source
+from ._numbers import NO_VALUE, as_numbers, clock_form, dated, going_on
+from ._source import open_source
 from ._units import assumed_text, settle_by_all
 from .errors import LogError
 
@@ -157,7 +158,7 @@ def read(paths, request, *, tell=lambda text: None):
     runs = by_run.size().index.to_frame(index=False)
     table = table.drop(columns="device").assign(run=by_run.ngroup().to_numpy(np.int32))
     by_clock = request.guess and "time" in table and "run" not in layout.places
-    if by_clock and len(runs) > 1 == runs["device"].nunique():
+    if by_clock and len(runs) > 1 and runs["device"].nunique() == 1:
         table, runs, told = _joined_by_clock(table, runs, paths)
         notes += told
     assumed = {part: assumed_text(table[part], part, layout) for part in layout.assumed}

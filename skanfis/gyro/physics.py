@@ -9,7 +9,6 @@ from types import SimpleNamespace
 from typing import Self
 
 import numpy as np
-from numpy.polynomial import Polynomial
 from numpy.polynomial.polynomial import polyval, polyvander
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
@@ -217,11 +216,10 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         """Set coefficients in the units of X and y, in powers of T minus the reference."""
         self.reference_temperature_ = float(log.mean)
         output_unit, rate_unit, std, thermal_unit = log.units
-        tau = Polynomial([0.0, 1.0 / std])
 
         def in_units(coefficients, unit, degree):
             n_terms = 1 + (degree if self.temperature is not None else 0)
-            found = Polynomial(coefficients)(tau).coef * unit
+            found = coefficients * unit / std ** np.arange(coefficients.size)
             return np.pad(found, (0, n_terms - found.size))
 
         self.amplitude_ = in_units(law.a, output_unit, self.amplitude_degree)
