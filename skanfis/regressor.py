@@ -123,7 +123,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         (:class:`~skanfis.options.LinearExtrapolation`); "clip" holds the value at the edge; "nan"
         returns NaN, which scores refuse; "raise" raises ValueError. May be changed after training.
     verbose : bool, default=False
-        Whether to write a line per iteration.
+        Whether to write a line per candidate structure and per iteration.
     random_state : int, RandomState instance or None, default=None
         Seed for clustering and for holding out rows. None is a fixed seed: the same data give the
         same model. The rows that judge the structure depend on their values, not on the seed.
