@@ -3,9 +3,10 @@
 import sys
 import warnings
 from collections import Counter
+from collections.abc import Mapping
 from contextlib import contextmanager
 from datetime import date, time, timedelta
-from numbers import Integral
+from numbers import Integral, Real
 
 import numpy as np
 from scipy.sparse import issparse
@@ -149,6 +150,11 @@ def _name_what_is_no_number(table, what, error):
         advice = _SECONDS
     elif what != "X":
         advice = f"A {'target' if what == 'y' else 'weight'} must be a number."
+    elif name is None:
+        advice = (
+            "X must be a table, with a number for every column in every row: pandas.DataFrame(X) "
+            "makes one of a dict or of named fields."
+        )
     else:
         advice = (
             "Correct the value, drop the column, or encode categories as numbers in a Pipeline "
@@ -180,8 +186,8 @@ def _columns(table):
         array = np.asarray(table, dtype=object)
     except ValueError:
         return []
-    if array.ndim == 1:
-        return [(getattr(table, "name", None), array)]
+    if array.ndim < 2:
+        return [(getattr(table, "name", None), np.atleast_1d(array))]
     return [(f"x{j}", array[:, j]) for j in range(array.shape[1])] if array.ndim == 2 else []
 
 
@@ -252,6 +258,13 @@ def check_finite(values, what, names):
             )
 
 
+def in_column_order(given, names):
+    """A pandas Series or frame labelled by all columns, in their order; all else as it is given."""
+    is_labelled = hasattr(given, "keys") and not isinstance(given, Mapping)
+    labels = list(given.keys()) if is_labelled else []
+    return given[list(names)] if len(labels) == len(names) == len({*labels, *names}) else given
+
+
 def feature_indices(given, names, parameter):
     """Sorted positions of the columns given by name, position or mask; None is all columns.
 
@@ -259,7 +272,7 @@ def feature_indices(given, names, parameter):
     """
     if given is None:
         return np.arange(len(names))
-    entries = np.atleast_1d(np.asarray(given, dtype=object)).tolist()
+    entries = np.atleast_1d(np.asarray(in_column_order(given, names), dtype=object)).tolist()
     if entries and all(isinstance(entry, bool | np.bool_) for entry in entries):
         if len(entries) != len(names):
             raise ValueError(
@@ -309,6 +322,19 @@ def checked_position(feature, names, what="input"):
     return found
 
 
+def row_weights(given, n_rows):
+    """One weight per row as floats, or ValueError; a number is the weight of every row."""
+    is_one = isinstance(given, Real)
+    weights = np.full(n_rows, float(given)) if is_one else as_numbers(given, "sample_weight")
+    if weights.shape != (n_rows,):
+        raise ValueError(
+            f"sample_weight must have one entry per row; X has the length {n_rows}, sample_weight "
+            f"the shape {weights.shape}: give every row its weight."
+        )
+    check_finite(weights[:, None], "sample_weight", ["sample_weight"])
+    return weights
+
+
 def check_not_negative(sample_weight):
     """Raise ValueError that names the first row of negative weight, if there is one."""
     if np.any(sample_weight < 0):
@@ -330,7 +356,7 @@ def positive_weights(sample_weight, n_rows, least=2):
     if n_kept < least:
         raise ValueError(
             f"sample_weight leaves {n_kept} of {n_rows} rows with a positive weight; at least "
-            f"{least} are needed."
+            f"{least} are needed, and a row of weight zero is none."
         )
     return None if n_kept == n_rows else keep
 

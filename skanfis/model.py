@@ -306,7 +306,8 @@ class TSKModel:
             distance = self._way(Z, nearest) / self.spread[:, None]
             near = np.exp(-0.5 * np.sum(distance**2, axis=0))
             by_rule = self.antecedent.strengths(nearest) * support.by_rule(nearest)
-            return (by_rule.sum(axis=0) * near)[None]
+            # Strengths may sum to a rounding error more than one.
+            return (np.minimum(by_rule.sum(axis=0), 1.0) * near)[None]
 
         n_distances = 2 * self.n_rules * (1 + self.n_inputs)
         return self._by_block(X, of_block, 1, n_distances)[:, 0]

@@ -91,8 +91,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Order of the consequents: 0 is a constant per rule, 1 a linear function of the inputs.
     monotonic_cst : array-like of shape (n_features,) or dict, default=None
         1: the target does not fall as the feature rises; -1: it does not rise; 0: nothing is known.
-        A dict gives these by name or position; several outputs take a row each. The order certainly
-        holds in the range of the training data and beyond it (:mod:`skanfis.bounds`).
+        A dict gives these by name or position, a Series by name; several outputs take a row each.
+        The order certainly holds in the range of the data and beyond it (:mod:`skanfis.bounds`).
     constraints : list of OutputLimits and FixedPoint, default=None
         Limits that the output keeps on every row, and values that it takes at given points. They
         are in the units of the X given here, after any scaler. See :mod:`skanfis.bounds`.
@@ -121,9 +121,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         What ``predict`` does with rows outside the range of the training data, input by input:
         "linear" warns, and follows the tangent at the edge for a limited distance
         (:class:`~skanfis.options.LinearExtrapolation`); "clip" holds the value at the edge; "nan"
-        returns NaN; "raise" raises ValueError. It may be changed after training.
+        returns NaN, which scores refuse; "raise" raises ValueError. May be changed after training.
     verbose : bool, default=False
-        Whether to write a line per iteration.
+        Whether to write a line per candidate structure and per iteration.
     random_state : int, RandomState instance or None, default=None
         Seed for clustering and for holding out rows. None is a fixed seed: the same data give the
         same model. The rows that judge the structure depend on their values, not on the seed.

@@ -127,15 +127,26 @@ REFUSED = {
         ["AgglomerativeClustering", "no sample_weight", "KMeans", "'grid'"],
     ),
     "negative weight": ({"sample_weight": with_entry(ONES, 4, -2.0)}, ["Negative", "-2 at row 4"]),
-    "no weight": ({"sample_weight": 0.0 * ONES}, ["ample", "eight", "at least"]),
+    "no weight": ({"sample_weight": 0.0 * ONES}, ["sample_weight leaves 0 of 60", "at least 2"]),
     "weight of one row": (
         {"sample_weight": with_entry(0.0 * ONES, 3, 1.0)},
         ["sample_weight leaves 1 of 60 rows", "at least 2"],
     ),
-    "NaN weight": ({"sample_weight": with_entry(ONES, 4, np.nan)}, ["sample_weight contains NaN"]),
-    "other weights": ({"sample_weight": ONES[:-1]}, ["sample_weight.shape == (59,)", "(60,)"]),
+    "NaN weight": (
+        {"sample_weight": with_entry(ONES, 4, np.nan)},
+        ["sample_weight contains NaN", "first at row 4", "1 of its 60"],
+    ),
+    "missing weight": ({"sample_weight": [1.0] * 59 + [None]}, ["NaN", "first at row 59"]),
+    "other weights": (
+        {"sample_weight": ONES[:-1]},
+        ["sample_weight must have one entry per row", "length 60", "(59,)", "every row"],
+    ),
     "text as weights": ({"sample_weight": LO_HI}, ["sample_weight holds text, first at row 0"]),
-    "2D weights": ({"sample_weight": np.ones((N_ROWS, 2))}, ["Sample weights must be 1D"]),
+    "name of weights": ({"sample_weight": "rate"}, ["sample_weight holds text", "'rate'"]),
+    "2D weights": (
+        {"sample_weight": np.ones((N_ROWS, 2))},
+        ["sample_weight must have one entry per row", "(60, 2)"],
+    ),
     "noise": ({"partition": DBSCAN(eps=1e-9)}, ["partition found no cluster", "noise"]),
     "no rules": ({"partition": ANFISRegressor()}, ["has no rules", "not been fitted", "model_"]),
     "a class": ({"partition": KMeans}, ["is a class", "KMeans(...)"]),
@@ -151,6 +162,22 @@ def test_what_fit_refuses(case):
     given, said = REFUSED[case]
     with refused(ValueError, *said):
         fit(**given)
+
+
+@pytest.mark.parametrize(
+    ("no_table", "kind"),
+    [
+        (dict(zip(NAMES, X.T, strict=True)), "type dict"),
+        (FRAME.to_records(index=False), "type tuple"),
+        ([[1.0, 2.0, 3.0], *([[1.0, 2.0]] * (N_ROWS - 1))], "type list"),
+        ("log.csv", "text"),
+    ],
+)
+def test_x_that_is_no_table(no_table, kind):
+    for act in (fit, line().predict):
+        with pytest.raises((TypeError, ValueError), match=r"X must be a table.*DataFrame") as told:
+            act(no_table)
+        assert f"Input X holds {'values of ' * (kind != 'text')}{kind}" in str(told.value)
 
 
 TEXT = ["X holds text in column 'rate', first at row 0", "'lo'", "drop the column, or encode"]

@@ -189,6 +189,15 @@ def test_coverage_is_the_formula(frozen, rng):
     assert 0.0 < expected.max() < 1.0
 
 
+def test_coverage_is_one_at_most_whatever_strengths_are_rounded_to(rng):
+    frozen = build(scattered())
+    n_rules = len(frozen.support.share)
+    everywhere = replace(frozen.support, share=np.ones(n_rules), radius=np.full(n_rules, np.inf))
+    X = inside(frozen, rng, 1000)
+    assert (frozen.strengths(X).sum(axis=1) > 1.0).any()
+    assert_array_equal(replace(frozen, support=everywhere).coverage(X).max(), 1.0)
+
+
 def test_without_knowledge_of_data_there_is_no_coverage(rng):
     frozen = build(grid(), support=None)
     assert_array_equal(frozen.coverage(around(frozen, rng)), 0.0)

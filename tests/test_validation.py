@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from numpy.testing import assert_array_equal
 from sklearn import config_context
 from sklearn.model_selection import GridSearchCV
 from sklearn.pipeline import make_pipeline
@@ -64,6 +65,27 @@ def test_a_missing_group_is_named_whatever_stands_for_it(missing):
         group_numbers([1, missing, 2], 3)
     for groups in ([7, 5, 7], ["b", "a", "b"]):
         assert group_numbers(groups, 3).tolist() == [1, 0, 1]
+
+
+def test_a_series_by_names_of_columns_is_read_by_name():
+    """And not in its own order, which may be another; without all names, by position."""
+    rows = np.random.default_rng(0).uniform(-1.0, 1.0, (60, 3))
+    X, y = pd.DataFrame(rows, columns=["a", "b", "c"]), rows[:, 0] ** 2
+    order = ["c", "a", "b"]
+    given = {
+        "n_mfs": [1, 3, 2],
+        "mf": ["bell", "gaussian", "triangular"],
+        "premise_features": [False, True, True],
+        "consequent_features": [True, True, False],
+    }
+    named = {key: pd.Series(values, index=order) for key, values in given.items()}
+    model = quick(**named).fit(X, y)
+    by_position = quick(**{key: [v[1], v[2], v[0]] for key, v in given.items()}).fit(X, y)
+    assert_array_equal(model.predict(X), by_position.predict(X))
+    of_inputs = {(term["input"], term["function"]) for term in model.memberships_}
+    assert of_inputs == {("a", "gaussian"), ("b", "triangular")}
+    assert [slopes.any() for slopes in model.consequents_[:, 1:].T] == [True, False, True]
+    assert quick(pd.Series([3, 2, 1])).fit(X, y).n_rules_ == 6
 
 
 def test_a_warning_points_at_the_line_of_the_user_however_deep_it_arises():

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .._validation import feature_indices, position_of
+from .._validation import feature_indices, in_column_order, position_of
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class FixedPoint:
     Parameters
     ----------
     x : array-like of shape (n_features,) or dict
-        The point, in the units of X, or by the inputs' names.
+        The point, in the units of X; a dict or a Series by the inputs' names.
     y : float or array-like of shape (n_outputs,)
         The value there.
 
@@ -173,7 +173,8 @@ def _signs(given, input_names, n_outputs):
         places = [position_of(name, input_names) for name in names]
         by_place = dict(zip(places, given.values(), strict=True))
         given = [by_place.get(j, 0) for j in range(n_inputs)]
-    signs = np.zeros(n_inputs) if given is None else _numbers(given, told)
+    given = np.zeros(n_inputs) if given is None else in_column_order(given, input_names)
+    signs = _numbers(given, told)
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):
         raise ValueError(
             f"monotonic_cst has shape {signs.shape}, not {(n_inputs,)} or {(n_outputs, n_inputs)}: "
@@ -209,7 +210,7 @@ def _point(given, input_names):
                 f"X ({names}) and no other."
             )
         given = [given[name] for name in input_names]
-    point = _numbers(given, f"FixedPoint.x={given!r}")
+    point = _numbers(in_column_order(given, input_names), f"FixedPoint.x={given!r}")
     if point.shape != (len(input_names),):
         raise ValueError(
             f"FixedPoint.x={given!r} must have a number for each of the {len(input_names)} "

@@ -59,7 +59,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         warn_user(message, ConstraintWarning)
     # What the data contradict costs much with any rules: other rules are no remedy.
     if drawn and raised > _WORTH_A_WARNING and not told:
-        names = ", ".join(one.name for one in found.inequalities) or "the fixed points"
+        names = " and ".join(one.name for one in found.inequalities) or "the fixed points"
         is_tree = isinstance(model.antecedent, TreeAntecedent)
         remedy = "a smaller max_rules" if is_tree else "partition='tree'"
         end = "a single line that keeps" if is_line else "rules that provably keep"

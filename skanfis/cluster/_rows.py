@@ -11,8 +11,8 @@ from scipy.spatial.distance import cdist
 from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from .._sklearn import check_sample_weight, fit_context
-from .._validation import check_finite, check_not_negative, named_refusals
+from .._sklearn import fit_context
+from .._validation import check_finite, check_not_negative, named_refusals, row_weights
 from ..blocks import row_blocks
 
 # Number of distances in a block: a few arrays of this size stay in the cache.
@@ -30,8 +30,7 @@ def check_rows(estimator, X, reset=False) -> np.ndarray:
 
 def distinct_rows(X, sample_weight):
     """Distinct rows of positive weight, in lexicographic order, and the weight of each."""
-    with named_refusals(sample_weight=sample_weight):
-        weight = check_sample_weight(sample_weight, X, dtype=np.float64)
+    weight = row_weights(1.0 if sample_weight is None else sample_weight, len(X))
     check_not_negative(weight)
     keep = weight > 0
     if not keep.any():

@@ -111,6 +111,8 @@ class StructureSearch:
         cost, of_rules = cost_of(tuned), error + tuned.disagreement
         judged = Judged(candidate, in_folds, squares, free_squares, error, cost, of_rules)
         self.judged.append(judged)
+        if self.plan.tell is not None:
+            self.plan.tell(f"{candidate.describe()}: error {np.sqrt(error):.3g}, {cost} numerals")
         return judged
 
     def _squares(self, in_folds, held):

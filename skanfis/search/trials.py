@@ -66,6 +66,7 @@ class Plan:
     premises_move: bool  # whether the final training moves the premises
     held: Held | None = None
     n_all: float = np.nan  # rows by weight that the final model will be trained on
+    tell: Callable[[str], None] | None = None  # of every candidate, for ``verbose``
 
     @property
     def free(self):

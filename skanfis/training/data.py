@@ -1,12 +1,10 @@
 """Input and output of a fit: validated rows, runs of the solver, and results."""
 
 from dataclasses import dataclass
-from numbers import Real
 
 import numpy as np
 from sklearn.utils.validation import check_consistent_length, validate_data
 
-from .._sklearn import check_sample_weight
 from .._validation import (
     bearable_weights,
     check_finite,
@@ -14,6 +12,7 @@ from .._validation import (
     named_refusals,
     positive_weights,
     refuse_lazy,
+    row_weights,
 )
 from ..bounds.constraints import Constraints
 from ..learning import SolverResult
@@ -91,14 +90,8 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
     groups = None if groups is None else group_numbers(groups, len(X))
     keep = None
     if sample_weight is not None:
-        # A chunk may have no weight at all, which newer versions of scikit-learn refuse. Weights of
-        # chunks are relative to each other, and stay as they are.
-        if isinstance(sample_weight, Real):
-            sample_weight = np.full(len(X), sample_weight)
-        with named_refusals(sample_weight=sample_weight):
-            if not (is_chunk and np.array_equal(sample_weight, np.zeros(len(X)))):
-                sample_weight = check_sample_weight(sample_weight, X, dtype=np.float64)
-        sample_weight = np.asarray(sample_weight, dtype=float)
+        sample_weight = row_weights(sample_weight, len(X))
+        # Weights of chunks are relative to each other, and stay as they are.
         sample_weight = sample_weight if is_chunk else bearable_weights(sample_weight)
         keep = positive_weights(sample_weight, len(X), 0 if is_chunk else 2)
     if keep is not None:

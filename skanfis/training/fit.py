@@ -96,6 +96,7 @@ class _Fit:
             request,
             consequent_inputs=inputs[~is_constant[inputs]],
             held=held_in_search(data.constraints),
+            tell=self.printer and self.printer.write,
         )
 
     def start(self, rows: StandardisedData) -> Start:

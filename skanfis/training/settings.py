@@ -3,7 +3,7 @@
 from sklearn.utils import check_random_state
 from sklearn.utils.validation import has_fit_parameter
 
-from .._validation import feature_indices
+from .._validation import feature_indices, in_column_order
 from ..learning import SOLVERS, Solver
 from ..membership import Gaussian, membership_families
 from ..model import TSKModel
@@ -28,7 +28,7 @@ def given_weights(estimator):
 def structure_request(estimator, names, sample_weight=None):
     """The request that a start is found for, with all names of columns and families resolved."""
     partition = _partition(estimator, names, sample_weight)
-    families = membership_families(estimator.mf, names)
+    families = membership_families(in_column_order(estimator.mf, names), names)
     if isinstance(partition, str) and partition == "tree" and set(families) != {Gaussian}:
         raise ValueError(
             f"mf={estimator.mf!r} has no effect with partition='tree', whose terms are the sides "
@@ -43,7 +43,7 @@ def structure_request(estimator, names, sample_weight=None):
     # random_state=None stands for one fixed seed: the same data give the same model.
     state = estimator.random_state
     return StructureRequest(
-        n_mfs=estimator.n_mfs,
+        n_mfs=in_column_order(estimator.n_mfs, names),
         partition=partition,
         families=families,
         order=estimator.order,

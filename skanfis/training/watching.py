@@ -24,7 +24,7 @@ def watch_all(*watchers):
 
 
 class Printer:
-    """Writes a line to the standard output after every iteration, for ``verbose``."""
+    """Writes a line to the standard output per candidate and iteration, for ``verbose``."""
 
     def __init__(self, name):
         self._name, self._start = name, time.perf_counter()
@@ -33,19 +33,19 @@ class Printer:
         """Write the structure and the weights of the start."""
         penalty, n_candidates = start.penalty, len(start.candidates)
         found = f"{n_candidates} candidates compared, " if n_candidates > 1 else ""
-        self._write(
+        self.write(
             f"{found}{start.antecedent.n_rules} rules, agreement {penalty.agreement:.3g}, "
             f"alpha {penalty.alpha:.3g}, stiffness {penalty.stiffness:.3g}"
         )
 
-    def _write(self, text):
+    def write(self, text):
         sys.stdout.write(f"[{self._name}] {text}\n")
         sys.stdout.flush()
 
     def __call__(self, n_iter, evaluation):
         seconds = time.perf_counter() - self._start
         loss = evaluation.mean_squared_error
-        self._write(f"iteration {n_iter}: loss {loss:.6g}, {seconds:.1f} s")
+        self.write(f"iteration {n_iter}: loss {loss:.6g}, {seconds:.1f} s")
         return False
 
 

@@ -85,6 +85,17 @@ def test_signs_are_found_by_name_or_position(rows, signs):
     assert_array_equal(one.predict(rows), other.predict(rows))
 
 
+def test_signs_and_points_of_a_series_are_read_by_name():
+    rows = pd.DataFrame(X, columns=["rate", "time"])
+    signs, point = {"time": 0, "rate": 1}, {"time": 0.5, "rate": 0.7}
+    for of in (pd.Series, lambda signs: pd.DataFrame([signs])):
+        held = ANFISRegressor(**QUICK, monotonic_cst=of(signs)).fit(rows, Y)
+        told = ANFISRegressor(**QUICK, monotonic_cst=signs).fit(rows, Y)
+        assert_array_equal(held.predict(rows), told.predict(rows))
+    known = ANFISRegressor(**QUICK, constraints=[FixedPoint(pd.Series(point), 0.9)]).fit(rows, Y)
+    assert_allclose(known.predict(pd.DataFrame([[0.7, 0.5]], columns=rows.columns)), 0.9)
+
+
 def test_the_search_judges_what_is_kept(rng):
     """Of a valley told to rise: what is expected of new rows is what the held model leaves."""
     X, X_new = rng.uniform(-1.0, 1.0, (2, 300, 2))

@@ -64,6 +64,17 @@ def test_verbose_writes_a_line_per_iteration(capsys):
     assert capsys.readouterr().out == ""
 
 
+def test_verbose_tells_of_every_candidate_when_it_is_judged(capsys):
+    """Not only after the search, which takes most of the time of a default fit."""
+    model = ANFISRegressor(max_rules=2, verbose=True).fit(X, Y)
+    lines = capsys.readouterr().out.splitlines()
+    for one in model.structures_:
+        error, cost = one["expected_error"], one["reading_cost"]
+        told = f"[ANFISRegressor] {one['structure']}: error {error:.3g}, {cost} numerals"
+        assert told in lines[: -1 - model.n_iter_]
+    assert "candidates compared, " in lines[-1 - model.n_iter_]
+
+
 @needs_callbacks
 class TestCallbacks:
     def test_every_iteration_is_told_with_a_usable_model_and_none_changes_it(self):
