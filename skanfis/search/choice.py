@@ -47,36 +47,41 @@ class Judges:
 
     weight: np.ndarray
     group: np.ndarray
+    certain: float  # standard errors by which several rules must beat one
 
     @classmethod
-    def of(cls, parts):
+    def of(cls, parts, certain):
         """From the rows that each fold has left out."""
         weight = np.concatenate([rows.sample_weight for rows in parts])
-        if any(rows.groups is None for rows in parts):
-            return cls(weight, np.arange(weight.size))
-        groups = np.unique(np.concatenate([rows.groups for rows in parts]), return_inverse=True)[1]
-        # A single group has no standard error: then rows count as independent.
-        return cls(weight, groups if groups.any() else np.arange(weight.size))
+        groups = np.arange(weight.size)
+        if all(rows.groups is not None for rows in parts):
+            named = np.concatenate([rows.groups for rows in parts])
+            found = np.unique(named, return_inverse=True)[1]
+            # A single group has no standard error: then rows count as independent.
+            groups = found if found.any() else groups
+        return cls(weight, groups, certain)
 
     def mean(self, squares) -> float:
         """Weighted mean of squared errors."""
         return float(np.average(squares, weights=self.weight))
 
-    def are_less(self, squares, than) -> bool:
-        """Whether ``squares`` are below ``than`` on average, by more than one standard error."""
+    def are_less(self, squares, than, n_errors=1.0) -> bool:
+        """Whether ``squares`` are below ``than`` on average, by more than some standard errors."""
         gain = than - squares
         mean = self.mean(gain)
         excess = np.bincount(self.group, self.weight * (gain - mean))
         error = np.sqrt(np.sum(excess**2)) / np.sum(self.weight)
-        return bool(mean > max(error, _NOTHING))
+        return bool(mean > max(n_errors * error, _NOTHING))
 
 
 def best_of(judged, judges: Judges) -> Judged:
     """The candidate of the smallest error, where a higher reading cost must gain beyond chance."""
     best, *others = sorted(judged, key=lambda one: one.cost)
+    line = best
     for one in others:
         best = one if judges.are_less(one.squares, best.squares) else best
-    return best
+        line = best if best.candidate.n_rules == 1 else line
+    return best if judges.are_less(best.squares, line.squares, judges.certain) else line
 
 
 def tolerated(least: float, variance: float, simplicity: float) -> float:

@@ -23,6 +23,10 @@ from .tuning import cost_of
 # A sequence ends this many steps beyond its best candidate. One would be too few: a product of two
 # inputs needs terms on both before either helps.
 _FURTHER = 2
+# Standard errors by which several rules must beat one if half of the rows judge. In folds one is
+# enough: noise that the rows of training have by chance is missing on those left out, so what has
+# learnt it loses there. The half that judges once has noise of its own.
+_OF_HALF = 2.0
 # If rows do not suffice for this many rules, slopes by the inputs of the lasso are tried too.
 _FEW_RULES = 3
 
@@ -39,7 +43,7 @@ class StructureSearch:
         self.folds = [Trials(sample.part(grow), plan, is_wide) for grow, _ in found]
         self.left_out = [sample.part(judge) for _, judge in found]
         self.trials = self.folds[0] if is_half else Trials(sample, plan, is_wide)
-        self.judges = Judges.of(self.left_out)
+        self.judges = Judges.of(self.left_out, _OF_HALF if is_half else 1.0)
         self.judged: list[Judged] = []
 
     def run(self, kinds: Sequence[str]) -> Start:
@@ -112,7 +116,8 @@ class StructureSearch:
         judged = Judged(candidate, in_folds, squares, free_squares, error, cost, of_rules)
         self.judged.append(judged)
         if self.plan.tell is not None:
-            self.plan.tell(f"{candidate.describe()}: error {np.sqrt(error):.3g}, {cost} numerals")
+            words = f"{candidate.describe()}: expected error {np.sqrt(error):.3g} sd"
+            self.plan.tell(f"{words} of the target, {cost} numerals")
         return judged
 
     def _squares(self, in_folds, held):

@@ -16,8 +16,8 @@ def judged(squares, cost=1, n_rules=1, of_rules=0.0, n_clusters=0):
     return Judged(candidate, [], squares, squares, squares.mean(), cost, of_rules)
 
 
-def alike(n_rows, group=None):
-    return Judges(np.ones(n_rows), np.arange(n_rows) if group is None else group)
+def alike(n_rows, group=None, certain=1.0):
+    return Judges(np.ones(n_rows), np.arange(n_rows) if group is None else group, certain)
 
 
 class TestPrefer:
@@ -46,12 +46,12 @@ class TestPrefer:
         X, y, group = np.zeros((3, 1)), np.zeros((3, 1)), np.array([7, 3, 7])
         weight = np.arange(1.0, 4.0)
         rows = StandardisedData(X, y, weight, None, None, group)
-        found = Judges.of([rows.part([0, 1]), rows.part([2])])
+        found = Judges.of([rows.part([0, 1]), rows.part([2])], 1.0)
         assert_array_equal(found.group, [1, 0, 1])
         assert found.mean(np.array([1.0, 0.0, 5.0])) == 16.0 / 6.0
         # One group for all says nothing.
         for one in (None, np.full(3, 7)):
-            alone = Judges.of([StandardisedData(X, y, weight, None, None, one)])
+            alone = Judges.of([StandardisedData(X, y, weight, None, None, one)], 1.0)
             assert_array_equal(alone.group, [0, 1, 2])
 
 
@@ -62,6 +62,19 @@ def test_the_best_costs_more_to_read_only_where_that_is_no_chance():
     candidates = [judged(0.5 * luck, 9), judged(level, 3), judged(0.5 * level, 7), judged(luck, 4)]
     assert best_of(candidates, alike(100)) is candidates[2]
     assert best_of(candidates[1::2], alike(100)) is candidates[1]
+
+
+def test_several_rules_may_have_to_beat_one_by_two_standard_errors():
+    level, luck = np.full(100, 3.0), np.where(np.arange(100) % 2, 1.0, -1.0)
+    one_error = sem(luck, ddof=0)
+    line, rules = judged(level), judged(level - luck - 1.5 * one_error, 4, 2)
+    more = judged(rules.squares - one_error, 9, 3)
+    better_line = judged(rules.squares, 3)
+    for certain, best in ((1.0, rules), (2.0, line)):
+        judges = alike(100, certain=certain)
+        assert best_of([line, rules], judges) is best
+        assert best_of([line, rules, more], judges) is more
+        assert best_of([line, better_line], judges) is better_line
 
 
 @pytest.mark.parametrize(

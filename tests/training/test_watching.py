@@ -71,7 +71,7 @@ def test_verbose_tells_of_every_candidate_when_it_is_judged(capsys):
     for one in model.structures_:
         error, cost = one["expected_error"], one["reading_cost"]
         told = f"[ANFISRegressor] {one['structure']}: error {error:.3g}, {cost} numerals"
-        assert told in lines[: -1 - model.n_iter_]
+        assert f"[ANFISRegressor] {told}" in lines[: -1 - model.n_iter_]
     assert "candidates compared, " in lines[-1 - model.n_iter_]
 
 
