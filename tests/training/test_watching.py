@@ -70,7 +70,8 @@ def test_verbose_tells_of_every_candidate_when_it_is_judged(capsys):
     lines = capsys.readouterr().out.splitlines()
     for one in model.structures_:
         error, cost = one["expected_error"], one["reading_cost"]
-        told = f"[ANFISRegressor] {one['structure']}: error {error:.3g}, {cost} numerals"
+        of_error = f"expected error {error:.3g} sd of the target"
+        told = f"{one['structure']}: {of_error}, {cost} numerals"
         assert f"[ANFISRegressor] {told}" in lines[: -1 - model.n_iter_]
     assert "candidates compared, " in lines[-1 - model.n_iter_]
 
