@@ -181,13 +181,13 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
     predicted, inside, folds, fold_models = _held_out(X, target, groups, split, recipe, tell, rng)
     rows = some_rows(np.arange(len(X)), _MOST_FIT_ROWS, X, rng)
+    # All compensations are judged on the same rows: those that the model answered in range.
+    judged = inside & np.isfinite(predicted)
     tell("comparing with simpler compensations")
-    simpler = list(simpler_compensations(X, rate, before, folds, rows, recipe.outside))
+    simpler = list(simpler_compensations(X, rate, before, folds, rows, judged, recipe.outside))
     estimator, messages = _fit(X.iloc[rows], target[rows], groups[rows], recipe, tell)
     predicts, after = ("rate", predicted) if recipe.physics else ("error", before - predicted)
     model = Compensation(_MODEL, predicts, after, estimator=estimator, fold_models=fold_models)
-    # All compensations are judged on the same rows: those that the model answered in range.
-    judged = inside & np.isfinite(after)
     every = [each for each in [*simpler, model] if each.after is not None]
     errors = {each.name: (each.after - rate)[judged] for each in every}
     verdict = judge(errors, split.labels[judged], split.most)

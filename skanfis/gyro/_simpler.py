@@ -51,10 +51,11 @@ class Compensation:
     fold_models: list = field(default_factory=list)
 
 
-def simpler_compensations(X, rate, before, folds, rows, policy):
+def simpler_compensations(X, rate, before, folds, rows, judged, policy):
     """Simple compensations from the simplest to the least simple, on the same rows and folds.
 
-    ``folds`` are pairs of rows fitted to and rows predicted, ``rows`` those of the final fit.
+    ``folds`` are pairs of rows fitted to and rows predicted, ``rows`` those of the final fit. The
+    rows ``judged`` need a prediction: without one, even by ``policy``, nothing can be compared.
     """
     parts = [train for train, _ in folds] + [rows]
     with warnings.catch_warnings():
@@ -67,12 +68,11 @@ def simpler_compensations(X, rate, before, folds, rows, policy):
                 *made, whole = (fit(X.iloc[part], target[part]) for part in parts)
                 for estimator, (_, test) in zip(made, folds, strict=True):
                     predicted[test] = estimator.predict(X.iloc[test])
-                    is_lost = estimator.in_bounds(X.iloc[test]) & ~np.isfinite(predicted[test])
-                    if is_lost.any():
-                        n_lost = np.count_nonzero(is_lost)
-                        raise ValueError(f"it has no finite prediction for {n_lost} rows")
+                if n_lost := np.count_nonzero(judged & ~np.isfinite(predicted)):
+                    raise ValueError(f"it has no finite prediction for {n_lost} rows")
             except ValueError as error:
-                # Only the law fails: the rate never changes, or it has too few rows.
+                # Only the law fails: the rate never changes, rows are too few, or the output is
+                # beyond its sine.
                 yield Compensation(name, predicts, missing=str(error))
                 continue
             after = predicted if predicts == "rate" else before - predicted

@@ -1,5 +1,7 @@
 """From a log to a verdict: planted truths, held out by hand, and structures chosen within folds."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -92,6 +94,18 @@ def test_the_formula_of_what_is_simpler_can_be_computed(law_and_line, name):
 
 
 @pytest.mark.usefixtures("few_rivals")
+def test_what_answers_fewer_rows_than_the_rules_is_missing_and_says_why():
+    """With "nan" the law has no value where the output exceeds its sine, which rules do not know."""
+    log = log_of(constant, n_rows=40)
+    log["rate"] *= 2.5
+    log["output"] = log["rate"] + law(log["temperature"], log["rate"])
+    found = calibrated(log, outside="nan", terms=(2, 3))
+    missing = {one.name: one.missing for one in found.simpler}
+    assert re.fullmatch(r"it has no finite prediction for \d+ rows", missing["arcsine law"])
+    assert "arcsine law" not in found.verdict.rms
+    assert np.isfinite(list(found.verdict.rms.values())).all()
+
+
 def test_where_nothing_is_surely_better_something_may_still_have_left_less():
     """A constant is of use in three runs of eight, and does harm in the others."""
     log = log_of(lambda t, r: 0.01 * np.repeat([1.0, 0.0], [180, 300]))
