@@ -93,9 +93,8 @@ def test_the_formula_of_what_is_simpler_can_be_computed(law_and_line, name):
     np.testing.assert_allclose(found, expected, atol=1e-8)
 
 
-@pytest.mark.usefixtures("few_rivals")
 def test_what_answers_fewer_rows_than_the_rules_is_missing_and_says_why():
-    """With "nan" the law has no value where the output exceeds its sine, which rules do not know."""
+    """The law has no value by the policy "nan" where the output is beyond its sine."""
     log = log_of(constant, n_rows=40)
     log["rate"] *= 2.5
     log["output"] = log["rate"] + law(log["temperature"], log["rate"])
@@ -106,6 +105,7 @@ def test_what_answers_fewer_rows_than_the_rules_is_missing_and_says_why():
     assert np.isfinite(list(found.verdict.rms.values())).all()
 
 
+@pytest.mark.usefixtures("few_rivals")
 def test_where_nothing_is_surely_better_something_may_still_have_left_less():
     """A constant is of use in three runs of eight, and does harm in the others."""
     log = log_of(lambda t, r: 0.01 * np.repeat([1.0, 0.0], [180, 300]))
