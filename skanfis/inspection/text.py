@@ -84,10 +84,11 @@ def export_text(
     Returns
     -------
     text : str
-        First, the standard deviations of the outputs, and of the noise about the rules. Then the
-        rules by their number, with the part of the rows on which each is the strongest, and the
-        RMSE of the rule alone there. Last, how many numbers there are, the error of the text as
-        printed (with the default precision), and what speaks against reading rules one by one.
+        First, the standard deviations of the outputs, and about the rules: of the noise, or the
+        training error if it is larger. Then the rules by their number, with the part of the rows on
+        which each is the strongest, and the RMSE of the rule alone there. Last, how many numbers
+        there are, the error of the text as printed (with the default precision), and what speaks
+        against reading rules one by one.
 
     Raises
     ------
