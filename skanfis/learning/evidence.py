@@ -100,9 +100,7 @@ class Laplace:
     @cached_property
     def trace_after(self):
         """The same in the posterior: the number of parameters that each part holds."""
-        stiffness = self.penalty.stiffness
-        # Without stiffness nothing is held, even if there is no curvature, where this is 0 / 0.
-        held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
+        held = held_displacements(self.curvature, self.penalty.stiffness)
         return self._traces(self.factor, held)
 
     def _traces(self, factor, by_stiffness):
@@ -149,10 +147,11 @@ class Laplace:
         """Effective number of all parameters: all, less those that the penalty holds."""
         return self.n_columns + self.curvature.size - float(np.sum(self.trace_after))
 
-    @property
-    def n_effective_premises(self):
-        """Effective number of the displacements: all, less those that the stiffness holds."""
-        return self.curvature.size - float(self.trace_after[_STIFFNESS])
+
+def held_displacements(curvature, stiffness):
+    """The number of displacements that the stiffness holds; ``curvature`` are eigenvalues of H."""
+    # Without stiffness nothing is held, even if there is no curvature, where this is 0 / 0.
+    return float(np.sum(stiffness / (curvature + stiffness))) if stiffness else 0.0
 
 
 def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), curvature=()):
