@@ -7,7 +7,7 @@ larger than memory.
 """
 
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -53,7 +53,7 @@ class Scale:
     minimum: np.ndarray
     maximum: np.ndarray
 
-    @property
+    @cached_property
     def is_constant(self):
         """Which columns never change, but for rounding errors."""
         return never_changes(self.minimum, self.maximum)
