@@ -72,11 +72,12 @@ class Laplace:
     """The posterior at a point: everything that the evidence and its derivatives are made of."""
 
     penalty: Penalty
+    weights: np.ndarray  # all, in the order of ``CommonLine.kinds``
     n_rows: float  # by weight
     twice_cost: float  # 2F
     n_outputs: int  # outputs that vary
     determinants: float  # log |M| - log |P|+ + log R
-    paid: np.ndarray  # its part of beta' P beta + kappa |x|^2, for each of ``CommonLine.weights``
+    paid: np.ndarray  # of beta' P beta + kappa |x|^2, the part of each weight
     disagreement: np.ndarray  # Q, which makes up P together with the line
     line: CommonLine
     prior: NormalFactor  # of P, its null space filled in at the size of P
@@ -104,7 +105,7 @@ class Laplace:
         return self._traces(self.factor, held)
 
     def _traces(self, factor, by_stiffness):
-        found = self.line.weights(self.penalty)
+        found = self.weights.copy()
         # One rule disagrees with none: its Q holds rounding errors alone.
         found[_AGREEMENT] *= factor.trace(self.disagreement) if self.line.n_rules > 1 else 0.0
         found[_OTHERS] *= self.line.traces(factor)
@@ -164,12 +165,14 @@ def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), 
     size = size if size > 2.0 * factor.shift else 1.0
     # P is singular. Its null space is filled in at P's own size, so that it has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), normal.free)
-    paid = line.weights(penalty)
+    weights = line.weights(penalty)
+    paid = weights.copy()
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
     paid[_STIFFNESS] *= np.dot(displacement, displacement)
     paid[_OTHERS] *= line.squares(solved)
     return Laplace(
         penalty,
+        weights,
         problem.n_rows,
         max(2.0 * evaluation.cost + float(paid[_STIFFNESS]), _LEAST_ERROR),
         problem.n_varying,
@@ -206,8 +209,7 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
     If distinct rows are few for the number of consequents, all slopes share one weight. Weights of
     their own would give way to slopes that fit noise by chance.
     """
-    penalty, line = posterior.penalty, posterior.line
-    now = line.weights(penalty)
+    line, now = posterior.line, posterior.weights
     before, outputs = posterior.trace_before, np.full(now.size, posterior.n_outputs)
     outputs[_STIFFNESS] = 1
     determined = outputs * np.maximum(before - posterior.trace_after, 0.0)
@@ -217,15 +219,20 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
         determined[_STIFFNESS] += _PRIOR_NUMBER
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = _log_ratio(determined, cost)
-    slopes, components = line.kinds == "slope", line.kinds == "alpha"
+    slopes, components = line.of_slopes, line.of_components
     if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns:
         step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
-    moves = np.isin(line.kinds, free) & (before > 0.0)
+    moves = _is_free(line, free) & (before > 0.0)
     ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
-    return _limited(penalty, line, now * ratio, moves, now, least)
+    return _limited(posterior.penalty, line, now * ratio, moves, now, least)
+
+
+def _is_free(line, free):
+    """Which of all weights are free; ``free`` names kinds."""
+    return np.array([kind in free for kind in line.kinds])
 
 
 def _log_ratio(determined, cost):
@@ -249,7 +256,7 @@ def _step_to_likeness(cost, determined, weights):
 
 def _limited(penalty, line, weights, moves, others, least):
     """The penalty of ``weights`` within their limits where ``moves``, of ``others`` elsewhere."""
-    slopes, components = line.kinds == "slope", line.kinds == "alpha"
+    slopes, components = line.of_slopes, line.of_components
     # All weights of a kind move, or none.
     moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
     low = np.maximum(line.weights(SMALLEST), line.weights(least))
@@ -275,8 +282,8 @@ def extrapolated(line, before, now, after, free, least):
     weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
     first, second, third = np.log(np.maximum(weights, _NOTHING))
     step, last = third - second, second - first
-    moves = np.isin(line.kinds, free)
-    moves &= (step * last > _ROUNDING) & (np.abs(step) >= _ALIKE * np.abs(last))
+    moves = (step * last > _ROUNDING) & (np.abs(step) >= _ALIKE * np.abs(last))
+    moves &= _is_free(line, free)
     if not moves.any():
         return after
     left = np.maximum(1.0 - step / np.where(moves, last, 1.0), np.finfo(float).eps)
