@@ -28,15 +28,7 @@ from .judging import ENOUGH, FOLDS
 from .lasso import lasso_inputs
 from .sample import DIGITS, to_six_digits, unit_scale
 from .splits import best_splits, together
-from .tuning import (
-    ARRIVING,
-    FEW_TURNS,
-    FIRST_PENALTY,
-    MOST_TURNS,
-    Tuned,
-    tuned_from,
-    with_sparse_slopes,
-)
+from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
 
 # Rows that a candidate sees for each of its parameters; and the fewest that it sees in any case,
 # one fold of which is enough to judge.
@@ -138,10 +130,11 @@ class Trials:
         smaller = self.tuned(candidate)
         begun = {}
         for one in filter(self._is_small, self._tried(kind, candidate, smaller)):
-            start = self._start(one, smaller)
+            problem = self._problem(one, smaller)
             # If few rows differ, k-means finds fewer clusters than asked for: leave these out.
-            if start.problem.antecedent.n_rules == one.n_rules:
-                begun[one] = self._train(start, turns=0)
+            if problem.antecedent.n_rules == one.n_rules:
+                still = Premise.still(problem.antecedent)
+                begun[one] = tune(problem, still, self.plan.free, 0, _STEPS_TO_PROMISE)
         self._begun |= begun
         return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
 
@@ -191,12 +184,12 @@ class Trials:
                 trained = self.tuned(replace(candidate, slope_worth=None))
                 found = with_sparse_slopes(trained, candidate.slope_worth)
             elif candidate.n_rules == 1:
-                found = self._train(self._start(candidate), turns=0, first_steps=ARRIVING)
+                found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
             else:
                 # Terms of a grid serve many rules. More turns would fit them to runs that lie far
                 # from one another, and make the rules wild in between.
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
-                found = self._train(self._begun[candidate], turns)
+                found = self._train(self._begun[candidate].problem, turns)
                 # Monotonic constraints need a term of every rule on an input: there, all stay.
                 if candidate.n_clusters and self.plan.premises_move and self.plan.held is None:
                     found = with_fewer_conditions(found)
@@ -215,19 +208,19 @@ class Trials:
         n_effective = tuned.posterior.n_effective
         return (1.0 + n_effective / self.plan.n_all) / (1.0 + n_effective / tuned.posterior.n_rows)
 
-    def _start(self, candidate, smaller=None):
-        """The point that a candidate begins at, from the rules and weights of a smaller one."""
+    def _problem(self, candidate, smaller=None):
+        """The problem that a candidate begins with, from the rules and weights of a smaller one."""
         plan, rows = self.plan, self.rows_for(candidate)
         penalty = plan.first if smaller is None else smaller.penalty
         antecedent = rule_base(candidate, rows, plan.families, self.spacing, plan.seed, smaller)
         inputs = self._inputs_with_slopes(candidate)
-        problem = SeparableProblem(rows, antecedent, penalty, consequent_inputs=inputs)
-        return Tuned.start(problem, Premise.of(antecedent, *rows.inputs.box), plan.free)
+        return SeparableProblem(rows, antecedent, penalty, consequent_inputs=inputs)
 
-    def _train(self, start, turns, first_steps=_STEPS_TO_PROMISE):
+    def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE):
         if turns and not self.plan.premises_move:
             turns, first_steps = 0, ARRIVING
-        return tuned_from(start, turns, first_steps)
+        premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
+        return tune(problem, premise, self.plan.free, turns, first_steps)
 
     def squared_errors(self, tuned: Tuned, rows: StandardisedData, held: Held | None):
         """Squared errors of ``predict`` on rows that were not trained on, summed over outputs."""

@@ -126,20 +126,15 @@ def tune(
     The weights start at those of the problem's penalty, and take ``first_steps`` before the
     premises move. There are ``turns`` turns at most; with 0 the premises stay.
     """
-    return tuned_from(Tuned.start(problem, premise, free), turns, first_steps)
-
-
-def tuned_from(start: Tuned, turns, first_steps) -> Tuned:
-    """The same as :func:`tune`, from any point."""
-    problem, size, steps = start.problem, start.premise.size, _STEPS
+    steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
         first_steps, turns, steps = min(first_steps, FEW_TURNS), min(turns, FEW_TURNS), 1
-    elif size == 0 and turns > 0:
+    elif premise.size == 0 and turns > 0:
         first_steps = ARRIVING
-    start = _improved(start, first_steps)
-    if size == 0 or turns == 0:
+    start = _improved(Tuned.start(problem, premise, free), first_steps)
+    if premise.size == 0 or turns == 0:
         return start
-    if "stiffness" in start.free:
+    if "stiffness" in free:
         stiffness = start.posterior.noise_variance / (problem.n_rows * PRIOR_DISPLACEMENT**2)
         start = start.with_penalty(replace(start.penalty, stiffness=stiffness))
     return _risen(turned(start, steps), turns - 1, steps)
@@ -171,10 +166,9 @@ def _risen(tuned: Tuned, turns, steps) -> Tuned:
 
 def turned(tuned: Tuned, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
     """One turn from the end of the last: premises down the cost, then weights up the evidence."""
-    premise = tuned.premise
     result = varpro(
         tuned.problem,
-        premise,
+        tuned.premise,
         max_iter=iterations,
         tol=TOLERANCE,
         stiffness=tuned.penalty.stiffness,
@@ -182,7 +176,7 @@ def turned(tuned: Tuned, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
         evaluation=tuned.solved,
     )
     evaluation = result.evaluation
-    x = premise.displacement(evaluation.antecedent.parameters)
+    x = tuned.premise.displacement(evaluation.antecedent.parameters)
     # Usually it is that of one step before the end, which is as good and saves a pass.
     curvature = np.maximum(np.linalg.eigvalsh(result.gauss_newton), 0.0)
     there = {"evaluation": evaluation, "solved": evaluation, "displacement": x}
@@ -233,8 +227,7 @@ def with_most_agreement(tuned: Tuned, room: float) -> Tuned:
         agreement = agreement or _most_agreement(best, most)
         if agreement < _LEAST_RAISE * best.penalty.agreement:
             break
-        raised = best.with_penalty(replace(best.penalty, agreement=agreement))
-        found = turned(raised, steps=0)
+        found = turned(best.with_penalty(replace(best.penalty, agreement=agreement)), steps=0)
         if found.expected_error <= most:
             best, agreement = found, 0.0
         else:
