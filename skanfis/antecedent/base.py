@@ -66,8 +66,7 @@ def pieces(values, lengths):
 
 def by_group(gradients, by_term):
     """Pairs of the gradients of a group, and its rows of ``by_term``, which has one per term."""
-    own = pieces(by_term, [gradient.shape[1] for gradient in gradients])
-    return zip(gradients, own, strict=True)
+    return zip(gradients, pieces(by_term, [one.shape[1] for one in gradients]), strict=True)
 
 
 def by_parameter(gradients, by_term):

@@ -60,8 +60,7 @@ class Scale:
 
     def varying(self, columns):
         """The ``columns`` as a list, with None in place of constant ones."""
-        is_constant = self.is_constant
-        return [None if is_constant[j] else int(j) for j in columns]
+        return [None if self.is_constant[j] else int(j) for j in columns]
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:

@@ -72,12 +72,11 @@ class Laplace:
     """The posterior at a point: everything that the evidence and its derivatives are made of."""
 
     penalty: Penalty
-    weights: np.ndarray  # all, in the order of ``CommonLine.kinds``
     n_rows: float  # by weight
     twice_cost: float  # 2F
     n_outputs: int  # outputs that vary
     determinants: float  # log |M| - log |P|+ + log R
-    paid: np.ndarray  # of beta' P beta + kappa |x|^2, the part of each weight
+    paid: np.ndarray  # its part of beta' P beta + kappa |x|^2, for each of ``CommonLine.weights``
     disagreement: np.ndarray  # Q, which makes up P together with the line
     line: CommonLine
     prior: NormalFactor  # of P, its null space filled in at the size of P
@@ -101,11 +100,10 @@ class Laplace:
     @cached_property
     def trace_after(self):
         """The same in the posterior: the number of parameters that each part holds."""
-        held = held_displacements(self.curvature, self.penalty.stiffness)
-        return self._traces(self.factor, held)
+        return self._traces(self.factor, held_displacements(self.curvature, self.penalty.stiffness))
 
     def _traces(self, factor, by_stiffness):
-        found = self.weights.copy()
+        found = self.line.weights(self.penalty)
         # One rule disagrees with none: its Q holds rounding errors alone.
         found[_AGREEMENT] *= factor.trace(self.disagreement) if self.line.n_rules > 1 else 0.0
         found[_OTHERS] *= self.line.traces(factor)
@@ -165,14 +163,12 @@ def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), 
     size = size if size > 2.0 * factor.shift else 1.0
     # P is singular. Its null space is filled in at P's own size, so that it has a Cholesky factor.
     prior = NormalFactor(matrix + size * np.outer(line.height, line.height), normal.free)
-    weights = line.weights(penalty)
-    paid = weights.copy()
+    paid = line.weights(penalty)
     paid[_AGREEMENT] *= np.vdot(solved, normal.disagreement @ solved)
     paid[_STIFFNESS] *= np.dot(displacement, displacement)
     paid[_OTHERS] *= line.squares(solved)
     return Laplace(
         penalty,
-        weights,
         problem.n_rows,
         max(2.0 * evaluation.cost + float(paid[_STIFFNESS]), _LEAST_ERROR),
         problem.n_varying,
@@ -209,7 +205,8 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
     If distinct rows are few for the number of consequents, all slopes share one weight. Weights of
     their own would give way to slopes that fit noise by chance.
     """
-    line, now = posterior.line, posterior.weights
+    penalty, line = posterior.penalty, posterior.line
+    now = line.weights(penalty)
     before, outputs = posterior.trace_before, np.full(now.size, posterior.n_outputs)
     outputs[_STIFFNESS] = 1
     determined = outputs * np.maximum(before - posterior.trace_after, 0.0)
@@ -225,14 +222,9 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
-    moves = _is_free(line, free) & (before > 0.0)
+    moves = np.array([kind in free for kind in line.kinds]) & (before > 0.0)
     ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
-    return _limited(posterior.penalty, line, now * ratio, moves, now, least)
-
-
-def _is_free(line, free):
-    """Which of all weights are free; ``free`` names kinds."""
-    return np.array([kind in free for kind in line.kinds])
+    return _limited(penalty, line, now * ratio, moves, now, least)
 
 
 def _log_ratio(determined, cost):
@@ -282,8 +274,8 @@ def extrapolated(line, before, now, after, free, least):
     weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
     first, second, third = np.log(np.maximum(weights, _NOTHING))
     step, last = third - second, second - first
-    moves = (step * last > _ROUNDING) & (np.abs(step) >= _ALIKE * np.abs(last))
-    moves &= _is_free(line, free)
+    moves = np.array([kind in free for kind in line.kinds])
+    moves &= (step * last > _ROUNDING) & (np.abs(step) >= _ALIKE * np.abs(last))
     if not moves.any():
         return after
     left = np.maximum(1.0 - step / np.where(moves, last, 1.0), np.finfo(float).eps)

@@ -125,8 +125,7 @@ class CommonLine:
             # Its slopes are those of the line, and it departs by nothing: most entries are zero.
             self._rows = sparse.csr_array(self._rows)
         self._part = np.concatenate([np.arange(len(self.slopes)), len(self.slopes) + component])
-        parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.components)
-        self.kinds = [*WEIGHTS, *parts]
+        self.kinds = [*WEIGHTS, *["slope"] * len(self.slopes), *["alpha"] * len(self.components)]
         # Where the weights of the slopes, and those of the components, stand among all.
         last = len(WEIGHTS) + len(self.slopes)
         self.of_slopes, self.of_components = slice(len(WEIGHTS), last), slice(last, None)

@@ -26,16 +26,13 @@ def sparse_slopes(posterior: Laplace, coefficients, worth):
     (n_columns, n_outputs). A slope is kept if it is worth at least ``worth``.
     """
     line, unit = posterior.line, posterior.noise_variance / posterior.n_rows
-    columns, n_outputs = np.eye(len(coefficients)), coefficients.shape[1]
-    before, after = (
-        unit * half.T @ half
-        for half in (factor.half_solve(columns) for factor in (posterior.prior, posterior.factor))
-    )
+    identity, n_outputs = np.eye(line.n_rules), coefficients.shape[1]
+    before, after = (unit * one.root.T @ one.root for one in (posterior.prior, posterior.factor))
     state, every, common, absent = [coefficients, after, before], np.arange(line.n_rules), [], []
     whole = [_loss(_of(state, line.own_slopes(j, every))) for j in line.slopes]
     for k in np.argsort(whole, kind="stable"):
         j, rules = line.slopes[k], every
-        slopes, identity = line.own_slopes(j, every), np.eye(line.n_rules)
+        slopes = line.own_slopes(j, every)
         by_input = _of(state, slopes)
         while rules.size > 1:
             own, contrasts = _of(by_input, identity[rules]), linalg.helmert(rules.size)
@@ -66,7 +63,7 @@ def _of(state, contrasts):
 def _loss(state):
     """What the evidence loses, in -2 log p, if all of the state's slopes are zero."""
     mean, *covariances = state
-    root, of_prior = (np.linalg.cholesky(one) for one in covariances)
+    root, of_prior = np.linalg.cholesky(covariances)
     misfit = np.linalg.solve(root, mean)
     change = np.log(root.diagonal() / of_prior.diagonal()).sum()
     return float(np.sum(misfit**2) + 2.0 * mean.shape[1] * change)
@@ -75,12 +72,11 @@ def _loss(state):
 def _given(state, contrasts):
     """Mean and covariances, given that these contrasts are zero."""
     mean, *covariances = state
-    gains = [
-        np.linalg.solve(contrasts @ one @ contrasts.T, contrasts @ one).T for one in covariances
-    ]
+    across = [contrasts @ one for one in covariances]
+    gains = [np.linalg.solve(one @ contrasts.T, one).T for one in across]
     return [
         mean - gains[0] @ (contrasts @ mean),
-        *(one - gain @ (contrasts @ one) for one, gain in zip(covariances, gains, strict=True)),
+        *(one - gain @ rows for one, gain, rows in zip(covariances, gains, across, strict=True)),
     ]
 
 
