@@ -16,7 +16,7 @@ membership of t, normalised over the terms of its input; of scattered rules, the
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import groupby
+from itertools import accumulate, groupby, pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -59,11 +59,14 @@ def _stack(values, Z):
     return np.concatenate(values) if values else np.empty((0, Z.shape[1]))
 
 
+def pieces(values, lengths):
+    """Consecutive pieces of some lengths along the first axis, as views."""
+    return [values[start:stop] for start, stop in pairwise([0, *accumulate(lengths)])]
+
+
 def by_group(gradients, by_term):
     """Pairs of the gradients of a group, and its rows of ``by_term``, which has one per term."""
-    ends = np.cumsum([gradient.shape[1] for gradient in gradients])
-    # Without any group there is nothing to split.
-    return zip(gradients, np.split(by_term, ends[:-1]), strict=False)
+    return zip(gradients, pieces(by_term, [one.shape[1] for one in gradients]), strict=True)
 
 
 def by_parameter(gradients, by_term):
@@ -199,9 +202,9 @@ class Antecedent(ABC):
 
     def with_parameters(self, parameters):
         """Return the same rule base with other parameters, laid out as in :attr:`parameters`."""
-        ends = np.cumsum([group.theta.size for group in self.groups])
-        parts = zip(self.groups, np.split(parameters, ends[:-1]), strict=False)
-        groups = [replace(group, theta=own.reshape(group.theta.shape)) for group, own in parts]
+        own = pieces(parameters, [group.theta.size for group in self.groups])
+        pairs = zip(self.groups, own, strict=True)
+        groups = [replace(group, theta=one.reshape(group.theta.shape)) for group, one in pairs]
         return replace(self, groups=tuple(groups))
 
     def change_units(self, offset, scale):

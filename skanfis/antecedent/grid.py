@@ -1,12 +1,11 @@
 """Grid partition: a rule for every combination of terms."""
 
 from dataclasses import dataclass, replace
-from itertools import accumulate, pairwise
 from math import prod
 
 import numpy as np
 
-from .base import Antecedent, combinations, groups_of, softmax_in_place
+from .base import Antecedent, combinations, groups_of, pieces, softmax_in_place
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +70,7 @@ class GridAntecedent(Antecedent):
         n_rows = log_mu.shape[1]
         if not self.counts:
             return np.ones((1, n_rows)), log_mu
-        edges = [0, *accumulate(self.counts)]
-        shares = [log_mu[i:j] for i, j in pairwise(edges)]
+        shares = pieces(log_mu, self.counts)
         if min(self.counts) == max(self.counts):
             # All inputs at once: the time to predict one row is mostly that of calls.
             softmax_in_place(log_mu.reshape(len(shares), -1, n_rows))

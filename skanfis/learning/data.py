@@ -7,7 +7,7 @@ larger than memory.
 """
 
 from dataclasses import dataclass
-from functools import reduce
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -53,15 +53,14 @@ class Scale:
     minimum: np.ndarray
     maximum: np.ndarray
 
-    @property
+    @cached_property
     def is_constant(self):
         """Which columns never change, but for rounding errors."""
         return never_changes(self.minimum, self.maximum)
 
     def varying(self, columns):
         """The ``columns`` as a list, with None in place of constant ones."""
-        is_constant = self.is_constant
-        return [None if is_constant[j] else int(j) for j in columns]
+        return [None if self.is_constant[j] else int(j) for j in columns]
 
     @property
     def box(self) -> tuple[np.ndarray, np.ndarray]:

@@ -100,10 +100,7 @@ class Laplace:
     @cached_property
     def trace_after(self):
         """The same in the posterior: the number of parameters that each part holds."""
-        stiffness = self.penalty.stiffness
-        # Without stiffness nothing is held, even if there is no curvature, where this is 0 / 0.
-        held = np.sum(stiffness / (self.curvature + stiffness)) if stiffness else 0.0
-        return self._traces(self.factor, held)
+        return self._traces(self.factor, held_displacements(self.curvature, self.penalty.stiffness))
 
     def _traces(self, factor, by_stiffness):
         found = self.line.weights(self.penalty)
@@ -149,10 +146,11 @@ class Laplace:
         """Effective number of all parameters: all, less those that the penalty holds."""
         return self.n_columns + self.curvature.size - float(np.sum(self.trace_after))
 
-    @property
-    def n_effective_premises(self):
-        """Effective number of the displacements: all, less those that the stiffness holds."""
-        return self.curvature.size - float(self.trace_after[_STIFFNESS])
+
+def held_displacements(curvature, stiffness):
+    """The number of displacements that the stiffness holds; ``curvature`` are eigenvalues of H."""
+    # Without stiffness nothing is held, even if there is no curvature, where this is 0 / 0.
+    return float(np.sum(stiffness / (curvature + stiffness))) if stiffness else 0.0
 
 
 def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), curvature=()):
@@ -218,13 +216,13 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
         determined[_STIFFNESS] += _PRIOR_NUMBER
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = _log_ratio(determined, cost)
-    slopes, components = line.kinds == "slope", line.kinds == "alpha"
+    slopes, components = line.of_slopes, line.of_components
     if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns:
         step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
     else:
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
-    moves = np.isin(line.kinds, free) & (before > 0.0)
+    moves = np.array([kind in free for kind in line.kinds]) & (before > 0.0)
     ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
     return _limited(penalty, line, now * ratio, moves, now, least)
 
@@ -250,7 +248,7 @@ def _step_to_likeness(cost, determined, weights):
 
 def _limited(penalty, line, weights, moves, others, least):
     """The penalty of ``weights`` within their limits where ``moves``, of ``others`` elsewhere."""
-    slopes, components = line.kinds == "slope", line.kinds == "alpha"
+    slopes, components = line.of_slopes, line.of_components
     # All weights of a kind move, or none.
     moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
     low = np.maximum(line.weights(SMALLEST), line.weights(least))
@@ -276,7 +274,7 @@ def extrapolated(line, before, now, after, free, least):
     weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
     first, second, third = np.log(np.maximum(weights, _NOTHING))
     step, last = third - second, second - first
-    moves = np.isin(line.kinds, free)
+    moves = np.array([kind in free for kind in line.kinds])
     moves &= (step * last > _ROUNDING) & (np.abs(step) >= _ALIKE * np.abs(last))
     if not moves.any():
         return after

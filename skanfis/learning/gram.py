@@ -21,7 +21,7 @@ from math import prod
 
 import numpy as np
 
-from ..antecedent.base import combinations
+from ..antecedent.base import combinations, pieces
 
 
 def pairs(rows, others):
@@ -67,8 +67,7 @@ class DesignMoments:
 
     def of(self, shares, basis_rows, weighted_basis):
         """Moments of a block of rows: shares (n_shares, n_rows), basis plain and weighted."""
-        # The last piece, behind the last factor, is empty.
-        factors = np.split(shares, np.cumsum(self._lengths[:-1]))[:-1]
+        factors = pieces(shares, self._lengths[:-1])
         groups = [*(pairs(own, own) for own in factors), pairs(weighted_basis, basis_rows)]
         left, right = groups[: self._split], groups[self._split :]
         # An empty left group is a row of ones, with which the basis begins.

@@ -147,9 +147,9 @@ class SeparableProblem:
         farthest = np.zeros((antecedent.n_rules, self.n_basis - 1))
         for _, Z, _, _ in self._blocks():
             root = np.sqrt(antecedent.strengths(Z))
-            for j, z in enumerate(self._design.basis(Z)[1:]):
-                distance = root * np.abs(z - self.local.center[:, j, None])
-                np.maximum(farthest[:, j], distance.max(axis=1), out=farthest[:, j])
+            distance = np.abs(self._design.basis(Z)[1:] - self.local.center[:, :, None])
+            distance *= root[:, None]
+            np.maximum(farthest, distance.max(axis=2), out=farthest)
         return np.maximum(farthest, 1.0)
 
     @property

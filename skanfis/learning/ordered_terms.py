@@ -172,8 +172,7 @@ def _range(term, raw, reach):
     theta[term.positions == term.location] = 0.0
     changes = np.linspace(-LOG_FACTOR, LOG_FACTOR, _CHANGES)
     moved = theta[:, None] + term.is_width[:, None] * changes
-    places = np.array([[[-0.5]], [[0.5]]]).repeat(_CHANGES, axis=1)
-    truth = np.exp([term.family.log_value(place, moved)[:, 0] for place in places])
+    truth = np.exp(term.family.log_value(np.array([-0.5, 0.5]), moved)).T
     # A shoulder stays near one on one side: its flank is the other side.
     flanks = [side for side in truth if side[0] < _GREATEST_CROSSING] or [truth[0]]
     is_true = np.min(flanks, axis=0) >= _LEAST_TRUTH

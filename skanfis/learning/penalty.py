@@ -29,6 +29,8 @@ from .departures import departures
 
 # The first entries of ``CommonLine.weights``; those of all slopes and all components follow.
 WEIGHTS = ("agreement", "stiffness")
+# With fewer columns, products of dense matrices are faster even if most entries are zero.
+_SPARSE_COLUMNS = 100
 
 
 @dataclass(frozen=True)
@@ -119,12 +121,14 @@ class CommonLine:
         # Rows that map u to slopes of the line and to departures, (n_slopes + n_columns,
         # n_columns), and the part of the penalty that each row belongs to.
         self._rows = np.concatenate([to_slopes[is_varying], by_part])
-        if self.n_rules == 1:
+        if self.n_rules == 1 and n_columns > _SPARSE_COLUMNS:
             # Its slopes are those of the line, and it departs by nothing: most entries are zero.
             self._rows = sparse.csr_array(self._rows)
         self._part = np.concatenate([np.arange(len(self.slopes)), len(self.slopes) + component])
-        parts = ["slope"] * len(self.slopes) + ["alpha"] * len(self.components)
-        self.kinds = np.array([*WEIGHTS, *parts])
+        self.kinds = [*WEIGHTS, *["slope"] * len(self.slopes), *["alpha"] * len(self.components)]
+        # Where the weights of the slopes, and those of the components, stand among all.
+        last = len(WEIGHTS) + len(self.slopes)
+        self.of_slopes, self.of_components = slice(len(WEIGHTS), last), slice(last, None)
         # Factors that convert local slopes to a unit that all rules share.
         self._per_unit = extent.mean(axis=0) / local.spread
         self._place = {j: k for k, j in enumerate(slopes) if j is not None}

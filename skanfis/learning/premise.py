@@ -54,6 +54,12 @@ class Premise:
         size = np.unique(tied).size
         return cls(antecedent, lower[:size], upper[:size], unit, tied, tuple(ordered), is_unbounded)
 
+    @classmethod
+    def still(cls, antecedent):
+        """The premise of an antecedent that does not move: it has no displacements."""
+        none = np.empty(0)
+        return cls(antecedent, none, none, none, none.astype(int), ())
+
     @property
     def size(self):
         """Number of displacements."""

@@ -26,29 +26,27 @@ def sparse_slopes(posterior: Laplace, coefficients, worth):
     (n_columns, n_outputs). A slope is kept if it is worth at least ``worth``.
     """
     line, unit = posterior.line, posterior.noise_variance / posterior.n_rows
-    identity, n_outputs = np.eye(len(coefficients)), coefficients.shape[1]
-    before, after = (
-        unit * half.T @ half
-        for half in (factor.half_solve(identity) for factor in (posterior.prior, posterior.factor))
-    )
+    identity, n_outputs = np.eye(line.n_rules), coefficients.shape[1]
+    before, after = (unit * one.root.T @ one.root for one in (posterior.prior, posterior.factor))
     state, every, common, absent = [coefficients, after, before], np.arange(line.n_rules), [], []
-    whole = [_loss(state, line.own_slopes(j, every)) for j in line.slopes]
+    whole = [_loss(_of(state, line.own_slopes(j, every))) for j in line.slopes]
     for k in np.argsort(whole, kind="stable"):
         j, rules = line.slopes[k], every
+        slopes = line.own_slopes(j, every)
+        by_input = _of(state, slopes)
         while rules.size > 1:
-            slopes = line.own_slopes(j, rules)
-            contrasts = linalg.helmert(rules.size) @ slopes
-            if _loss(state, contrasts) < worth * contrasts.shape[0] * n_outputs:
+            own, contrasts = _of(by_input, identity[rules]), linalg.helmert(rules.size)
+            if _loss(_of(own, contrasts)) < worth * contrasts.shape[0] * n_outputs:
                 break
-            rules = np.delete(rules, _farthest(state, slopes))
+            rules = np.delete(rules, _farthest(own))
         if rules.size > 1:
-            state = _given(state, contrasts)
+            state = _given(state, contrasts @ slopes[rules])
         else:
             # Nothing is shared. The rule that can do best without its slope is the one to test.
-            alone = [_loss(state, line.own_slopes(j, rule)) for rule in every[:, None]]
+            alone = [_loss(_of(by_input, rule)) for rule in identity[:, None]]
             rules = every[[int(np.argmin(alone))]]
-        slope = line.own_slopes(j, rules[:1])
-        if _loss(state, slope) < worth * n_outputs:
+        slope = slopes[rules[:1]]
+        if _loss(_of(state, slope)) < worth * n_outputs:
             absent.append((j, tuple(rules.tolist())))
             state = _given(state, slope)
         elif rules.size > 1:
@@ -56,34 +54,36 @@ def sparse_slopes(posterior: Laplace, coefficients, worth):
     return tuple(sorted(common)), tuple(sorted(absent))
 
 
-def _loss(state, contrasts):
-    """What the evidence loses, in -2 log p, if these contrasts are zero."""
-    mean, after, before = state
-    root, of_prior = (linalg.cholesky(contrasts @ one @ contrasts.T) for one in (after, before))
-    misfit = linalg.solve_triangular(root, contrasts @ mean, trans="T")
-    change = np.log(np.diag(root) / np.diag(of_prior)).sum()
+def _of(state, contrasts):
+    """Mean and covariances of these contrasts alone."""
+    mean, *covariances = state
+    return [contrasts @ mean, *(contrasts @ one @ contrasts.T for one in covariances)]
+
+
+def _loss(state):
+    """What the evidence loses, in -2 log p, if all of the state's slopes are zero."""
+    mean, *covariances = state
+    root, of_prior = np.linalg.cholesky(covariances)
+    misfit = np.linalg.solve(root, mean)
+    change = np.log(root.diagonal() / of_prior.diagonal()).sum()
     return float(np.sum(misfit**2) + 2.0 * mean.shape[1] * change)
 
 
 def _given(state, contrasts):
     """Mean and covariances, given that these contrasts are zero."""
     mean, *covariances = state
-    gains = [
-        linalg.solve(contrasts @ one @ contrasts.T, contrasts @ one, assume_a="pos").T
-        for one in covariances
-    ]
+    across = [contrasts @ one for one in covariances]
+    gains = [np.linalg.solve(one @ contrasts.T, one).T for one in across]
     return [
         mean - gains[0] @ (contrasts @ mean),
-        *(one - gain @ (contrasts @ one) for one, gain in zip(covariances, gains, strict=True)),
+        *(one - gain @ rows for one, gain, rows in zip(covariances, gains, across, strict=True)),
     ]
 
 
-def _farthest(state, slopes):
+def _farthest(state):
     """The rule whose slope is farthest from the mean of the others, in deviations."""
-    mean, after, _ = state
-    values = slopes @ mean
-    variances = np.einsum("ri,ij,rj->r", slopes, after, slopes)
-    weights = 1.0 / np.maximum(variances, np.finfo(float).tiny)
+    values, after, _ = state
+    weights = 1.0 / np.maximum(after.diagonal(), np.finfo(float).tiny)
     others = weights.sum() - weights
     centers = (weights @ values - weights[:, None] * values) / others[:, None]
     squares = np.sum((values - centers) ** 2, axis=1)

@@ -5,8 +5,6 @@ normalised. With q = 1 / mu - 1, output f_r and prediction y, the prediction cha
 delta = q w_r (f_r - y) / (1 + q w_r). The condition is worth the evidence that this change loses.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..consequent import basis, rule_outputs
@@ -26,8 +24,10 @@ def with_fewer_conditions(tuned: Tuned) -> Tuned:
     If the evidence is lower in the end, all conditions stay.
     """
     rows, inputs, found = tuned.problem.rows, tuned.problem.consequent_inputs, tuned
+    # Always that of the model with all conditions.
+    precision = tuned.posterior.n_rows / tuned.posterior.noise_variance
     while True:
-        loss = term_losses(found)
+        loss = precision * term_losses(found)
         for own in (row[row >= 0] for row in found.evaluation.antecedent.rule_terms):
             loss[own[np.argmax(loss[own])]] = np.inf
         n_needless = np.count_nonzero(loss < WORTH * tuned.problem.n_outputs)
@@ -38,17 +38,15 @@ def with_fewer_conditions(tuned: Tuned) -> Tuned:
         now = found.evaluation.antecedent.without_terms(terms)
         problem = SeparableProblem(rows, start, tuned.penalty, consequent_inputs=inputs)
         premise = Premise.of(start, *rows.inputs.box)
-        there = Tuned.start(problem, premise, tuned.free, premise.displacement(now.parameters))
-        # Keep the noise variance of the model with all conditions.
-        found = replace(there, posterior=tuned.posterior)
+        found = Tuned.start(problem, premise, tuned.free, premise.displacement(now.parameters))
     if found is tuned:
         return tuned
-    found = turned(found, tuned.penalty)
+    found = turned(found)
     return min(tuned, found, key=lambda one: one.posterior.minus_twice_log)
 
 
 def term_losses(tuned):
-    """By how much -2 log p rises if a term is left out, for each term, (n_terms,)."""
+    """By how much 2F (``evidence``) rises if a term is left out, for each term, (n_terms,)."""
     problem, solved, rows = tuned.problem, tuned.solved, tuned.problem.rows
     antecedent, weight = solved.antecedent, rows.weights / rows.total_weight
     has_term = antecedent.rule_terms >= 0
@@ -66,4 +64,4 @@ def term_losses(tuned):
         change = more * (outputs - strengths * prediction)[rule_of]
         half = root @ (design @ (change * weight).T)
         found += (change * (change - 2.0 * (y - prediction))) @ weight - np.sum(half**2, axis=0)
-    return found * tuned.posterior.n_rows / tuned.posterior.noise_variance
+    return found

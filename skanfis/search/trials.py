@@ -133,7 +133,8 @@ class Trials:
             problem = self._problem(one, smaller)
             # If few rows differ, k-means finds fewer clusters than asked for: leave these out.
             if problem.antecedent.n_rules == one.n_rules:
-                begun[one] = self._train(problem, turns=0)
+                still = Premise.still(problem.antecedent)
+                begun[one] = tune(problem, still, self.plan.free, 0, _STEPS_TO_PROMISE)
         self._begun |= begun
         return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
 

@@ -24,6 +24,7 @@ from ..learning.evidence import (
     WORTH,
     Laplace,
     extrapolated,
+    held_displacements,
     is_settled,
     laplace,
     least_weights,
@@ -53,7 +54,7 @@ _HALVINGS, _LEAST_RAISE = 8, 2.0
 
 @dataclass(frozen=True, eq=False)
 class Tuned:
-    """A point of the tuning: the premises, the weights, and the posterior there."""
+    """A point of the tuning: the premises and the weights."""
 
     problem: SeparableProblem
     premise: Premise
@@ -61,32 +62,29 @@ class Tuned:
     evaluation: Evaluation  # at the premises, for the weights that they moved by
     solved: Any  # the same, solved again for the weights of now
     displacement: np.ndarray
-    posterior: Laplace
+    curvature: np.ndarray  # eigenvalues of H; empty before the premises move
 
     @classmethod
     def start(cls, problem: SeparableProblem, premise: Premise, free, x=None):
         """The point at displacement ``x``, zero if not given, with the weights of the problem."""
         x = np.zeros(premise.size) if x is None else x
         evaluation = problem.evaluate(premise.parameters(x))
-        posterior = laplace(problem, evaluation, x)
-        return cls(problem, premise, free, evaluation, evaluation, x, posterior)
+        return cls(problem, premise, free, evaluation, evaluation, x, np.empty(0))
 
-    def with_penalty(self, penalty, curvature=None):
-        """The same point at other weights; ``curvature`` if it has changed."""
-        curvature = self.posterior.curvature if curvature is None else curvature
-        there = self.solved_with(penalty)
-        posterior = laplace(there.problem, there.solved, self.displacement, curvature)
-        return replace(there, posterior=posterior)
-
-    def solved_with(self, penalty):
-        """The same point with consequents of other weights; the posterior stays as it was."""
+    def with_penalty(self, penalty):
+        """The same point at other weights; no pass over the rows."""
         problem = self.problem.with_penalty(penalty)
         return replace(self, problem=problem, solved=problem.solved_again(self.evaluation))
+
+    @cached_property
+    def posterior(self) -> Laplace:
+        """The posterior at this point."""
+        return laplace(self.problem, self.solved, self.displacement, self.curvature)
 
     @property
     def penalty(self):
         """The weights found."""
-        return self.posterior.penalty
+        return self.problem.penalty
 
     @property
     def disagreement(self):
@@ -108,8 +106,8 @@ class Tuned:
         error for the premises, (1 + k / n) / (1 - k / n), k their effective number. It is infinite
         where k reaches the number of rows n.
         """
-        n_rows = self.posterior.n_rows
-        share = self.posterior.n_effective_premises / n_rows
+        n_held = held_displacements(self.curvature, self.penalty.stiffness)
+        share = (self.curvature.size - n_held) / self.problem.n_rows
         if share >= 1.0:
             return np.inf
         left_out = self.problem.leave_one_out_error(self.solved)
@@ -136,11 +134,10 @@ def tune(
     start = _improved(Tuned.start(problem, premise, free), first_steps)
     if premise.size == 0 or turns == 0:
         return start
-    penalty = start.penalty
     if "stiffness" in free:
         stiffness = start.posterior.noise_variance / (problem.n_rows * PRIOR_DISPLACEMENT**2)
-        penalty = replace(penalty, stiffness=stiffness)
-    return _risen(turned(start, penalty, steps), turns - 1, steps)
+        start = start.with_penalty(replace(start.penalty, stiffness=stiffness))
+    return _risen(turned(start, steps), turns - 1, steps)
 
 
 def tune_unbounded(problem: SeparableProblem, premise: Premise, free) -> Tuned:
@@ -151,7 +148,7 @@ def tune_unbounded(problem: SeparableProblem, premise: Premise, free) -> Tuned:
     least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
     penalty = replace(problem.penalty, **least)
     start = Tuned.start(problem, premise, free).with_penalty(penalty)
-    first = turned(start, penalty, ARRIVING, _UNBOUNDED_ITERATIONS)
+    first = turned(start, ARRIVING, _UNBOUNDED_ITERATIONS)
     return _risen(first, MOST_TURNS - 1, _STEPS)
 
 
@@ -159,7 +156,7 @@ def _risen(tuned: Tuned, turns, steps) -> Tuned:
     """The point of the largest evidence, after up to ``turns`` more turns."""
     best = last = tuned
     for _ in range(turns):
-        last = turned(last, last.penalty, steps)
+        last = turned(last, steps)
         gain = best.posterior.minus_twice_log - last.posterior.minus_twice_log
         best = last if gain > 0.0 else best
         if not gain > WORTH:
@@ -167,24 +164,23 @@ def _risen(tuned: Tuned, turns, steps) -> Tuned:
     return best
 
 
-def turned(tuned: Tuned, penalty, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
+def turned(tuned: Tuned, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
     """One turn from the end of the last: premises down the cost, then weights up the evidence."""
-    problem, premise = tuned.problem.with_penalty(penalty), tuned.premise
     result = varpro(
-        problem,
-        premise,
+        tuned.problem,
+        tuned.premise,
         max_iter=iterations,
         tol=TOLERANCE,
-        stiffness=penalty.stiffness,
+        stiffness=tuned.penalty.stiffness,
         start=tuned.displacement,
-        evaluation=problem.solved_again(tuned.evaluation),
+        evaluation=tuned.solved,
     )
     evaluation = result.evaluation
-    x = premise.displacement(evaluation.antecedent.parameters)
+    x = tuned.premise.displacement(evaluation.antecedent.parameters)
     # Usually it is that of one step before the end, which is as good and saves a pass.
     curvature = np.maximum(np.linalg.eigvalsh(result.gauss_newton), 0.0)
-    there = replace(tuned, evaluation=evaluation, displacement=x)
-    return _improved(there.with_penalty(penalty, curvature), steps)
+    there = {"evaluation": evaluation, "solved": evaluation, "displacement": x}
+    return _improved(replace(tuned, **there, curvature=curvature), steps)
 
 
 def _improved(tuned: Tuned, steps) -> Tuned:
@@ -231,7 +227,7 @@ def with_most_agreement(tuned: Tuned, room: float) -> Tuned:
         agreement = agreement or _most_agreement(best, most)
         if agreement < _LEAST_RAISE * best.penalty.agreement:
             break
-        found = turned(best, replace(best.penalty, agreement=agreement), steps=0)
+        found = turned(best.with_penalty(replace(best.penalty, agreement=agreement)), steps=0)
         if found.expected_error <= most:
             best, agreement = found, 0.0
         else:
@@ -252,9 +248,8 @@ def _most_agreement(tuned: Tuned, most: float) -> float:
     low, high = tuned.penalty.agreement, LARGEST.agreement
     for _ in range(_HALVINGS):
         middle = float(np.sqrt(low * high))
-        penalty = replace(tuned.penalty, agreement=middle)
         # Solving again takes no pass over the rows; only the error of the solution does.
-        raised = tuned.solved_with(penalty)
+        raised = tuned.with_penalty(replace(tuned.penalty, agreement=middle))
         low, high = (middle, high) if raised.expected_error <= most else (low, middle)
     return low
 

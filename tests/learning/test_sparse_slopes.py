@@ -13,7 +13,7 @@ from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import WORTH
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
-from skanfis.learning.sparse_slopes import _given, _loss, sparse_slopes
+from skanfis.learning.sparse_slopes import _given, _loss, _of, sparse_slopes
 
 from .test_evidence import laplace_at
 
@@ -69,7 +69,7 @@ def test_what_it_takes_from_the_evidence_is_that_of_the_marginal_likelihood(rng,
         across = before @ contrasts.T
         given = before - across @ np.linalg.solve(contrasts @ across, across.T)
         expected = minus_twice_log(given) - minus_twice_log(before)
-        assert_allclose(_loss(state, contrasts), expected, rtol=1e-6)
+        assert_allclose(_loss(_of(state, contrasts)), expected, rtol=1e-6)
         # What is left is conditioned on it.
         before, state = given, _given(state, contrasts)
         assert_allclose(contrasts @ state[0], 0.0, atol=1e-10)

@@ -53,7 +53,7 @@ def test_what_rules_err_one_by_one(two_rules):
 
 def with_agreement(tuned, agreement):
     """The same with consequents alone of another agreement."""
-    return tuned.solved_with(replace(tuned.penalty, agreement=agreement))
+    return tuned.with_penalty(replace(tuned.penalty, agreement=agreement))
 
 
 class TestAgreement:
