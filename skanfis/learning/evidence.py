@@ -52,8 +52,6 @@ _LEAST = 1e-6
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
 _LONGEST_STEP = np.log(100.0)
-# Successive steps of a weight count as alike from this ratio on.
-_ALIKE = 0.5
 # A number below all weights that has a logarithm.
 _NOTHING = np.finfo(float).tiny
 # Numbers of parameters, penalties and products of steps below this are rounding errors.
@@ -262,7 +260,7 @@ def _limited(penalty, line, weights, moves, others, least):
 
 
 def extrapolated(line, before, now, after, free, least):
-    """The limit of successive steps by Aitken's rule: ``after``, or beyond it if they are alike.
+    """The limit of successive steps by Aitken's rule: beyond ``after`` where both go one way.
 
     If data hardly decide on a weight, as with more columns than rows, every step is a small part of
     the way. If log weights form a geometric sequence, the rest of the way is 1 / (1 - r) last
@@ -274,8 +272,7 @@ def extrapolated(line, before, now, after, free, least):
     weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
     first, second, third = np.log(np.maximum(weights, _NOTHING))
     step, last = third - second, second - first
-    moves = np.array([kind in free for kind in line.kinds])
-    moves &= (step * last > _ROUNDING) & (np.abs(step) >= _ALIKE * np.abs(last))
+    moves = np.array([kind in free for kind in line.kinds]) & (step * last > _ROUNDING)
     if not moves.any():
         return after
     left = np.maximum(1.0 - step / np.where(moves, last, 1.0), np.finfo(float).eps)

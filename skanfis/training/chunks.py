@@ -235,7 +235,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     ``given`` are weights of the penalty, by name. The others come from ``first``, which
     :func:`fitted_weights` returns; without ``first``, the evidence finds them.
     """
-    antecedent, none = sums.base.antecedent, np.empty(0)
+    antecedent = sums.base.antecedent
     given = {key: given[key] for key in _FREE if key in given}
     if first is not None:
         # Weights are relative to a mean over rows, so they fall as rows rise.
@@ -250,8 +250,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     free = [key for key in _FREE if key not in given]
     problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
     if free:
-        premise = Premise(antecedent, none, none, none, none.astype(int), ())
-        tuned = tune(problem, premise, free, turns=0, first_steps=ARRIVING)
+        tuned = tune(problem, Premise.still(antecedent), free, turns=0, first_steps=ARRIVING)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
     overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight
