@@ -16,7 +16,6 @@ from sklearn.utils._param_validation import (
     StrOptions,
     validate_parameter_constraints,
 )
-from sklearn.utils.validation import _check_sample_weight as check_sample_weight
 
 try:
     from sklearn.callback import CallbackSupportMixin
@@ -33,7 +32,6 @@ __all__ = [
     "Interval",
     "StrOptions",
     "check_parameters",
-    "check_sample_weight",
     "fit_context",
     "safe_indexing",
     "validate_parameter_constraints",

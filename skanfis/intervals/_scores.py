@@ -20,13 +20,13 @@ from sklearn.model_selection import GroupKFold, GroupShuffleSplit, KFold, Shuffl
 from sklearn.utils.metadata_routing import process_routing
 from sklearn.utils.validation import has_fit_parameter
 
-from .._sklearn import check_sample_weight, safe_indexing
+from .._sklearn import safe_indexing
 from .._validation import (
     as_numbers,
     check_finite,
     group_numbers,
-    named_refusals,
     positive_weights,
+    row_weights,
 )
 from ..exceptions import OutOfBoundsWarning
 from ..export.folding import final_step
@@ -68,8 +68,7 @@ def checked_targets(y, sample_weight, groups):
     by_output = targets.reshape(len(targets), -1)
     check_finite(by_output, "y", target_names(y, by_output.shape[1]))
     if sample_weight is not None:
-        with named_refusals(sample_weight=sample_weight):
-            sample_weight = check_sample_weight(sample_weight, targets, dtype=np.float64)
+        sample_weight = row_weights(sample_weight, len(targets))
         positive_weights(sample_weight, len(targets))
     numbers = None if groups is None else group_numbers(groups, len(targets))
     has_weight = slice(None) if sample_weight is None else sample_weight > 0.0
