@@ -1,8 +1,7 @@
 """Where training starts: rules in standardised units, weights of the penalty, premises so far.
 
 Rules come from a search, or are given: by terms per input, by a clusterer, by a model. For given
-rules, the weights are found in the same way, on a sample. Their ordered terms may leave the bounds,
-as in classic ANFIS, if this lowers the expected squared error by more than a tenth.
+rules, the weights are found in the same way, on a sample.
 """
 
 from dataclasses import dataclass, field
@@ -10,9 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..antecedent import Antecedent, GridAntecedent, RuleTableAntecedent, TreeAntecedent
-from ..consequent import MANY_COLUMNS
 from ..learning.data import StandardisedData
-from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
@@ -27,14 +24,11 @@ from .tuning import (
     cost_of,
     scaled,
     tune,
-    tune_unbounded,
+    with_free_terms,
     with_most_agreement,
     with_sparse_slopes,
 )
 
-# Terms without bounds must lower the expected squared error below this part of it: a smaller gain
-# may be chance.
-_LESS_ERROR = 0.9
 # Decimals of displacements, in spacings of terms. Rounding errors are smaller.
 _DIGITS = 5
 
@@ -81,18 +75,9 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     """A start from given rules, with the free weights found on a sample of the rows."""
     sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
-    low, high = sample.inputs.box
-    premise = Premise.of(antecedent, low, high)
+    premise = Premise.of(antecedent, *sample.inputs.box)
     turns = MOST_TURNS if plan.premises_move and free else 0
-    best = tune(problem, premise, free, turns)
-    # With hardly more rows than coefficients, unbounded terms could pass through every row.
-    has_rows = sample.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
-    is_bounded = bool(turns) and premise.size > 0 and antecedent.is_ordered
-    if is_bounded and has_rows and problem.n_columns <= MANY_COLUMNS:
-        unbounded = Premise.of(antecedent, low, high, is_unbounded=True)
-        freed = tune_unbounded(problem, unbounded, free)
-        if freed.expected_error < _LESS_ERROR * best.expected_error:
-            best = freed
+    best = with_free_terms(tune(problem, premise, free, turns))
     room, worths = 1.0, SLOPE_WORTHS if turns else ()
     sparse = [with_sparse_slopes(best, worth) for worth in worths]
     error = min(one.expected_error for one in (best, *sparse))

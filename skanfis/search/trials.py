@@ -28,7 +28,16 @@ from .judging import ENOUGH, FOLDS
 from .lasso import lasso_inputs
 from .sample import DIGITS, to_six_digits, unit_scale
 from .splits import best_splits, together
-from .tuning import ARRIVING, FEW_TURNS, FIRST_PENALTY, MOST_TURNS, Tuned, tune, with_sparse_slopes
+from .tuning import (
+    ARRIVING,
+    FEW_TURNS,
+    FIRST_PENALTY,
+    MOST_TURNS,
+    Tuned,
+    tune,
+    with_free_terms,
+    with_sparse_slopes,
+)
 
 # Rows that a candidate sees for each of its parameters; and the fewest that it sees in any case,
 # one fold of which is enough to judge.
@@ -94,7 +103,8 @@ class Trials:
         # Bells overlap: on an input with two values, only the cut of a tree tells the values apart.
         self.bell_inputs = [int(j) for j in plan.premise_inputs if self.spacing.n_values(j) > 2]
         self.one_rule = Candidate((1,) * rows.X.shape[1])
-        self._begun: dict[Candidate, Tuned] = {}  # trained as far as needed to rank them
+        # The problem that a candidate begins with, and the smaller one that it has grown from.
+        self._begun: dict[Candidate, tuple[SeparableProblem, Tuned]] = {}
         self._found: dict[Candidate, Tuned] = {}  # trained to the end
 
     def _significant_inputs(self, candidate, scores):
@@ -128,14 +138,14 @@ class Trials:
     def larger(self, kind, candidate) -> Candidate | None:
         """The next candidate of a kind: the one tried with the least expected error, or None."""
         smaller = self.tuned(candidate)
-        begun = {}
+        begun: dict[Candidate, Tuned] = {}
         for one in filter(self._is_small, self._tried(kind, candidate, smaller)):
             problem = self._problem(one, smaller)
             # If few rows differ, k-means finds fewer clusters than asked for: leave these out.
             if problem.antecedent.n_rules == one.n_rules:
                 still = Premise.still(problem.antecedent)
                 begun[one] = tune(problem, still, self.plan.free, 0, _STEPS_TO_PROMISE)
-        self._begun |= begun
+        self._begun |= {one: (tuned.problem, smaller) for one, tuned in begun.items()}
         return min(begun, key=lambda one: to_six_digits(self.expected(begun[one])), default=None)
 
     def _tried(self, kind, candidate, tuned):
@@ -189,7 +199,12 @@ class Trials:
                 # Terms of a grid serve many rules. More turns would fit them to runs that lie far
                 # from one another, and make the rules wild in between.
                 turns = FEW_TURNS if candidate.is_grid else MOST_TURNS
-                found = self._train(self._begun[candidate].problem, turns)
+                problem, smaller = self._begun[candidate]
+                found = self._train(problem, turns)
+                # If terms without bounds do not pay in a small grid, they are not tried in larger.
+                is_first = smaller.problem.antecedent.n_rules == 1
+                if is_first or smaller.premise.is_unbounded:
+                    found = with_free_terms(found)
                 # Monotonic constraints need a term of every rule on an input: there, all stay.
                 if candidate.n_clusters and self.plan.premises_move and self.plan.held is None:
                     found = with_fewer_conditions(found)

@@ -20,6 +20,7 @@ from ..consequent import MANY_COLUMNS
 from ..learning.evidence import (
     LARGEST,
     PRIOR_DISPLACEMENT,
+    ROWS_PER_CONSEQUENT,
     SMALLEST,
     WORTH,
     Laplace,
@@ -48,6 +49,8 @@ FEW_TURNS = 2
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
 # Terms without bounds move far in their first turn.
 _UNBOUNDED_ITERATIONS = 25
+# They must lower the expected squared error below this part of it: a smaller gain may be chance.
+_LESS_ERROR = 0.9
 # Bisection steps that raise the agreement; a smaller rise is not worth a training.
 _HALVINGS, _LEAST_RAISE = 8, 2.0
 
@@ -140,16 +143,24 @@ def tune(
     return _risen(turned(start, steps), turns - 1, steps)
 
 
-def tune_unbounded(problem: SeparableProblem, premise: Premise, free) -> Tuned:
-    """The same for unbounded terms: the premises move first, at the smallest weights.
+def with_free_terms(tuned: Tuned) -> Tuned:
+    """The same with ordered terms without bounds, as in classic ANFIS, if this pays.
 
-    Else, on data without noise, the misfit of the first premises would be taken for noise.
+    Their premises move first, at the smallest weights. Else, on data without noise, the misfit of
+    the first premises would be taken for noise.
     """
-    least: dict[str, Any] = dict.fromkeys(free, SMALLEST.alpha)
-    penalty = replace(problem.penalty, **least)
-    start = Tuned.start(problem, premise, free).with_penalty(penalty)
-    first = turned(start, ARRIVING, _UNBOUNDED_ITERATIONS)
-    return _risen(first, MOST_TURNS - 1, _STEPS)
+    problem, antecedent = tuned.problem, tuned.problem.antecedent
+    # With hardly more rows than coefficients, unbounded terms could pass through every row.
+    has_rows = problem.rows.n_rows >= ROWS_PER_CONSEQUENT * problem.n_columns
+    has_moved = tuned.curvature.size > 0 and antecedent.is_ordered
+    if not (has_moved and has_rows and problem.n_columns <= MANY_COLUMNS):
+        return tuned
+    premise = Premise.of(antecedent, *problem.rows.inputs.box, is_unbounded=True)
+    least: dict[str, Any] = dict.fromkeys(tuned.free, SMALLEST.alpha)
+    start = Tuned.start(problem, premise, tuned.free)
+    start = start.with_penalty(replace(problem.penalty, **least))
+    freed = _risen(turned(start, ARRIVING, _UNBOUNDED_ITERATIONS), MOST_TURNS - 1, _STEPS)
+    return freed if freed.expected_error < _LESS_ERROR * tuned.expected_error else tuned
 
 
 def _risen(tuned: Tuned, turns, steps) -> Tuned:

@@ -30,6 +30,17 @@ def chosen(model):
     return told
 
 
+@pytest.mark.parametrize("width", [0.3, 1.5, 2.5])
+def test_the_two_rules_that_made_the_data_are_found(rng, width):
+    """Narrow terms, and wide ones that no bound on where neighbours cross would allow."""
+    x = inputs(rng, 400, 1)
+    strengths = np.exp(-0.5 * ((x - [-0.6, 0.8]) / width) ** 2)
+    y = np.sum(strengths * (np.array([1.0, 3.0]) + x * [4.0, -5.0]), axis=1) / strengths.sum(axis=1)
+    model = ANFISRegressor(partition="grid", simplicity=0).fit(x, y)
+    assert model.n_rules_ == 2
+    assert_allclose(model.predict(x), y, atol=1e-5)
+
+
 @pytest.mark.parametrize("n_rows", [150, 2000])
 def test_noise_alone_gets_a_single_rule(rng, n_rows):
     """Nine times of ten (``benchmarks structure``, 36 of 40); here four of five at least."""

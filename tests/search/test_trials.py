@@ -9,6 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from skanfis import ANFISRegressor
 from skanfis.learning.data import StandardisedData
 from skanfis.membership import Gaussian
+from skanfis.search import trials as trials_module
+from skanfis.search import tuning
 from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.judging import dealt_rows
 from skanfis.search.sample import unit_scale
@@ -200,3 +202,24 @@ def test_a_candidate_sees_as_many_rows_as_its_parameters_need(rng):
         assert n_rows == 9000 or n_rows >= _ROWS_PER_PARAMETER * trials.n_parameters(candidate)
         assert_array_equal(rows.X, trials.rows.X[:n_rows])
         assert_array_equal(rows.inputs.box, [rows.X.min(axis=0), rows.X.max(axis=0)])
+
+
+@pytest.mark.parametrize(("noise", "n_tried"), [(0.0, 3), (0.3, 1)])
+def test_terms_without_bounds_are_tried_in_larger_grids_only_if_they_pay(
+    rng, monkeypatch, noise, n_tried
+):
+    x = rng.uniform(-1.0, 1.0, (300, 1))
+    tried = []
+
+    def with_free_terms(tuned):
+        tried.append(tuned.problem.antecedent.n_rules)
+        return tuning.with_free_terms(tuned)
+
+    monkeypatch.setattr(trials_module, "with_free_terms", with_free_terms)
+    trials = trials_of(x, np.sin(4.0 * x[:, 0]) + noise * rng.normal(size=300))
+    candidate = trials.one_rule
+    for _ in range(3):
+        candidate = trials.larger("grid", candidate)
+    trials.tuned(candidate)
+    assert tried == [2, 3, 4][:n_tried]
+    assert trials.tuned(candidate).premise.is_unbounded == (n_tried == 3)
