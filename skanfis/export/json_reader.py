@@ -321,7 +321,10 @@ def _posterior(item, antecedent, n_inputs, n_slopes, n_outputs):
     n_columns = antecedent.n_rules * (1 + len(inputs))
     if n_columns + n_parameters > MOST_PARAMETERS:
         raise ValueError(f"posterior: more than {MOST_PARAMETERS} parameters.")
-    n_rows = np.unique(antecedent.tied).size if found["premises"] else 0
+    # There may be fewer: directions that no data tell from rounding are left out.
+    n_rows, n_free = len(found["premises"]), np.unique(antecedent.tied).size
+    if n_rows > n_free:
+        raise ValueError(f"posterior.premises has {n_rows} rows; {n_free} fit.")
     n_pinned = len(_list(_list(found["pinned"], "posterior.pinned")[0], "posterior.pinned[0]", 0))
     if n_pinned > n_columns + n_rows:
         raise ValueError(f"posterior.pinned has {n_pinned} rows; {n_columns + n_rows} fit.")

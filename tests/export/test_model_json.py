@@ -9,12 +9,17 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis import ANFISRegressor
+from skanfis.datasets import make_jang_sinc
 from skanfis.export import export_json, read_fis, read_json
 from skanfis.export.json_reader import parse_json
 
 from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
 
 A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
+
+
+_ROWS_OF_PREMISES = ("premises", 0), ("cross", 1)
 
 
 def assert_same(read, model):
@@ -44,6 +49,21 @@ def test_comes_back_to_the_last_bit(model):
     rows = rows_of(model, 1.3)
     assert_array_equal(read.predict(rows), model.predict(rows))
     assert_array_equal(read.coverage(rows), model.coverage(rows))
+
+
+def test_a_posterior_may_leave_directions_out():
+    X, y = make_jang_sinc()
+    model = ANFISRegressor(n_mfs=3).fit(X, y).model_
+    whole = model.posterior
+    assert len(whole.premises) == 12
+    some = replace(whole, premises=whole.premises[2:], cross=whole.cross[:, 2:])
+    some = replace(some, pinned=np.zeros((0, 0, 0)))
+    fewer = replace(model, posterior=some)
+    assert_same(parse_json(export_json(fewer, posterior=True)), fewer)
+    twice = {name: np.repeat(getattr(whole, name), 2, axis) for name, axis in _ROWS_OF_PREMISES}
+    too_many = replace(model, posterior=replace(whole, **twice, pinned=np.zeros((0, 0, 0))))
+    with pytest.raises(ValueError, match="premises has 24 rows; 12 fit"):
+        parse_json(export_json(too_many, posterior=True))
 
 
 def test_a_person_can_read_it():
