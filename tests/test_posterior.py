@@ -229,7 +229,7 @@ def document():
         (lambda p: p.update(noise=[0.1, 0.2]), "posterior.noise: .* not a list of 1"),
         (lambda p: p.update(inputs=[0, 0]), "has an input twice"),
         (lambda p: p["consequents"].pop(), "posterior.consequents: .* is not a list of 78"),
-        (lambda p: p["premises"].pop(), "posterior.premises: .* is not a list of 8"),
+        (lambda p: p["premises"].pop(), r"posterior.cross\[0\]: .* is not a list of 7"),
         (lambda p: p["cross"][0][0].insert(0, 1.0), r"posterior.cross\[0\]\[0\]: .* list of 12"),
         (lambda p: p["cross"][0][0].__setitem__(0, "1"), "is not a number of size up to"),
     ],
