@@ -19,9 +19,6 @@ from .rule_bases import EVERY_PAIR, MODELS, build, narrow_target, rows_of
 A_GRID = replace(MODELS["grid, order 1, 2 outputs"], target=narrow_target(2))
 
 
-_ROWS_OF_PREMISES = ("premises", 0), ("cross", 1)
-
-
 def assert_same(read, model):
     """All that a model consists of, to the last bit, but what no file has."""
     if isinstance(model, tuple):
@@ -54,16 +51,17 @@ def test_comes_back_to_the_last_bit(model):
 def test_a_posterior_may_leave_directions_out():
     X, y = make_jang_sinc()
     model = ANFISRegressor(n_mfs=3).fit(X, y).model_
-    whole = model.posterior
+    whole, nothing = model.posterior, np.zeros((0, 0, 0))
     assert len(whole.premises) == 12
-    some = replace(whole, premises=whole.premises[2:], cross=whole.cross[:, 2:])
-    some = replace(some, pinned=np.zeros((0, 0, 0)))
-    fewer = replace(model, posterior=some)
+
+    def with_rows(rows):
+        parts = {"premises": whole.premises[rows], "cross": whole.cross[:, rows]}
+        return replace(model, posterior=replace(whole, **parts, pinned=nothing))
+
+    fewer = with_rows(np.arange(2, 12))
     assert_same(parse_json(export_json(fewer, posterior=True)), fewer)
-    twice = {name: np.repeat(getattr(whole, name), 2, axis) for name, axis in _ROWS_OF_PREMISES}
-    too_many = replace(model, posterior=replace(whole, **twice, pinned=np.zeros((0, 0, 0))))
     with pytest.raises(ValueError, match="premises has 24 rows; 12 fit"):
-        parse_json(export_json(too_many, posterior=True))
+        export_json(with_rows(np.tile(np.arange(12), 2)), posterior=True)
 
 
 def test_a_person_can_read_it():
