@@ -2,9 +2,9 @@ r"""The error expected on new rows: that on rows which neither growth nor traini
 
 A sequence of candidates is grown again without some of the rows, and judged on these, size by size.
 With few rows this is done in five folds. With many, half of the rows grow the candidates and half
-judge them, once. Rows that come in groups, say runs of an instrument, are left out in whole groups.
-If there are few groups, each is left out alone: leaving out several runs together would tear wider
-gaps. Rows beyond the range that a fold grows on do not judge, unless most are beyond it.
+judge them, once. Rows that come in groups, say runs of an instrument, are left out in whole groups,
+in ten folds: leaving out several runs of a dozen together would tear wider gaps. Rows beyond the
+range that a fold grows on do not judge, unless most are beyond it.
 
 Rows are dealt in a random order that depends on their values alone: neither the order of rows nor
 that of columns makes a difference. Equal rows are one row with a weight.
@@ -16,8 +16,8 @@ from sklearn.model_selection import GroupKFold
 from ..learning.data import StandardisedData
 from .sample import DIGITS, search_sample
 
-# Number of folds; up to this number of groups, each group is a fold instead.
-FOLDS, FEW_GROUPS = 5, 10
+# Number of folds of rows, and the largest number of folds of groups.
+FOLDS, FOLDS_OF_GROUPS = 5, 10
 # Rows, and groups, that are enough to judge on: further folds are not needed.
 ENOUGH, ENOUGH_GROUPS = 200, 40
 
@@ -41,8 +41,8 @@ def folds(rows: StandardisedData):
     """For every fold, positions of the rows outside and inside it; a fold holds whole groups."""
     found = n_groups(rows)
     if found > 1:
-        n_folds = found if found <= FEW_GROUPS else FOLDS
-        return list(GroupKFold(n_folds).split(rows.X, groups=rows.groups))
+        cv = GroupKFold(min(found, FOLDS_OF_GROUPS))
+        return list(cv.split(rows.X, groups=rows.groups))
     every, n_folds = np.arange(rows.n_rows), min(FOLDS, rows.n_rows)
     return [(every[every % n_folds != k], every[k::n_folds]) for k in range(n_folds)]
 

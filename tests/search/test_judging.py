@@ -52,7 +52,7 @@ class TestSplits:
 
     @pytest.mark.parametrize(
         ("n_groups", "n_folds", "n_judging"),
-        [(2, 2, 2), (8, 8, 8), (11, 5, 11), (40, 5, 40), (50, 4, 40), (100, 2, 40), (500, 1, 100)],
+        [(2, 2, 2), (8, 8, 8), (11, 10, 11), (40, 10, 40), (50, 8, 40), (100, 4, 40), (500, 1, 50)],
     )
     def test_groups_are_left_out_whole(self, rng, n_groups, n_folds, n_judging):
         """Few alone, of many a part."""
