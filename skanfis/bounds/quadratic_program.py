@@ -6,7 +6,7 @@ least-distance programming by non-negative least squares (Lawson and Hanson 1974
 """
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import qr, solve_triangular
 from scipy.optimize import nnls
 
 from ..consequent import NormalFactor
@@ -26,11 +26,14 @@ def nearest(factor: NormalFactor, start, equal, equal_to, at_least, least):
     half = factor.half_solve(at_least.T)
     base, toward = np.empty((len(half), 0)), np.empty(0)
     if equal.size:
-        base, triangle = np.linalg.qr(factor.half_solve(equal.T))
-        sizes = np.abs(np.diagonal(triangle))
-        if (sizes <= _ZERO * sizes.max(initial=0.0)).any() or equal.shape[0] > len(half):
+        # The rows of E that others imply are left out, if e agrees.
+        base, triangle, order = qr(factor.half_solve(equal.T), mode="economic", pivoting=True)
+        sizes, asked = np.abs(np.diagonal(triangle)), (equal_to - equal @ start)[order]
+        rank = np.count_nonzero(sizes > _ZERO * sizes[0])
+        base, triangle = base[:, :rank], triangle[:rank]
+        toward = solve_triangular(triangle[:, :rank], asked[:rank], trans="T")
+        if (np.abs(triangle.T @ toward - asked) > _ZERO * (1.0 + np.abs(asked))).any():
             raise InfeasibleError
-        toward = solve_triangular(triangle, equal_to - equal @ start, trans="T")
     short = least - at_least @ start - half.T @ (base @ toward)
     free = half - base @ (base.T @ half)
     length = np.sqrt(np.sum(free**2, axis=0))

@@ -328,7 +328,7 @@ def test_there_is_always_a_line(rng):
             r"output 0 is fixed to 2 at \[0. 0.\], so .* at \[0. 0.\], where it is fixed to 1",
         ),
         (
-            {"constraints": points_on_a_line(*np.linspace(-0.5, 0.5, 40))},
+            {"constraints": [FixedPoint([0.0, x], x**2) for x in np.linspace(-0.5, 0.5, 40)]},
             "No consequents of 9 rules keep the 40 fixed points. Drop a constraint",
         ),
         (
@@ -365,10 +365,18 @@ def test_a_free_fit_without_any_error_is_held_too(n_mfs, seed):
     assert_array_equal([monotonicity(model, 0)[0] for model in (rising, falling)], [1, -1])
 
 
-def test_a_point_may_be_given_twice():
+def test_points_may_say_the_same():
+    """Given twice, more of them on a line than it needs, or beyond the range with one edge."""
     points = [FixedPoint([0.2, 0.0], 0.1), FixedPoint([0.0, 0.0], 0.0)]
     once, twice = (ANFISRegressor(**QUICK, constraints=of).fit(X, Y) for of in (points, points * 2))
     assert_array_equal(once.predict(X), twice.predict(X))
+    line = [FixedPoint([x, 0.0], x) for x in (-0.2, 0.0, 0.2)]
+    edge = [FixedPoint([0.0, x], 0.3) for x in (2.0, 2.5, 3.0)]
+    for known, settings in ((line, {"n_mfs": 1}), (edge, {"out_of_bounds": "clip"})):
+        told = [ANFISRegressor(**QUICK | settings, constraints=of) for of in (known, known[::2])]
+        held, fewer = (model.fit(X, Y) for model in told)
+        assert_allclose(held.predict([one.x for one in known]), [one.y for one in known], atol=1e-9)
+        assert_allclose(held.predict(X), fewer.predict(X), atol=1e-9)
 
 
 def test_a_constant_target_contradicts_no_sign():

@@ -43,6 +43,11 @@ def test_what_cannot_be_met_is_refused(rng):
         nearest(factor, start, none, nothing, np.vstack([row, -row]), np.array([1.0, -0.9]))
     with pytest.raises(InfeasibleError):
         nearest(factor, start, np.vstack([row, row]), np.array([1.0, 2.0]), none, nothing)
+    # Twice the same says nothing new.
+    once, twice = (
+        nearest(factor, start, np.tile(row, (n, 1)), np.ones(n), none, nothing)[0] for n in (1, 2)
+    )
+    assert_allclose(twice, once, rtol=1e-9)
     # What an equality decides cannot be asked to be otherwise.
     with pytest.raises(InfeasibleError):
         nearest(factor, start, row, np.array([1.0]), row, np.array([1.1]))
