@@ -60,7 +60,8 @@ def _speaks_against(one, free, X):
     if excess[excess > 0.0].sum() <= _WRONG_PART * np.abs(excess).sum():
         return False
     column = X[:, one.input]
-    edges = np.quantile(column, np.linspace(0.0, 1.0, _PARTS + 1))
+    # Edges are values of rows, so that no part is empty.
+    edges = np.quantile(column, np.linspace(0.0, 1.0, _PARTS + 1), method="nearest")
     for low, high in pairwise(edges):
         before = X[(low <= column) & (column <= high)]
         after = before.copy()

@@ -379,10 +379,12 @@ def test_points_may_say_the_same():
         assert_allclose(held.predict(X), fewer.predict(X), atol=1e-9)
 
 
-def test_a_constant_target_contradicts_no_sign():
+def test_a_constant_target_or_two_rows_contradict_no_sign():
     # The margin between rules costs some millionths of a deviation.
     held = ANFISRegressor(**QUICK, monotonic_cst=[1, -1]).fit(X, np.full(len(X), 3.0))
     assert 0.0 < held.constraints_["loss_after"] < 1e-9
+    held = ANFISRegressor(n_mfs=1, alpha=1.0, monotonic_cst=[-1]).fit([[0.0], [1.0]], [0.0, 1.0])
+    assert_allclose(held.predict([[0.0], [1.0]]), 0.5, atol=1e-5)
 
 
 def test_a_constant_keeps_a_limit_that_the_data_contradict():
