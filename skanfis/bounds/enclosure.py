@@ -46,6 +46,8 @@ class _Parts:
         # The part of the boxes in range, (2, n_inputs, n_boxes), half its widths, the range of h.
         self.box, self.half = box, half
         self.way = np.clip(ends - box, -rules.reach[:, None], rules.reach[:, None])
+        # Inputs along which at least one box leaves the range.
+        self.outside = np.flatnonzero(self.way.any(axis=(0, 2)))
         self.shares = [
             enclosed(one, place - len(rules.counts) - 1, terms, at_middle, half)
             for place, one in enumerate(rules.factors)
@@ -59,7 +61,9 @@ class _Parts:
         radius = np.abs(rules.slopes) @ half
         self.middle = rules.shaped(centre)
         self.value = rules.shaped(np.stack([centre - radius, centre + radius]))
-        self.known: dict = {}  # cache
+        # For each factor, f less its mean along the factor's axis.
+        self.centred = [rules.centred(self, [one]) for one in self.shares]
+        self.there: dict = {}  # cache
         self.slack, self.slope_slack = rules.slacks(self)
 
 
@@ -153,9 +157,8 @@ class Enclosure:
         strength = parts.strength
         # How much errors of the strengths change the output, rule by rule.
         moved = np.zeros(parts.middle.shape)
-        for place, one in enumerate(parts.shares):
-            error = np.fmin(one.error, 1.0)
-            moved += 2.0 * strength * error * size(self._centred(parts, place))
+        for one, centred in zip(parts.shares, parts.centred, strict=True):
+            moved += 2.0 * strength * np.fmin(one.error, 1.0) * size(centred)
         slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
         for j, ends in parts.departure.items():
             # Where one rule fires alone, D is zero, but its slope is still rounded.
@@ -175,23 +178,15 @@ class Enclosure:
         own = self.shaped(self.slopes[:, j, None])
         if j not in parts.departure:
             return np.stack([own, own])
-        return own + product(parts.departure[j], self._centred(parts, self.place[j]))
+        return own + product(parts.departure[j], parts.centred[self.place[j]])
 
-    def _centred(self, parts, *places):
+    def centred(self, parts, every):
         """Range of f less its means along the axes of these factors, by shares at the middle."""
-        if places not in parts.known:
-            middle, radius = self._less_means(parts, parts.middle, places), 0.0
-            for i in np.flatnonzero(self.slopes.any(axis=0)):
-                own = self._less_means(parts, self.shaped(self.slopes[:, i, None]), places)
-                radius = radius + np.abs(own) * parts.half[i]
-            parts.known[places] = np.stack([middle - radius, middle + radius])
-        return parts.known[places]
-
-    def _less_means(self, parts, values, places):
-        for place in places:
-            one = parts.shares[place]
-            values = values - (one.middle * values).sum(axis=one.axis, keepdims=True)
-        return values
+        middle, radius = _less_means(parts.middle, every), 0.0
+        for i in np.flatnonzero(self.slopes.any(axis=0)):
+            own = _less_means(self.shaped(self.slopes[:, i, None]), every)
+            radius = radius + np.abs(own) * parts.half[i]
+        return np.stack([middle - radius, middle + radius])
 
     def _mean(self, parts, ends):
         """Range of the mean over rules, (2, n_boxes)."""
@@ -200,7 +195,7 @@ class Enclosure:
     def _natural(self, parts):
         """Range of the rules' output by its formula, E f + sum_j h_j dy/dx_j, (2, n_boxes)."""
         found = self._mean(parts, parts.value)
-        for j in self._ways_out(parts):
+        for j in parts.outside:
             slope = self._steepness(self._there(parts, j), j)
             found = found + product(parts.way[:, j], slope)
         return widened(found, parts.slack)
@@ -211,22 +206,18 @@ class Enclosure:
         g = int(np.flatnonzero(own[:, j])[0])
         if np.isnan(at[g]).all():
             return parts
-        if ("there", g) not in parts.known:
+        if g not in parts.there:
             there = np.where(np.isnan(at[g])[:, None], parts.box, at[g][:, None])
-            parts.known["there", g] = _Parts(self, *there)
-        return parts.known["there", g]
+            parts.there[g] = _Parts(self, *there)
+        return parts.there[g]
 
     def _steepness(self, parts, j):
         """Range of the slope by x_j of the rules, in range."""
         return widened(self._mean(parts, self._tangent(parts, j)), parts.slope_slack[j])
 
-    def _ways_out(self, parts):
-        """Inputs along which at least one box leaves the range."""
-        return np.flatnonzero(parts.way.any(axis=(0, 2)))
-
     def _slope(self, parts, low, high, i):
         """Range of dP/dx_i, (2, n_boxes)."""
-        model, outside, (own, at) = self.model, self._ways_out(parts), self.tangents
+        model, outside, (own, at) = self.model, parts.outside, self.tangents
         inside = beyond = self._steepness(parts, i)
         if i in outside:
             beyond = self._steepness(self._there(parts, i), i)
@@ -254,20 +245,29 @@ class Enclosure:
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:
                 own = self.shaped(self.slopes[:, other, None])
-                own = self._less_means(parts, own, [self.place[one]])
+                own = _less_means(own, [parts.shares[self.place[one]]])
                 found = found + product(parts.departure[one], (own, own))
         if i in parts.departure and j in parts.departure:
-            places = dict.fromkeys((self.place[i], self.place[j]))
+            first, second = (parts.shares[self.place[k]] for k in (i, j))
             both = product(parts.departure[i], parts.departure[j])
             if i == j:
                 both = square(parts.departure[i]) + parts.curvature[i]
-            off = self._centred(parts, *places)
-            if len(places) == 1:
+            if first is second:
                 # E D_i D_j is not zero within one factor: f loses its mean for any shares.
-                off = off - mean_range(off, [parts.shares[self.place[i]]])[::-1]
+                off = parts.centred[self.place[i]]
+                off = off - mean_range(off, [first])[::-1]
+            else:
+                off = self.centred(parts, [first, second])
             found = found + product(both, off)
         slack = EPS * ROUNDINGS * prod(self.counts) * size(found).max(axis=self.axes)
         return widened(self._mean(parts, found), slack)
+
+
+def _less_means(values, every):
+    """Values less their means along the axes of these factors, by shares at the middle."""
+    for one in every:
+        values = values - (one.middle * values).sum(axis=one.axis, keepdims=True)
+    return values
 
 
 def _best_centres(slopes, low, high):

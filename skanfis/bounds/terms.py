@@ -187,8 +187,9 @@ def enclosed(factor: dict, axis: int, terms: TermRanges, at_middle: TermRanges, 
     least, most = _by_range(_total(factor, terms.log_mu), axis)
     error = _total(factor, terms.error)
     # The sum in the softmax adds the mean error of all shares.
-    mean, largest = (most * error).sum(axis=axis, keepdims=True), _largest(error, axis)
-    error = error + np.minimum(mean, largest) + EPS * (ROUNDINGS + least.shape[axis])
+    mean = (most * error).sum(axis=axis, keepdims=True)
+    mean = np.minimum(mean, error.max(axis=axis, keepdims=True))
+    error = error + mean + EPS * (ROUNDINGS + least.shape[axis])
     slopes, curvature = _along(factor, terms.slope), _along(factor, terms.curve)
     steepness = {j: size(ends) for j, ends in slopes.items()}
     shares = Shares(axis, middle, least, most, error, steepness, curvature, {})
@@ -207,7 +208,7 @@ def enclosed(factor: dict, axis: int, terms: TermRanges, at_middle: TermRanges, 
 
 def _by_range(logarithms, axis):
     """Ranges of shares from the ranges of their logarithms alone."""
-    down, up = np.exp(logarithms - _largest(logarithms[1], axis))
+    down, up = np.exp(logarithms - logarithms[1].max(axis=axis, keepdims=True))
     slack = (down.shape[axis] + ROUNDINGS) * EPS
     all_up, all_down = (one.sum(axis=axis, keepdims=True) for one in (up, down))
     # Add what the subtraction may have lost to rounding.
@@ -237,7 +238,7 @@ def _by_mean_value(departure, at_middle, shares, half):
         for i, others in departure.items():
             both = square(ends) if i == j else product(ends, others)
             curve = shares.curvature[j] if i == j else np.zeros_like(ends)
-            largest = _largest(size(both) + size(curve), shares.axis)
+            largest = (size(both) + size(curve)).max(axis=shares.axis, keepdims=True)
             slack = EPS * (ROUNDINGS + ends.shape[shares.axis]) * largest
             rate = size(curve - mean_range(both + curve, [shares])[::-1]) + 2.0 * slack
             change = change + half[i] * rate
@@ -248,22 +249,14 @@ def _by_mean_value(departure, at_middle, shares, half):
 
 
 def mean_range(ends, every):
-    """Range of the mean, under all factors' shares, of values with an axis for each factor."""
-    return np.stack([-largest_mean(-ends[0], every), largest_mean(ends[1], every)])
-
-
-def largest_mean(values, every):
-    """Upper bound of the mean of values, under any shares of all factors in their ranges."""
+    """Range of the mean, under any shares of all factors in their ranges, of values by share."""
+    most = np.stack([-ends[0], ends[1]])
     for shares in reversed(every):
-        middle = (shares.middle * values).sum(axis=shares.axis, keepdims=True)
-        off = values - middle
+        middle = (shares.middle * most).sum(axis=shares.axis, keepdims=True)
+        off = most - middle
         beyond = np.where(off > 0.0, shares.high * off, shares.low * off)
-        values = middle + beyond.sum(axis=shares.axis, keepdims=True)
-    return values
-
-
-def _largest(values, axis):
-    return values.max(axis=axis, keepdims=True)
+        most = middle + beyond.sum(axis=shares.axis, keepdims=True)
+    return np.stack([-most[0], most[1]])
 
 
 def product(one, other):
