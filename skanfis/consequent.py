@@ -91,7 +91,7 @@ class LocalBasis:
         """Weighted moments of the inputs under each rule, from Phi' S Phi / sum(s)."""
         n_basis = gram.shape[0] // n_rules
         blocks = gram.reshape(n_rules, n_basis, n_rules, n_basis)
-        mass = blocks[:, 0, :, 0].sum(axis=1)
+        mass = rule_masses(gram, n_rules)
         fires = mass > _SMALLEST_MASS
         safe_mass = np.where(fires, mass, 1.0)[:, None]
         first = blocks[:, 1:, :, 0].sum(axis=2)

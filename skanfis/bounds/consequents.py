@@ -34,7 +34,7 @@ class Consequents:
     """A free fit with other consequents: their model, their error, and proofs of the constraints.
 
     ``model`` is in the user's units. ``free`` is the evaluation of the free fit, if possible at
-    premises for which an order of the rules is known. ``n_boxes`` counts the boxes of all proofs.
+    premises for which an order of the rules is known.
     """
 
     def __init__(self, model, free, problem, constraints):
@@ -49,7 +49,9 @@ class Consequents:
         targets = problem.rows.targets
         values = (constraints.values - targets.offset) / targets.scale
         self.fixed = self.columns.predict(constraints.points), values
-        self.n_boxes, self._part = 0, min(1.0, _TERMS / max(free.antecedent.n_terms, 1))
+        # Boxes of all proofs so far, and the most of a proof and of all.
+        part = min(1.0, _TERMS / max(free.antecedent.n_terms, 1))
+        self._n_boxes, self._most, self._most_of_all = 0, int(part * _MOST_BOXES), part * _ALL_BOXES
 
     def model(self, local, is_line=False):
         """The model with these consequents; if ``is_line``, its rules are equal to the last bit."""
@@ -131,7 +133,7 @@ class Consequents:
             now = self.model(local)
             own = [one for one in self.inequalities if one.output == k]
             worst = [_worst(one.excess(now, sample), sample) for one in own]
-            if not any(map(len, worst)) and self.n_boxes <= _ALL_BOXES * self._part:
+            if not any(map(len, worst)) and self._n_boxes <= self._most_of_all:
                 worst = [self._failure(one, now) for one in own]
             pairs = zip(own, worst, strict=True)
             rows = [nothing, *(self._rows(one, points) for one, points in pairs)]
@@ -159,9 +161,9 @@ class Consequents:
         """What branch and bound finds for an inequality, and the largest bound that proves it."""
         bound_of = Enclosure(model, one.output, -one.sign).evaluate(one.input)
         until, ends = -one.sign * one.limit, (model.minimum, model.maximum)
-        most = int(_MOST_BOXES * self._part)
-        found = largest(bound_of, *ends, 0.0, most, training_box(model), until=until)
-        self.n_boxes += found.n_boxes
+        cuts = training_box(model)
+        found = largest(bound_of, *ends, 0.0, self._most, cuts, until=until)
+        self._n_boxes += found.n_boxes
         return found, until
 
     def _is_proven(self, local):

@@ -90,7 +90,7 @@ class Enclosure:
         self.rules = replace(answering, target=None)
         self.lowest, self.highest = np.sort(sign * model.output_limits[:, output])
 
-    def say(self, X):
+    def unheld(self, X):
         """Sign times the output at rows, before it is held within limits."""
         return self.sign * self.rules.predict(X)[:, self.output]
 
@@ -112,7 +112,7 @@ class Enclosure:
             natural = self._natural(parts)[1]
             slopes = np.stack([self._slope(parts, low, high, i) for i in range(len(low))], axis=1)
             points, rise = _best_centres(slopes, low, high)
-            attained = self.say(points.T)
+            attained = self.unheld(points.T)
             by_slopes = attained + rise + 2.0 * parts.slack
             bound = np.fmin(np.where(np.isnan(natural), np.inf, natural), by_slopes)
             gain = (slopes[1] - slopes[0]) * (high - low)
@@ -138,8 +138,8 @@ class Enclosure:
                 lowest, highest = self._natural(parts)
                 is_free = (lowest >= self.lowest) & (highest <= self.highest)
                 bound = np.where(is_free, bound, np.maximum(bound, 0.0))
-            said = self.say(points.T)
-            attained = np.where(said == self.hold(said), least, 0.0)
+            outputs = self.unheld(points.T)
+            attained = np.where(outputs == self.hold(outputs), least, 0.0)
         return bound, points, attained, gain * (high - low)
 
     def _gain_of_slope(self, parts, j):
