@@ -1,9 +1,11 @@
-"""Fits in less time: where it matters that a model is fitted, and not which."""
+"""Models in less time: where it matters that a model is fitted, and not which."""
 
 from sklearn.base import clone
 
 from skanfis import ANFISRegressor
+from skanfis.consequent import in_user_units
 from skanfis.learning import SOLVERS
+from skanfis.model import TSKModel
 from skanfis.search import judging, lasso, search, trials
 
 STIFFNESS = 1e-3
@@ -33,3 +35,25 @@ def with_few_candidates(patch):
     every = judging.folds
     for module in (judging, lasso):
         patch.setattr(module, "folds", lambda rows: every(rows)[:2])
+
+
+def frozen(problem, evaluation, coefficients=None, **changes):
+    """The model of an evaluation in the units of its rows, or that of other consequents."""
+    inputs, targets = problem.rows.inputs, problem.rows.targets
+    coefficients = evaluation.coefficients if coefficients is None else coefficients
+    units = inputs, targets, problem.consequent_inputs, int(problem.n_basis > 1)
+    antecedent = evaluation.antecedent.change_units(inputs.offset, inputs.scale)
+    settings = {
+        "antecedent": antecedent,
+        "initial_antecedent": antecedent,
+        "coefficients": in_user_units(coefficients, *units),
+        "reference": inputs.offset,
+        "spread": inputs.scale,
+        "minimum": inputs.minimum,
+        "maximum": inputs.maximum,
+        "rule_weights": evaluation.masses,
+        "rule_rows": evaluation.masses,
+        "input_names": tuple(f"x{j}" for j in range(inputs.scale.size)),
+        "out_of_bounds": "clip",
+    }
+    return TSKModel(**settings | changes)

@@ -16,7 +16,6 @@ from sklearn.preprocessing import RobustScaler, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent
 from skanfis.bounds import FixedPoint
-from skanfis.consequent import in_user_units
 from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
 from skanfis.learning import LeastSquares, VariableProjection
@@ -28,6 +27,7 @@ from skanfis.membership import Bell, Gaussian
 from skanfis.options import LinearExtrapolation
 
 from . import oracles
+from .quick import frozen
 
 PENALTY = Penalty(agreement=0.3, alpha=1e-3, slope=1e-2, stiffness=0.02)
 KMEANS = KMeans(n_clusters=4, n_init=1, random_state=0)
@@ -108,7 +108,8 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, 
     posterior = posterior_of(problem, premise if is_learnt else None, evaluation, rows.n_rows)
     new = rng.uniform(-1, 1, size=(2, 80))
     noise, expected = dense_deviation(problem, premise, evaluation, new, is_learnt)
-    model = model_of(problem, evaluation, posterior)
+    wide_box = {"minimum": np.full(2, -1e3), "maximum": np.full(2, 1e3)}
+    model = frozen(problem, evaluation, posterior=posterior, **wide_box)
     X = rows.inputs.offset + rows.inputs.scale * new.T
     found = model.standard_deviation(X)[:, 0]
     sure = replace(model, posterior=posterior.given(model, X[:3]))
@@ -118,22 +119,6 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, 
     assert_allclose(left, of_known * rows.targets.scale[0], rtol=2e-5)
     assert_allclose(posterior.noise[0], noise * rows.targets.scale[0], rtol=1e-8)
     assert_allclose(found, expected * rows.targets.scale[0], rtol=1e-8)
-
-
-def model_of(problem, evaluation, posterior):
-    """A model in raw units, its box wide."""
-    rows, used, order = problem.rows, problem.consequent_inputs, int(problem.n_basis > 1)
-    raw = evaluation.antecedent.change_units(rows.inputs.offset, rows.inputs.scale)
-    return replace(
-        ANFISRegressor(n_mfs=1, max_iter=0).fit(rows.X, rows.y).model_,
-        antecedent=raw,
-        initial_antecedent=raw,
-        coefficients=in_user_units(evaluation.coefficients, rows.inputs, rows.targets, used, order),
-        term_names=("",) * raw.n_terms,
-        minimum=np.full(2, -1e3),
-        maximum=np.full(2, 1e3),
-        posterior=posterior,
-    )
 
 
 def wave(rng, n_rows, noise=0.1):

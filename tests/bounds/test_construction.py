@@ -12,14 +12,13 @@ from skanfis.bounds.certified import training_box
 from skanfis.bounds.construction import RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
 from skanfis.bounds.search import largest
-from skanfis.consequent import in_user_units
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.membership import Bell, Gaussian
-from skanfis.model import TSKModel
 
 from .. import oracles
+from ..quick import frozen
 
 FREE, ORIGIN = (-np.inf, np.inf), np.zeros(2)
 
@@ -68,23 +67,8 @@ def in_order(problem, evaluation, order):
 
 def kept(problem, evaluation, order):
     """A frozen model whose rules are in order."""
-    inputs, targets = problem.rows.inputs, problem.rows.targets
-    held = problem.local.to_global(in_order(problem, evaluation, order)[:, None])
-    coefficients = in_user_units(held, inputs, targets, np.arange(2), int(problem.n_basis > 1))
-    antecedent = evaluation.antecedent.change_units(inputs.offset, inputs.scale)
-    return TSKModel(
-        antecedent=antecedent,
-        initial_antecedent=antecedent,
-        coefficients=coefficients,
-        reference=inputs.offset,
-        spread=inputs.scale,
-        minimum=inputs.minimum,
-        maximum=inputs.maximum,
-        rule_weights=evaluation.masses,
-        rule_rows=evaluation.masses,
-        input_names=("a", "b"),
-        out_of_bounds="clip",
-    )
+    local = in_order(problem, evaluation, order)[:, None]
+    return frozen(problem, evaluation, problem.local.to_global(local))
 
 
 @pytest.mark.theory
