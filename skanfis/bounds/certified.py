@@ -215,13 +215,13 @@ def monotonicity(
     is_enough = is_in_range or is_steady or model.out_of_bounds != "linear"
     boxes = [(low, high)]
     if is_enough and not is_in_range:
-        boxes.insert(0, varying_part(training_box(model), model, of_slopes=True))
+        boxes.insert(0, (model.minimum, model.maximum))
 
     def is_proven(k, sign):
         if is_enough and is_in_order(model, k, sign * (np.arange(model.n_inputs) == j)):
             return True
         slope, cuts = Enclosure(model, k, -float(sign)).evaluate(j), training_box(model)
-        found = (largest(slope, *box, 0.0, max_boxes, cuts, until=0.0) for box in boxes)
+        found = (largest(slope, *ends, 0.0, max_boxes, cuts, until=0.0) for ends in boxes)
         return any(one.bound <= 0.0 for one in found)
 
     outputs = range(model.n_outputs)
