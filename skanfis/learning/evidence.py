@@ -46,15 +46,13 @@ _LIKENESS = 1.0 / np.log(3.0) ** 2
 # tenth of the slopes count, and add 5 % to that of planes of which all count. With fewer rows than
 # inputs, they fit noise.
 ROWS_PER_CONSEQUENT = 2
-# With fewer rows per consequent, no weight is less than this.
-_LEAST = 1e-6
 # Most of a target lies within this many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
 _LONGEST_STEP = np.log(100.0)
 # A number below all weights that has a logarithm.
 _NOTHING = np.finfo(float).tiny
-# Numbers of parameters, penalties and products of steps below this are rounding errors.
+# Numbers of parameters and penalties below this are rounding errors.
 _ROUNDING = 1e-12
 # A weight that changes by less, relative to itself, keeps its second digit.
 _SETTLED = 5e-3
@@ -180,21 +178,17 @@ def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), 
     )
 
 
-def least_weights(posterior: Laplace, n_distinct):
+def least_weights(posterior: Laplace):
     """The least weights: with smaller ones, the prior expects rules far beyond the target.
 
     A priori, the disagreement V is expected to be n_columns sigma^2 / (n lambda), and a departure
     from the common line has the variance sigma^2 / (n alpha). Neither may exceed the square of what
-    is far for a target. With hardly more distinct rows than consequents, a model can pass through
-    every row without noise, and rounding errors grow by 1 / alpha in directions that the data leave
-    open. So no weight may be next to nothing then.
+    is far for a target.
     """
-    least = _LEAST if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns else 0.0
     if posterior.line.n_rules == 1:
-        return Penalty(agreement=least, alpha=least, slope=least)
-    noise = posterior.noise_variance / posterior.n_rows
-    agreement = max(least, posterior.n_columns * noise / _FAR**2)
-    return Penalty(agreement=agreement, alpha=max(least, noise / _FAR**2), slope=least)
+        return SMALLEST
+    far = posterior.noise_variance / posterior.n_rows / _FAR**2
+    return replace(SMALLEST, agreement=posterior.n_columns * far, alpha=far)
 
 
 def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
@@ -221,8 +215,17 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
         step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
     step[components] = _step_to_likeness(cost[components], determined[components], now[components])
     moves = np.array([kind in free for kind in line.kinds]) & (before > 0.0)
+    # All weights of a kind move, or none.
+    moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
+    low = np.maximum(line.weights(SMALLEST), line.weights(least))
     ratio = np.exp(np.clip(step, -_LONGEST_STEP, _LONGEST_STEP))
-    return _limited(penalty, line, now * ratio, moves, now, least)
+    found = np.where(moves, np.clip(now * ratio, low, line.weights(LARGEST)), now)
+    after: dict[str, Any] = dict(zip(WEIGHTS, found.tolist(), strict=False))
+    if moves[slopes].any():
+        after["slope"], after["slope_pulls"] = mean_and_parts(found[slopes], line.slopes)
+    if moves[components].any():
+        after["alpha"], after["pulls"] = mean_and_parts(found[components], line.components)
+    return replace(penalty, **after)
 
 
 def _log_ratio(determined, cost):
@@ -242,43 +245,6 @@ def _step_to_likeness(cost, determined, weights):
     logs = np.log(weights)
     z = determined / (2.0 * _LIKENESS) - (logs - logs.mean())
     return z - wrightomega(z + np.log(cost / (2.0 * _LIKENESS) + _NOTHING))
-
-
-def _limited(penalty, line, weights, moves, others, least):
-    """The penalty of ``weights`` within their limits where ``moves``, of ``others`` elsewhere."""
-    slopes, components = line.of_slopes, line.of_components
-    # All weights of a kind move, or none.
-    moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()
-    low = np.maximum(line.weights(SMALLEST), line.weights(least))
-    found = np.where(moves, np.clip(weights, low, line.weights(LARGEST)), others)
-    after: dict[str, Any] = dict(zip(WEIGHTS, found.tolist(), strict=False))
-    if moves[slopes].any():
-        after["slope"], after["slope_pulls"] = mean_and_parts(found[slopes], line.slopes)
-    if moves[components].any():
-        after["alpha"], after["pulls"] = mean_and_parts(found[components], line.components)
-    return replace(penalty, **after)
-
-
-def extrapolated(line, before, now, after, free, least):
-    """The limit of successive steps by Aitken's rule: beyond ``after`` where both go one way.
-
-    If data hardly decide on a weight, as with more columns than rows, every step is a small part of
-    the way. If log weights form a geometric sequence, the rest of the way is 1 / (1 - r) last
-    steps, r the ratio of a step to the one before. It is at most the longest step, which is also
-    taken if r is one or more. ``before`` is None if there was no step before.
-    """
-    if before is None:
-        return after
-    weights = np.array([line.weights(penalty) for penalty in (before, now, after)])
-    first, second, third = np.log(np.maximum(weights, _NOTHING))
-    step, last = third - second, second - first
-    moves = np.array([kind in free for kind in line.kinds]) & (step * last > _ROUNDING)
-    if not moves.any():
-        return after
-    left = np.maximum(1.0 - step / np.where(moves, last, 1.0), np.finfo(float).eps)
-    jump = np.clip(step / left, -_LONGEST_STEP, _LONGEST_STEP)
-    far = np.where(moves, np.exp(second + jump), weights[2])
-    return _limited(after, line, far, moves, weights[2], least)
 
 
 def is_settled(line, penalty, after):

@@ -24,7 +24,6 @@ from ..learning.evidence import (
     SMALLEST,
     WORTH,
     Laplace,
-    extrapolated,
     held_displacements,
     is_settled,
     laplace,
@@ -195,25 +194,15 @@ def turned(tuned: Tuned, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
 
 
 def _improved(tuned: Tuned, steps) -> Tuned:
-    """The same point after up to ``steps`` steps of the free weights, fewer if they settle.
-
-    Similar successive steps are extrapolated to their limit, if the evidence rises there; the last
-    step is always a plain one. ``before`` is the penalty before the last step, if it was plain.
-    """
-    line, free, before = tuned.problem.common_line, tuned.free, None
-    n_distinct = tuned.problem.rows.n_rows  # a search sample has no row twice
-    for left in reversed(range(steps)):
-        posterior, now = tuned.posterior, tuned.penalty
-        least = SMALLEST if tuned.premise.is_unbounded else least_weights(posterior, n_distinct)
-        plain = reestimated(posterior, free, least, n_distinct)
-        far = extrapolated(line, before, now, plain, free, least)
-        if before is not None and is_settled(line, now, far):
+    """The same point after up to ``steps`` steps of the free weights, fewer if they settle."""
+    line, n_distinct = tuned.problem.common_line, tuned.problem.rows.n_rows  # no row is there twice
+    for _ in range(steps):
+        posterior = tuned.posterior
+        least = SMALLEST if tuned.premise.is_unbounded else least_weights(posterior)
+        penalty = reestimated(posterior, tuned.free, least, n_distinct)
+        if is_settled(line, tuned.penalty, penalty):
             break
-        jumped = tuned.with_penalty(far) if left and far != plain else None
-        if jumped is None or jumped.posterior.minus_twice_log > posterior.minus_twice_log:
-            tuned, before = tuned.with_penalty(plain), now
-        else:
-            tuned, before = jumped, None
+        tuned = tuned.with_penalty(penalty)
     return tuned
 
 

@@ -12,7 +12,6 @@ from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import (
     PRIOR_DISPLACEMENT,
     SMALLEST,
-    extrapolated,
     laplace,
     reestimated,
 )
@@ -239,17 +238,6 @@ class TestReestimated:
 
 
 STEPS = np.array([-0.01, 0.0, 0.01])
-
-
-@pytest.mark.parametrize("ratio", [0.55, 0.7])
-def test_logarithms_that_shrink_by_one_factor_are_taken_to_their_limit(ratio):
-    rows = oracles.bumpy_rows(np.random.default_rng(0), 20, 1)
-    line = SeparableProblem(rows, ONE_RULE, FIRST).common_line
-    agreements = 0.05 * 0.02 ** (ratio ** np.arange(3))
-    three = [Penalty(agreement=float(one), alpha=1.0, slope=1.0) for one in agreements]
-    found = extrapolated(line, *three, ("agreement", "alpha"), SMALLEST)
-    assert_allclose(found.agreement, 0.05, rtol=1e-12)
-    assert found.alpha == 1.0
 
 
 class OneWidth:
