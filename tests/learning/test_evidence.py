@@ -11,7 +11,6 @@ from skanfis.antecedent import GridAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import (
     PRIOR_DISPLACEMENT,
-    SMALLEST,
     laplace,
     reestimated,
 )
