@@ -67,10 +67,16 @@ def refuse_lazy(**tables):
             )
 
 
+def as_frame(table):
+    """A table of pyarrow, whose columns have neither names nor dtypes, as one of pandas."""
+    return table.to_pandas() if type(table).__module__.startswith("pyarrow") else table
+
+
 def as_numbers(table, what="X", *, takes_categories=True, floats="d"):
     """Return a table as floats, missing values as NaN; other entries are refused by column."""
     if type(table) is np.ndarray and table.dtype in list(floats) and table.ndim < 3:
         return table
+    table = as_frame(table)
     any_form = {"ensure_all_finite": False, "ensure_2d": False, "ensure_min_samples": 0}
     with named_refusals(takes_categories=takes_categories, **{what: table}):
         return check_array(table, dtype=list(floats), input_name=what, **any_form)
@@ -82,6 +88,7 @@ def rows_by_name(X, names):
     If no column has a str as its name, all are taken in their order.
     """
     refuse_lazy(X=X)
+    X = as_frame(X)
     is_named = any(isinstance(name, str) for name in getattr(X, "columns", ()))
     lacking = [name for name in names if is_named and name not in X.columns]
     if not lacking:

@@ -24,7 +24,7 @@ from ._sklearn import (
     fit_context,
 )
 from ._threads import N_JOBS, one_blas_thread
-from ._validation import check_finite, named_refusals, unchanged_by_failure, warn_user
+from ._validation import as_frame, check_finite, named_refusals, unchanged_by_failure, warn_user
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
 from .inspection import rules_html
 from .inspection.effects import importances
@@ -789,6 +789,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             and not hasattr(self, "feature_names_in_")
         )
         if not is_plain:
+            X = as_frame(X)
             with named_refusals(X=X):
                 X = validate_data(self, X, reset=False, **NUMERIC)
         check_finite(X, "X", self.model_.input_names)

@@ -252,6 +252,21 @@ def test_frames_of_polars():
         model.predict(frame.with_columns(polars.Series("time", TIMES.to_numpy())))
 
 
+def test_tables_of_pyarrow():
+    pyarrow = pytest.importorskip("pyarrow")
+    table = pyarrow.Table.from_pandas(FRAME)
+    model = ANFISRegressor(**QUICK).fit(table, pyarrow.table({"drift": Y}))
+    assert model.model_.output_names == ("drift",)
+    expected = model.predict(FRAME)
+    assert_array_equal(model.predict(table), expected)
+    assert_array_equal(model.model_.predict(table.select(NAMES[::-1])), expected)
+    assert_array_equal(explain(model, table)["value"], explain(model, FRAME)["value"])
+    place = NAMES.index("rate")
+    for entries, said in ((LO_HI, "X holds text in column 'rate'"), (TIMES, "X holds times")):
+        with refused(ValueError, said):
+            model.predict(table.set_column(place, "rate", pyarrow.array(entries)))
+
+
 @pytest.mark.parametrize("groups", [TIMES, LO_HI, pd.Series(LO_HI, dtype="category")])
 def test_groups_of_any_one_kind_serve(groups):
     # To one rule they make no difference.

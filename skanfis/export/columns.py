@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from .._sklearn import safe_indexing
-from .._validation import as_numbers, check_finite, refuse_lazy
+from .._validation import as_frame, as_numbers, check_finite, refuse_lazy
 
 _ROUNDING = 1e-9  # of a sum of shares
 
@@ -91,6 +91,7 @@ class Reader:
     def __call__(self, X) -> np.ndarray:
         """The rows of the inputs; ValueError for other columns or numbers that are not finite."""
         refuse_lazy(X=X)
+        X = as_frame(X)
         given, known = getattr(X, "columns", None), ", ".join(map(repr, self.names))
         if self.is_named and given is not None and list(given) != self.names:
             raise ValueError(

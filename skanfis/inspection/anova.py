@@ -152,6 +152,9 @@ class ProductAnova:
             self.parts.append((list(block.inputs), sets, by))
             self.means.append(half[:, :, 0])
             self.squares.append(np.einsum("arm,bsm->abrs", half, by, optimize=True))
+        # In many columns most have neither terms nor slopes: a product with their means is in vain.
+        in_vain = np.array([[1.0], [0.0]])
+        self.with_part = [g for g, mean in enumerate(self.means) if np.any(mean != in_vain)]
         self.start = np.stack([np.ones(model.n_rules), model.coefficients[:, 0, output]])
         self.mean = float(self._others(())[1].sum())
         # Count from the mean, so that squares lose no digits.
@@ -161,7 +164,7 @@ class ProductAnova:
 
     def _others(self, subset):
         """For every rule, the product of the means of all blocks that are not in the subset."""
-        others = (mean for g, mean in enumerate(self.means) if g not in subset)
+        others = (self.means[g] for g in self.with_part if g not in subset)
         return reduce(_times, others, self.start)
 
     def closed(self, subset):

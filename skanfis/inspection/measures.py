@@ -19,6 +19,8 @@ from ..blocks import add_each, fitting_rows, row_blocks
 from ..learning.data import StandardisedData
 from .sentences import Sentences
 
+_ROUNDING = 1e-12  # relative error of a difference of two sums over rows
+
 
 @dataclass(frozen=True, eq=False)
 class Measures:
@@ -56,6 +58,7 @@ def measure_rows(model, rows):
     )
     n_led = lead[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
+        squares = second - first**2 / n_led
         return Measures(
             deviation=rows.targets.scale,
             rule_weights=mass / weight,
@@ -63,7 +66,7 @@ def measure_rows(model, rows):
             rule_alone=np.sqrt(alone / n_led),
             alone=np.sqrt(alone.sum(axis=0) / weight),
             rule_errors=np.sqrt(rule_errors / n_led),
-            rule_spreads=np.sqrt(np.maximum(second - first**2 / n_led, 0.0) / n_led),
+            rule_spreads=np.sqrt(np.where(squares > _ROUNDING * second, squares, 0.0) / n_led),
             errors=np.sqrt(errors / weight),
             printed_errors=np.sqrt(printed_errors / weight),
         )

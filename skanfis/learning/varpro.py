@@ -105,7 +105,7 @@ def varpro(
             ratio = (cost - trial_cost) / expected if expected > 0.0 else -np.inf
             accepted = ratio > 0.0
             if not ratio >= 0.25:  # also where the trial is not finite
-                radius = 0.25 * min(length, radius)
+                radius = 0.25 * min(radius, length)  # the length may be NaN
             elif ratio > 0.75 and length > _ON_EDGE * radius:
                 radius = min(2.0 * radius, _LARGEST_RADIUS)
             # The decrease that a smaller step promises is lost in the rounding of the cost.

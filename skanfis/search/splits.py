@@ -55,6 +55,8 @@ def best_splits(tuned: Tuned, inputs, crossed):
     blocks = row_blocks(inputs.size, max(BLOCK_BYTES // (3 * 8 * _QUANTILES * rows.n_rows), 1))
     for leaf, strength in enumerate(tuned.evaluation.antecedent.strengths(rows.X.T)):
         own = weight * strength
+        if not own.any():  # where all other rows weigh next to nothing, a leaf may have none
+            continue
         center = np.average(crossed, axis=0, weights=own)
         basis = np.column_stack([np.ones(rows.n_rows), crossed - center])
         along = own[:, None, None] * basis[:, :, None] * residual[:, None]

@@ -6,6 +6,7 @@ import numpy as np
 from sklearn.utils.validation import check_consistent_length, validate_data
 
 from .._validation import (
+    as_frame,
     bearable_weights,
     check_finite,
     group_numbers,
@@ -66,6 +67,7 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
     """The data, checked, without rows of weight zero; ``is_chunk`` if other chunks may precede."""
     refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
     is_first = not (is_chunk and hasattr(estimator, "model_"))
+    X, y = as_frame(X), as_frame(y)
     given = y
     with named_refusals(X=X, y=y):
         X, y = validate_data(

@@ -15,7 +15,7 @@ from sklearn.preprocessing import OneHotEncoder, StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.export import export_json, fold
 from skanfis.export.json_reader import parse_json
-from skanfis.inspection import effects
+from skanfis.inspection import anova, effects
 
 from ..export.rule_bases import MODELS, build, narrow_target, rows_of
 from ..quick import quick
@@ -178,6 +178,17 @@ def test_inputs_without_terms_do_nothing_together():
     X = rows_of(MODELS["grid, order 1, 1 outputs"], 1.0, 9)
     found = effects(MODELS["grid on two inputs, order 0, 1 outputs"], X).table
     assert list(found.index[3:]) == ["time and rate", "three or more"]
+
+
+def test_columns_that_do_nothing_take_no_products(rng, monkeypatch):
+    X, times = rng.normal(size=(200, 40)), []
+    model = quick(n_mfs=[2, *[1] * 39], consequent_features=[0, 1]).fit(X, np.abs(X[:, 0]))
+    plain = anova._times
+    monkeypatch.setattr(anova, "_times", lambda *pair: times.append(1) or plain(*pair))
+    table = effects(model).table
+    assert_allclose(table["sobol"].sum(), 1.0)
+    # Two per input and two per pair, in place of one for each of 40 columns.
+    assert len(times) < 10 * len(table)
 
 
 def test_what_does_nothing_is_printed_as_one_row(rng):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis import ANFISRegressor
 from skanfis.antecedent import GridAntecedent
 from skanfis.inspection.measures import measure
 from skanfis.inspection.sentences import Sentences
@@ -107,3 +108,12 @@ def test_a_constant_target_has_a_deviation_of_one():
     found = measure(flat, np.random.default_rng(0).uniform(-2, 2, (99, 3)))
     assert_array_equal(found.deviation, 1.0)
     assert found.alone[0] < 1e-12
+
+
+def test_rows_of_a_rule_that_are_all_alike_have_no_spread():
+    X = np.linspace(-1.0, 1.0, 90)[:, None]
+    y = np.where(X < 0.0, 0.1, np.where(X < 0.5, 1.3, 1.7))
+    grid = ANFISRegressor(n_mfs=2, solver="lse").fit(X, y.ravel()).model_
+    first, second = measure(grid, X, y).rule_spreads[:, 0]
+    assert first == 0.0
+    assert second > 0.1

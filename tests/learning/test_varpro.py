@@ -222,6 +222,17 @@ class TestStatus:
         assert (result.status, result.n_iter) == ("gradient", 0)
         assert result.converged
 
+    def test_step_is_the_end_where_there_is_none(self):
+        # Weights that differ by 600 orders of magnitude leave no gradient to compute.
+        class Counted(Residuals):
+            def evaluate(self, x, reference=None):
+                assert len(self.evaluated) < 100
+                return super().evaluate(x, reference)
+
+        problem = Counted(lambda x: x + 1.0, lambda x: np.array([[np.nan]]))
+        result = varpro(problem, Box([-3.0], [3.0]), max_iter=5, tol=1e-3)
+        assert (result.status, result.n_iter) == ("step", 0)
+
     def test_step_is_the_end_where_nothing_is_tolerated(self):
         rows, premise, *_ = planted("scattered", 0, noise=0.1)
         _, result = solve(rows, premise, tol=0.0, max_iter=5000)

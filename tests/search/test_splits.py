@@ -59,6 +59,14 @@ def test_the_statistic_is_the_formula_at_every_cut(rng, n_outputs):
     assert [(split.leaf, split.input) for split in splits] == order
 
 
+def test_a_leaf_without_weight_is_not_split(rng):
+    X = rng.uniform(-1.0, 1.0, (60, 1))
+    tuned = model_of(X, np.abs(X), NOTHING.split(0, 0, 3.0, -8.0))
+    without = ~tuned.evaluation.antecedent.strengths(tuned.problem.rows.X.T).any(axis=1)
+    assert without.tolist() == [True, False]
+    assert {split.leaf for split in best_splits(tuned, range(1), np.arange(1))} == {1}
+
+
 def test_cuts_are_as_wide_as_half_of_the_leaf_and_crisp_between_two_values(rng):
     columns = rng.normal(size=400), rng.integers(0, 2, 400), 1e-3 * rng.normal(size=400)
     X = np.column_stack(columns)
