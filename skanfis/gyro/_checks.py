@@ -8,7 +8,7 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..digits import counted
-from ._columns import CANONICAL, SIGNALS, convert, convert_back, declared_units, units_of
+from ._columns import CANONICAL, SECONDS, SIGNALS, convert, convert_back, declared_units, units_of
 from .errors import LogError
 from .metrics import rate_columns
 
@@ -227,7 +227,10 @@ def check_at_rest(log, unit):
 
 
 def check_values(values, part, allow_missing=False):
-    """Raise LogError for the first value of a part that is missing or infinite."""
+    """Raise LogError for the first value of a part that is missing or infinite, or no number."""
+    if part not in LABELS and not pd.api.types.is_numeric_dtype(values):
+        advice = f" {SECONDS}" if part == "time" else ""
+        raise LogError(f"is of type {values.dtype}; it must hold numbers.{advice}", part)
     values = np.asarray(values)
     missing = np.asarray(pd.isna(values))
     bad = np.zeros_like(missing) if allow_missing else missing
