@@ -8,8 +8,9 @@ import pandas as pd
 from scipy.spatial import cKDTree
 
 from ..digits import counted
-from ._columns import CANONICAL, SIGNALS, convert, convert_back, declared_units, units_of
+from ._columns import CANONICAL, SECONDS, SIGNALS, convert, convert_back, declared_units, units_of
 from .errors import LogError
+from .metrics import rate_columns
 
 QUANTITIES = ("time", "temperature", "output", "rate")
 LABELS = ("run", "device")
@@ -226,7 +227,10 @@ def check_at_rest(log, unit):
 
 
 def check_values(values, part, allow_missing=False):
-    """Raise LogError for the first value of a part that is missing or infinite."""
+    """Raise LogError for the first value of a part that is missing or infinite, or no number."""
+    if part not in LABELS and not pd.api.types.is_numeric_dtype(values):
+        advice = f" {SECONDS}" if part == "time" else ""
+        raise LogError(f"is of type {values.dtype}; it must hold numbers.{advice}", part)
     values = np.asarray(values)
     missing = np.asarray(pd.isna(values))
     bad = np.zeros_like(missing) if allow_missing else missing
@@ -353,9 +357,10 @@ def _check_standing(output, rate, places, rows, what):
 def find_glitches(log, error):
     """Rows that no other row supports, and what is odd about each; ``error`` has one per row.
 
-    The error of a row is compared with those of the rows nearest in temperature, rate and order;
-    its temperature should lie between those of the rows before and after in the run. Least squares
-    bends the whole model towards one such row. If there are many, the first ones are named.
+    The error of a row, less what follows the rate, is compared with those of the rows nearest in
+    temperature, rate and order; its temperature should lie between those of the rows before and
+    after in the run. Least squares bends the whole model towards one such row. If there are many,
+    the first ones are named.
     """
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
@@ -370,6 +375,11 @@ def find_glitches(log, error):
     found = {row: f"the temperature of {temperature[row]:.4g} degC" for row in named}
     if more > 0:
         found[named[-1]] += f" (and that of {counted(f'{more:,}', 'row')} more)"
+    # Of a gyro that is far from linear, the curve would hide a glitch; clipped, none bends the fit.
+    columns = np.column_stack([np.ones_like(rate), rate_columns(rate, temperature)])
+    low, high = np.quantile(error, [0.05, 0.95])
+    clipped = np.clip(error, 2.0 * low - high, 2.0 * high - low)
+    error = error - columns @ np.linalg.lstsq(columns, clipped, rcond=None)[0]
     # A row farther from its neighbours than the spread of all errors is far from the median too.
     far = np.argsort(-np.abs(error - np.median(error)), kind="stable")[:_MOST_CANDIDATES]
     places = np.column_stack([temperature, rate, np.arange(len(log))])

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..export.folding import final_step
 
+SECONDS = "Give times as numbers of seconds."
 # For each unit: its factor to the canonical unit, and spellings in lower case without blanks.
 _TABLE = {
     "time": {
@@ -105,6 +106,8 @@ def in_rate_unit(unit, wanted):
 
 def check_column(values, name, n_rows=None, *, may_lack=False) -> np.ndarray:
     """``values`` as a float array of shape (n_rows,), or ValueError; ``may_lack`` admits NaN."""
+    if getattr(getattr(values, "dtype", None), "kind", "") in ("m", "M"):
+        raise ValueError(f"{name} must hold numbers, not {values.dtype}. {SECONDS}")
     try:
         numbers = np.asarray(values, dtype=float)
     except (TypeError, ValueError) as error:

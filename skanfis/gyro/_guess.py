@@ -157,6 +157,8 @@ def _guess(source, request, layout, first):
     called_rate = None if is_told else layout.places.pop("rate", None)
     places = range(len(source.header))
     sample = source.table(places, n_rows=_SAMPLE_ROWS)
+    if first is None and sample.empty:  # nothing to guess from
+        raise LogError(f"{source.path}: has no rows with values.")
     columns = [
         _Column(place, name, sample[place], source.decimal)
         for place, name in enumerate(source.header)

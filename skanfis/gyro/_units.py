@@ -114,11 +114,11 @@ def _of_time(values, units):
     if time.size > 1 and np.median(np.diff(time)) < 0.0:  # the last row comes first
         time, heat = time[::-1], heat[::-1]
     steps = np.diff(time)
-    if not (steps > 0.0).any() or not np.isfinite(heat).any():
-        return ["s"]
     # Only the first run, if the clock restarts after it; a few rows are a glitch, not a run.
     ends = np.flatnonzero(steps < 0.0)
     end = ends[0] + 1 if ends.size and ends[0] > 10 else time.size
+    if not (steps > 0.0).any() or not np.isfinite(heat[:end]).any():
+        return ["s"]
     degrees = convert(heat[:end], units.get("temperature", "degC"))
     heating = np.nanmax(degrees) - np.nanmin(degrees)
     step, duration = np.median(steps[steps > 0.0]), max(np.ptp(time[:end]), 1e-300)

@@ -17,7 +17,7 @@ from ..export.folding import found_by_search
 from ..export.json_reader import model_of
 from ..export.limits import MOST_BYTES, SMALLEST_NUMBER, number, read_bytes, shown
 from ._checks import columns_of
-from ._columns import ask, declared_units
+from ._columns import ask, check_column, declared_units
 from .compose import FrozenRules, Polynomial, ResidualRegressor, cubic_powers, joined, law_and_rules
 from .physics import DEGREES, HIGHEST_DEGREE, ROLES, OpenLoopArcsineRegressor, check_parameters
 from .thermal_rate import ThermalRate
@@ -221,7 +221,7 @@ def features(log, inputs, time_constant):
     for name in inputs:
         if name == "time":
             start = log.get("power_on", log["time"].groupby(runs).transform("first"))
-            columns[name] = (log["time"] - start).to_numpy(dtype=float)
+            columns[name] = check_column(log["time"] - start, "time")
         elif name == "temperature_rate":
             rate = ThermalRate(time_constant, time="time", run="run")
             parts = log[["time", "temperature"]].assign(run=runs)

@@ -182,8 +182,7 @@ def biases_of_branches(edges, rate, error, temperature, temperature_rate):
     The error's dependence on the rate, an odd polynomial that is linear in temperature, is fitted
     jointly with these means and subtracted (Frisch, Waugh).
     """
-    powers = (rate / (np.abs(rate).max() or 1.0))[:, None] ** np.array(_POWERS)
-    columns = np.column_stack([error, powers, powers * _centred(temperature)[:, None]])
+    columns = np.column_stack([error, rate_columns(rate, temperature)])
     moving = np.abs(temperature_rate) >= SLOWEST
     bins, columns = np.digitize(temperature[moving], edges[1:-1]), columns[moving]
     places = bins + np.where(temperature_rate[moving] > 0, 0, edges.size - 1)
@@ -193,6 +192,12 @@ def biases_of_branches(edges, rate, error, temperature, temperature_rate):
     coefficients = np.linalg.lstsq(columns[:, 1:], columns[:, 0], rcond=None)[0]
     at_rest = (means[0] - means.iloc[:, 1:] @ coefficients).where(by_place.size() >= ROWS_PER_MEAN)
     return at_rest.reindex(range(2 * (edges.size - 1))).to_numpy().reshape(2, -1)
+
+
+def rate_columns(rate, temperature):
+    """Odd powers of the rate, and their products with the temperature: what an error may follow."""
+    powers = (rate / (np.abs(rate).max() or 1.0))[:, None] ** np.array(_POWERS)
+    return np.column_stack([powers, powers * _centred(temperature)[:, None]])
 
 
 def allan_deviation(error, time, run=None):

@@ -5,6 +5,7 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from sklearn.compose import make_column_transformer
 from sklearn.linear_model import LinearRegression
@@ -227,3 +228,13 @@ def test_what_is_no_json_is_refused(tmp_path):
 def test_a_log_that_lacks_what_it_takes_is_refused_by_name(log, compensator, part):
     with pytest.raises(ValueError, match=f"the log has no {part}, which the compensator takes"):
         compensator.apply(log.drop(columns=part))
+
+
+def test_dates_are_no_times_in_seconds(log):
+    compensator = fitted(log)
+    assert "time" in compensator.inputs
+    dates = log.assign(time=pd.to_datetime(log["time"], unit="s"))
+    with pytest.raises(ValueError, match="time must hold numbers, not "):
+        compensator.apply(dates)
+    with pytest.raises(ValueError, match="time must hold numbers, not "):
+        features(dates, ("time",), 60.0)

@@ -238,6 +238,23 @@ def test_one_row_that_no_other_supports_is_named(part, by):
     assert glitches(log) == [row]
 
 
+@pytest.mark.parametrize("part", ["time", "temperature", "output", "rate"])
+def test_check_log_names_a_column_that_holds_no_numbers(part):
+    """As pandas reads decimal commas, dates and durations."""
+    log = simulated(sampling_interval=60.0)
+    for values in (log[part].astype(str), log[part].astype(object), pd.to_timedelta(log[part])):
+        with pytest.raises(LogError, match=f"column '{part}': is of type .*; it must"):
+            check_log(log.assign(**{part: values}))
+
+
+def test_glitches_are_named_that_the_curve_of_the_gyro_would_hide():
+    """The sine of the open loop leaves 4 deg/s; rows of a minute are far apart in rate."""
+    log = make_ofog(n_devices=1, n_runs=6, sampling_interval=60.0, random_state=0)
+    rows = [60, 150, 290]
+    log.loc[rows, "output"] += [3.0, -4.0, 2.0]
+    assert glitches(log) == rows
+
+
 def test_however_many_temperatures_are_glitches_and_a_step_is_none():
     log = simulated(sampling_interval=2.0)
     cold = log.loc[log.index[::400], "temperature"].index

@@ -181,6 +181,7 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
     [
         (b"", "is empty"),
         (b"\n\n  \n", "is empty"),
+        (b"Time [h],Temp (F),FOG (deg/h)\n", "has no rows with values"),
         (b"1,2,3\n4,5,6\n", "line 1: has numbers where names of columns are due"),
         (bytes(range(256)), "is not text .* or unpack it"),
         (b"temp,gyro\n20,1\n21,\x81\n", "is not text"),

@@ -37,6 +37,14 @@ def test_rate_of_a_ramp_comes_up_with_the_time_constant(steps):
     assert_allclose(rate, -0.02 * (1 - np.exp(-(time - time[0]) / 30)), rtol=1e-9)
 
 
+@pytest.mark.parametrize("convert", [pd.to_timedelta, pd.to_datetime])
+def test_dates_and_durations_are_no_times_in_seconds(log, convert):
+    """NumPy would make them microseconds, and every rate a million times too small."""
+    log = log.assign(t=convert(log["t"], unit="s"))
+    with pytest.raises(ValueError, match=r"'t' \(time\) must hold numbers, not .* seconds\."):
+        ThermalRate(30.0, time="t", run="run").fit(log[["t", "T", "run"]])
+
+
 @needs_compiler
 def test_the_lines_in_c_give_the_same(log, tmp_path):
     page = Path(__file__).parents[2] / "docs" / "gyro_data.rst"

@@ -156,6 +156,14 @@ def test_a_row_or_two_and_columns_without_numbers_tell_nothing(tmp_path, rows):
         read_table(tmp_path, pd.DataFrame(table)[:rows], require=("output",))
 
 
+def test_a_first_run_without_temperatures_tells_no_unit_of_the_time(tmp_path, truth):
+    """Its clock restarts; warnings of NumPy are errors here."""
+    table = truth[["time", "temperature", "output", "rate"]].copy()
+    table.loc[truth["run"] == 0, "temperature"] = np.nan
+    reading = read_table(tmp_path, table)
+    assert (reading.units["time"], len(reading.log)) == ("s", (truth["run"] > 0).sum())
+
+
 def test_a_bias_in_degrees_an_hour_is_asked_whether_it_is_in_degrees_a_second(tmp_path):
     wide = np.linspace(-98.0, 99.0, 101)
     table = pd.DataFrame({"temperature": np.linspace(-20.0, 60.0, 101), "output": wide})
