@@ -37,15 +37,10 @@ LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
 _AGREEMENT, _STIFFNESS = range(len(WEIGHTS))
 _OTHERS = slice(len(WEIGHTS), None)
 # x0 and nu: a term is expected to move by a fifth of a spacing.
-PRIOR_DISPLACEMENT = 0.2
+_PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
 # 1 / s^2, s the prior's standard deviation of log alpha_c, and of log rho_j: a factor of three.
 _LIKENESS = 1.0 / np.log(3.0) ** 2
-# From this many distinct rows per consequent on, unbounded terms are tried, and every slope has a
-# weight of its own. With three rows per input, such weights halve the error of planes of which a
-# tenth of the slopes count, and add 5 % to that of planes of which all count. With fewer rows than
-# inputs, they fit noise.
-ROWS_PER_CONSEQUENT = 2
 # Most of a target lies within this many standard deviations of its mean.
 _FAR = 2.0
 # One step changes a weight by no more than this factor.
@@ -119,7 +114,7 @@ class Laplace:
     @property
     def prior_precision(self):
         """Prior precision n kappa / sigma^2 of the displacements, in units of the expected one."""
-        return self.n_rows / self.noise_variance * self.penalty.stiffness * PRIOR_DISPLACEMENT**2
+        return self.n_rows / self.noise_variance * self.penalty.stiffness * _PRIOR_DISPLACEMENT**2
 
     @property
     def minus_twice_log(self):
@@ -191,12 +186,8 @@ def least_weights(posterior: Laplace):
     return replace(SMALLEST, agreement=posterior.n_columns * far, alpha=far)
 
 
-def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
-    """The penalty after one step of every free weight, none below ``least``.
-
-    If distinct rows are few for the number of consequents, all slopes share one weight. Weights of
-    their own would give way to slopes that fit noise by chance.
-    """
+def reestimated(posterior: Laplace, free, least=SMALLEST):
+    """The penalty after one step of every free weight, none below ``least``."""
     penalty, line = posterior.penalty, posterior.line
     now = line.weights(penalty)
     before, outputs = posterior.trace_before, np.full(now.size, posterior.n_outputs)
@@ -209,11 +200,8 @@ def reestimated(posterior: Laplace, free, least=SMALLEST, n_distinct=np.inf):
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision
     step = _log_ratio(determined, cost)
     slopes, components = line.of_slopes, line.of_components
-    if n_distinct < ROWS_PER_CONSEQUENT * posterior.n_columns:
-        step[slopes] = _log_ratio(determined[slopes].sum(), cost[slopes].sum())
-    else:
-        step[slopes] = _step_to_likeness(cost[slopes], determined[slopes], now[slopes])
-    step[components] = _step_to_likeness(cost[components], determined[components], now[components])
+    for alike in (slopes, components):
+        step[alike] = _step_to_likeness(cost[alike], determined[alike], now[alike])
     moves = np.array([kind in free for kind in line.kinds]) & (before > 0.0)
     # All weights of a kind move, or none.
     moves[slopes], moves[components] = moves[slopes].any(), moves[components].any()

@@ -19,11 +19,9 @@ from .._sklearn import Interval, StrOptions
 from .ordered_terms import NEXT_TO_NOTHING
 from .solver import Solver, SolverResult
 
-# Displacements are in spacings and logarithms. Steps beyond about a third of a spacing skip from
-# one arrangement of the terms to another, and may end in bad minima.
-_FIRST_RADIUS = 0.3
-# A whole spacing, however good the steps before were.
-_LARGEST_RADIUS = 1.0
+# First and largest radius. Displacements are in spacings and logarithms: longer steps skip from one
+# arrangement of the terms to another, and may end in bad minima.
+_RADIUS = 1.0
 # Steps up to the first factor longer than the radius are accepted: the radius itself is a guess.
 # Steps longer than the second part of it, as after the box has cut them, count as on its edge.
 _LENGTH_SLACK, _ON_EDGE = 1.01, 0.9
@@ -79,7 +77,7 @@ def varpro(
     cost = current.cost + 0.5 * stiffness * (x @ x)
     loss_curve = [current.mean_squared_error]
     status = "max_iter" if premise.size else "no_premise"
-    radius, settled, n_iter = _FIRST_RADIUS, 0, 0
+    radius, settled, n_iter = _RADIUS, 0, 0
     curvature = None
     while premise.size and n_iter < max_iter:
         raw = problem.linearise(current)
@@ -107,7 +105,7 @@ def varpro(
             if not ratio >= 0.25:  # also where the trial is not finite
                 radius = 0.25 * min(radius, length)  # the length may be NaN
             elif ratio > 0.75 and length > _ON_EDGE * radius:
-                radius = min(2.0 * radius, _LARGEST_RADIUS)
+                radius = min(2.0 * radius, _RADIUS)
             # The decrease that a smaller step promises is lost in the rounding of the cost.
             if accepted or radius < NEXT_TO_NOTHING:
                 break

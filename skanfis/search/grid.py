@@ -6,15 +6,13 @@ Terms stand at even steps of
 
 which is where the optimal quantiser has its points (Panter and Dite 1951). Evenly spaced terms
 would be wasted on a range that is mostly empty. The outer terms stand at quantiles, not at the
-outermost rows. Neighbouring gaps differ by a limited factor (``ordered_terms``), because a term has
-one width, which has to reach into both gaps.
+outermost rows.
 """
 
 import numpy as np
 
 from ..antecedent import GridAntecedent
 from ..learning.data import StandardisedData
-from ..learning.ordered_terms import LARGEST_RATIO
 from .sample import DIGITS, representative_rows, weighted_quantile
 
 # Neighbouring terms cross at this membership at the start. With the customary 0.5, training on
@@ -42,19 +40,9 @@ class Spacing:
     def centers(self, j, count):
         """Places of ``count`` terms on input ``j``, standardised; not to be changed."""
         if (j, count) not in self._centers:
-            self._centers[j, count] = self._found(j, count)
+            values, levels = self._columns[j]
+            self._centers[j, count] = np.interp(np.linspace(0.0, 1.0, count), levels, values)
         return self._centers[j, count]
-
-    def _found(self, j, count):
-        values, levels = self._columns[j]
-        places = np.interp(np.linspace(0.0, 1.0, count), levels, values)
-        gaps, k = np.diff(places), np.arange(count - 1)
-        # Widen small gaps: a gap k steps from another is at least its size / LARGEST_RATIO^k.
-        gaps = np.max(gaps / LARGEST_RATIO ** np.abs(k[:, None] - k), axis=1, initial=0.0)
-        if not gaps.any():
-            return places
-        gaps *= (places[-1] - places[0]) / gaps.sum()
-        return np.append(places[0], places[0] + np.cumsum(gaps))
 
 
 def _levels(column, weight, ends):

@@ -12,13 +12,12 @@ from dataclasses import replace
 import numpy as np
 
 from ..learning.data import StandardisedData
-from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from .choice import Judged, Judges, best_of, chosen, tolerated, within
 from .judging import dealt_rows, judging_folds
 from .start import Start, described, started
 from .trials import Plan, Trials
-from .tuning import cost_of
+from .tuning import ROWS_PER_CONSEQUENT, cost_of
 
 # A sequence ends this many steps beyond its best candidate. One would be too few: a product of two
 # inputs needs terms on both before either helps.

@@ -19,8 +19,6 @@ import numpy as np
 from ..consequent import MANY_COLUMNS
 from ..learning.evidence import (
     LARGEST,
-    PRIOR_DISPLACEMENT,
-    ROWS_PER_CONSEQUENT,
     SMALLEST,
     WORTH,
     Laplace,
@@ -46,6 +44,8 @@ FEW_TURNS = 2
 # A turn: a few iterations of the premises, then steps of the weights. Neither converges while the
 # other moves; the training that follows does the rest.
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
+# Rows per consequent that free terms need, and slopes by other inputs than those of the lasso.
+ROWS_PER_CONSEQUENT = 2
 # Terms without bounds move far in their first turn.
 _UNBOUNDED_ITERATIONS = 25
 # They must lower the expected squared error below this part of it: a smaller gain may be chance.
@@ -136,9 +136,6 @@ def tune(
     start = _improved(Tuned.start(problem, premise, free), first_steps)
     if premise.size == 0 or turns == 0:
         return start
-    if "stiffness" in free:
-        stiffness = start.posterior.noise_variance / (problem.n_rows * PRIOR_DISPLACEMENT**2)
-        start = start.with_penalty(replace(start.penalty, stiffness=stiffness))
     return _risen(turned(start, steps), turns - 1, steps)
 
 
@@ -195,12 +192,11 @@ def turned(tuned: Tuned, steps=_STEPS, iterations=_ITERATIONS) -> Tuned:
 
 def _improved(tuned: Tuned, steps) -> Tuned:
     """The same point after up to ``steps`` steps of the free weights, fewer if they settle."""
-    line, n_distinct = tuned.problem.common_line, tuned.problem.rows.n_rows  # no row is there twice
     for _ in range(steps):
         posterior = tuned.posterior
         least = SMALLEST if tuned.premise.is_unbounded else least_weights(posterior)
-        penalty = reestimated(posterior, tuned.free, least, n_distinct)
-        if is_settled(line, tuned.penalty, penalty):
+        penalty = reestimated(posterior, tuned.free, least)
+        if is_settled(tuned.problem.common_line, tuned.penalty, penalty):
             break
         tuned = tuned.with_penalty(penalty)
     return tuned

@@ -17,7 +17,6 @@ from ..consequent import LocalBasis, basis, in_user_units
 from ..learning import SolverResult
 from ..learning.covariance import posterior_of
 from ..learning.data import Scale, StandardisedData, check_scales, fingerprint, never_changes
-from ..learning.evidence import ROWS_PER_CONSEQUENT
 from ..learning.gram import DesignMoments
 from ..learning.objective import SeparableProblem
 from ..learning.passes import normal_sums
@@ -52,7 +51,6 @@ class RowSums:
     gram: np.ndarray  # G
     slope: np.ndarray  # c, (n_columns, n_outputs)
     square: np.ndarray  # q, (n_outputs,)
-    distinct: np.ndarray  # fingerprints of distinct rows, up to a limit
     rules: RuleRows
 
     @classmethod
@@ -66,16 +64,13 @@ class RowSums:
         design = DesignMoments(antecedent.share_counts, n_basis)
         slopes = np.zeros((n_rules * n_basis, y.shape[1]))
         sums = [np.zeros(design.shape), slopes, np.zeros(y.shape[1])]
-        centers, distinct = base.rule_centers[:, own], np.empty(0)
+        centers = base.rule_centers[:, own]
         rules = RuleRows.none(n_rules, n_inputs, own.size)
         n_values = 4 * (n_rules + antecedent.n_terms + n_inputs) + sum(design.shape)
         for part, Z, target, weight in rows.blocks(fitting_rows(n_values)):
             raw = np.array(rows.X[part].T, dtype=float, order="C")
             strengths, shares = antecedent.strengths_and_shares(raw)
             numbers = fingerprint((raw - base.reference[:, None]) / base.spread[:, None])
-            # Mantissa and exponent of the target, so that no unit makes it overflow or vanish.
-            marks = fingerprint(np.vstack([numbers, *np.frexp(rows.y[part].T)]))
-            distinct = np.union1d(distinct, marks)[: ROWS_PER_CONSEQUENT * len(slopes)]
             every = basis(Z)
             block = RuleRows.of(raw, every, strengths, weight, numbers, own, centers)
             rules = rules.plus(block, rows.inputs)
@@ -94,7 +89,6 @@ class RowSums:
             design.gram(moments),
             slope,
             square,
-            distinct,
             rules,
         )
 
@@ -123,8 +117,7 @@ class RowSums:
         one, two = self._on(inputs, targets), other._on(inputs, targets)
         names = (*_SUMS, "n_rows", "squared_weight")
         sums = {name: getattr(one, name) + getattr(two, name) for name in names}
-        distinct = np.union1d(one.distinct, two.distinct)[: ROWS_PER_CONSEQUENT * len(self.slope)]
-        return replace(one, distinct=distinct, rules=one.rules.plus(two.rules, inputs), **sums)
+        return replace(one, rules=one.rules.plus(two.rules, inputs), **sums)
 
     def _on(self, inputs: Scale, targets: Scale):
         """The sums on other scales."""
@@ -181,8 +174,8 @@ class _ProblemOfSums(SeparableProblem):
 
     def __init__(self, sums: RowSums, penalty: Penalty):
         self.antecedent, self.penalty = sums.base.antecedent, penalty
-        # Stands for the rows, of which only the scales and the number of distinct ones are used.
-        none = np.empty((len(sums.distinct), 0))
+        # Stands for the rows, of which only the scales are used.
+        none = np.empty((0, 0))
         self.rows = StandardisedData(none, none, None, sums.inputs, sums.targets)
         self.consequent_inputs, self.n_basis = sums.consequent_inputs, sums.n_basis
         self.n_columns, self.n_outputs = sums.slope.shape
