@@ -232,7 +232,7 @@ def test_out_of_range_it_is_the_deviation_of_the_tangent(kind, rng):
     """The row of the tangent by derivatives along its way, in the covariance of the posterior."""
     X, y = wave(rng, 150)
     X = np.column_stack([X, rng.normal(size=150)])
-    settings = {"n_mfs": [3, 2, 1], "max_iter": 5, **quick(0.1)}
+    settings = {"n_mfs": [3, 2, 1], "max_iter": 9, **quick(0.1)}
     settings |= {
         "order 0": {"order": 0, "n_mfs": [3, 2, 2]},
         "one slope": {"consequent_features": [1]},

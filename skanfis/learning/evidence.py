@@ -37,7 +37,7 @@ LARGEST = Penalty(agreement=1.0, alpha=1e4, slope=1e4, stiffness=1e4)
 _AGREEMENT, _STIFFNESS = range(len(WEIGHTS))
 _OTHERS = slice(len(WEIGHTS), None)
 # x0 and nu: a term is expected to move by a fifth of a spacing.
-_PRIOR_DISPLACEMENT = 0.2
+PRIOR_DISPLACEMENT = 0.2
 _PRIOR_NUMBER = 100.0
 # 1 / s^2, s the prior's standard deviation of log alpha_c, and of log rho_j: a factor of three.
 _LIKENESS = 1.0 / np.log(3.0) ** 2
@@ -114,7 +114,7 @@ class Laplace:
     @property
     def prior_precision(self):
         """Prior precision n kappa / sigma^2 of the displacements, in units of the expected one."""
-        return self.n_rows / self.noise_variance * self.penalty.stiffness * _PRIOR_DISPLACEMENT**2
+        return self.n_rows / self.noise_variance * self.penalty.stiffness * PRIOR_DISPLACEMENT**2
 
     @property
     def minus_twice_log(self):

@@ -19,6 +19,7 @@ import numpy as np
 from ..consequent import MANY_COLUMNS
 from ..learning.evidence import (
     LARGEST,
+    PRIOR_DISPLACEMENT,
     SMALLEST,
     WORTH,
     Laplace,
@@ -136,6 +137,9 @@ def tune(
     start = _improved(Tuned.start(problem, premise, free), first_steps)
     if premise.size == 0 or turns == 0:
         return start
+    if "stiffness" in free:
+        stiffness = start.posterior.noise_variance / (problem.n_rows * PRIOR_DISPLACEMENT**2)
+        start = start.with_penalty(replace(start.penalty, stiffness=stiffness))
     return _risen(turned(start, steps), turns - 1, steps)
 
 

@@ -27,7 +27,7 @@ from skanfis.learning import VariableProjection
 
 from ..quick import quick
 
-SHORT = {"max_iter": 3, "solver": VariableProjection(tol=0.1)}
+SHORT = {"max_iter": 8, "solver": VariableProjection(tol=0.1)}
 
 
 def bent(rng, n_rows):

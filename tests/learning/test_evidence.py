@@ -10,7 +10,7 @@ from scipy import integrate, optimize, stats
 from skanfis.antecedent import GridAntecedent
 from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import (
-    _PRIOR_DISPLACEMENT,
+    PRIOR_DISPLACEMENT,
     laplace,
     reestimated,
 )
@@ -296,7 +296,7 @@ class TestPremises:
     def prior_of_weight(self, found):
         """As a hundred displacements seen before would do."""
         expected = found.n_rows * found.penalty.stiffness / found.noise_variance
-        expected *= _PRIOR_DISPLACEMENT**2
+        expected *= PRIOR_DISPLACEMENT**2
         return 100.0 * (expected - np.log(expected) - 1.0)
 
     @pytest.mark.theory
