@@ -18,8 +18,7 @@ import numpy as np
 
 # Neighbouring gaps differ at most by the first factor. The gap beyond an outermost term is at most
 # the second factor times the next gap.
-LARGEST_RATIO = 2.2
-_LOG_RATIO, _LOG_OUTER = np.log(LARGEST_RATIO), np.log(1.45)
+_LOG_RATIO, _LOG_OUTER = np.log(2.2), np.log(1.45)
 # Change of the log ratio of two gaps per unit of displacement. By this unit, a term that moves by
 # some part of a gap pays about as much stiffness as a width that changes by the same part.
 _LOG_UNIT = 3.0**0.5
