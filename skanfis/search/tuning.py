@@ -45,7 +45,7 @@ FEW_TURNS = 2
 # A turn: a few iterations of the premises, then steps of the weights. Neither converges while the
 # other moves; the training that follows does the rest.
 _STEPS, _ITERATIONS, MOST_TURNS = 2, 4, 8
-# Rows per consequent that free terms need, and slopes by other inputs than those of the lasso.
+# With fewer rows per consequent, free terms are not tried, and slopes by the lasso's inputs are.
 ROWS_PER_CONSEQUENT = 2
 # Terms without bounds move far in their first turn.
 _UNBOUNDED_ITERATIONS = 25

@@ -384,3 +384,13 @@ def test_a_chunk_without_weight_in_any_form_changes_nothing(premises):
     before = model.predict(X)
     for nothing in (0.0, np.zeros(300), [0] * 300):
         assert np.array_equal(model.partial_fit(X, 1e9 * Y, nothing).predict(X), before)
+
+
+def test_the_unit_of_the_target_makes_no_difference(rng):
+    """With repeated inputs, each with ten targets."""
+    table = np.repeat(rng.uniform(-1.0, 1.0, (12, 2)), 10, axis=0)
+    y = np.sin(3.0 * table[:, 0]) + 0.1 * rng.normal(size=120)
+    premises = quick(2, **GIVEN).fit(table, y)
+    found, small = (chunk(premises).partial_fit(table, y * unit) for unit in (1.0, 1e-20))
+    assert found.alpha_ == small.alpha_
+    np.testing.assert_allclose(small.predict(table) * 1e20, found.predict(table), rtol=LAST_DIGIT)
