@@ -164,7 +164,7 @@ class Readability:
         for r, k in np.argwhere(is_poor):
             rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
             both = found.rule_errors[r, k], found.rule_spreads[r, k]
-            errs, spread = (in_digits(found.deviation[k] * one, 2) for one in both)
+            errs, spread = (in_digits(found.deviation[k] * one, 3) for one in both)
             named.append(f"{rule} (errs by {errs}, a constant by {spread})")
         what = "Errs more on its own rows than a constant would: rule"
         return [f"{what} {_named(named)}."] if named else []

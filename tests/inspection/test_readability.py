@@ -91,7 +91,7 @@ def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():
     errs = np.sqrt(np.mean((coefficients[1] - y[50:]) ** 2))
     assert [one for one in poor.findings if "constant" in one] == [
         "Errs more on its own rows than a constant would: rule 1 "
-        f"(errs by {in_digits(errs, 2)}, a constant by 1)."
+        f"(errs by {in_digits(errs, 3)}, a constant by 1)."
     ]
     # Through one row a constant may go itself.
     of_one_row = replace(poor.model, rule_rows=np.array([99.0, 1.0]))
