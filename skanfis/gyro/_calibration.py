@@ -98,9 +98,9 @@ class Calibration:
     ``compensator`` is the one written, and ``written`` its name in the verdict. ``model`` is the
     estimator of law and rules, written or not. For every row, ``before`` is the indicated rate,
     ``after`` the rate compensated by a model that had not seen the row, and ``inside`` whether the
-    row was in that model's bounds. ``simpler`` are compensations without rules; ``verdict`` judges
-    them and the model on the rows in range. ``warnings`` are those of the fit, ``glitches``
-    sentences on rows that no other row supports.
+    row was in the bounds of such a model of law and rules: then ``after`` is finite. ``simpler``
+    are compensations without rules; ``verdict`` judges them and the model on the rows ``inside``.
+    ``warnings`` are those of the fit, ``glitches`` sentences on rows that no other row supports.
     """
 
     recipe: Recipe
@@ -132,11 +132,6 @@ class Calibration:
     @property
     def rate(self):
         return self.log["rate"].to_numpy()
-
-    @property
-    def in_range(self):
-        """Rows in the bounds of a model that had not seen them, with a finite prediction."""
-        return self.inside & np.isfinite(self.after)
 
     def cautions(self, unit="deg/s"):
         """Sentences on why the compensator should not be used as it is; errors in ``unit``."""

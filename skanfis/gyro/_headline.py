@@ -118,8 +118,8 @@ def beyond(parts):
 def errors_and_verdict(calibration, name_row="row {}".format):
     """Lines of the command: errors before and after, which compensation to use."""
     before, after = (rates - calibration.rate for rates in (calibration.before, calibration.after))
-    inside = calibration.in_range
-    outside = ~calibration.inside & np.isfinite(after)
+    inside = calibration.inside
+    outside = ~inside & np.isfinite(after)
     sizes, constant = np.where(inside, np.abs(after), 0.0), calibration.verdict.rms["constant"]
     yield (
         f"error before   {rms(before[inside]):.4g} deg/s RMS, {constant:.4g} once a constant (the "

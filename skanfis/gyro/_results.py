@@ -107,16 +107,16 @@ class Results:
     def __init__(self, calibration, *, limits=(), typed="", files=(), **entries):
         self.calibration, self.limits = calibration, limits
         self.typed, self.files, self.entries = typed, files, entries
-        log, in_range = calibration.log, calibration.in_range
+        log, inside = calibration.log, calibration.inside
         known = [name for name in ("rate", "temperature", "time", "run") if name in log]
-        after = np.where(in_range, calibration.after, np.nan)
+        after = np.where(inside, calibration.after, np.nan)
         self.rows = log[known].assign(before=calibration.before, after=after)
         if "time" in log:
             # Needed even if it is no input: it shows what temperature alone cannot compensate.
             change = features(log, ("temperature_rate",), calibration.compensator.time_constant)
             self.rows["temperature_rate"] = _PER_MINUTE * change["temperature_rate"]
         # The unit in which errors do not begin with many zeros.
-        is_large = rms((calibration.before - calibration.rate)[in_range]) > _SMALL
+        is_large = rms((calibration.before - calibration.rate)[inside]) > _SMALL
         self.unit = "deg/s" if is_large else "deg/h"
         self.symbol = signs(self.unit)
 

@@ -136,8 +136,8 @@ def test_before_after_and_what_is_simpler_are_of_the_same_rows():
         left[test] -= before[train].mean()
     assert verdict.rms["constant"] == pytest.approx(rms(left[rows]))
     shown, left, *_ = errors_and_verdict(calibration)
-    error = np.abs(calibration.after - calibration.rate)[calibration.in_range]
-    row = np.flatnonzero(calibration.in_range)[error.argmax()]
+    error = np.abs(calibration.after - calibration.rate)[calibration.inside]
+    row = np.flatnonzero(calibration.inside)[error.argmax()]
     told = f"half of them within {np.median(error):.4g}, peak {error.max():.4g} (row {row})"
     assert left.endswith(told)
     errors = [f"{verdict.rms[name]:.4g}" for name in ("no compensation", "constant")]

@@ -155,7 +155,7 @@ def test_the_verdict_comes_first(page, calibration, no_pictures):
 def test_one_unit_throughout(page, calibration, no_pictures, monkeypatch):
     """Of errors; rates, and the formula of what to use instead, are in deg/s."""
     monkeypatch.setattr("skanfis.gyro._results._SMALL", np.inf)
-    size = rms((calibration.after - calibration.rate)[calibration.in_range])
+    size = rms((calibration.after - calibration.rate)[calibration.inside])
     hourly = text_of(calibration)
     for text, unit, factor in ((Outline(page).text, "°/s", 1.0), (hourly, "°/h", 3600.0)):
         told = text[text.index("How it was checked") : text.index("Figures of merit")]

@@ -51,7 +51,7 @@ def _write(calibration, text, folder):
     # ArduPilot applies the difference at T minus that at T_cal.
     is_relative = name == "ardupilot"
     largest = high - low if is_relative else max(0.0, -low, high)
-    model_rms = rms((calibration.after - calibration.rate)[calibration.in_range])
+    model_rms = rms((calibration.after - calibration.rate)[calibration.inside])
     if not np.isfinite(largest):
         return "its difference from the model could not be bounded.", False
     left = _held_out_rms(calibration, make, is_relative)
@@ -93,8 +93,8 @@ def _held_out_rms(calibration, make, is_relative):
     for (train, test), estimator in folds:
         error = ErrorModel(calibration.compensator, estimator, X.iloc[train])
         made = make(error).piecewise
-        rows = test[calibration.in_range[test]]
+        rows = test[calibration.inside[test]]
         left = errors[rows] - made(X.iloc[rows].to_numpy())
         shift = made(at) - error(at) if is_relative else np.zeros(1)
         squares = squares + (left**2).sum() + 2.0 * shift * left.sum() + left.size * shift**2
-    return float(np.sqrt(np.max(squares) / calibration.in_range.sum()))
+    return float(np.sqrt(np.max(squares) / calibration.inside.sum()))

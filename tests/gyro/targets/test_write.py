@@ -52,7 +52,7 @@ def test_errors_on_rows_held_out_by_hand_and_files_say_so(tmp_path):
     for (train, test), model in zip(calibration.split.folds, calibration.fold_models, strict=True):
         error = ErrorModel(calibration.compensator, model, X.iloc[train])
         # Of the definition: the model's own prediction of rows that are new to it.
-        inside = test[calibration.in_range[test]]
+        inside = test[calibration.inside[test]]
         by_hand = calibration.before[inside] - error(X.iloc[inside].to_numpy())
         np.testing.assert_allclose(by_hand, after[inside], atol=1e-12)
         for name, made in (("table", Table(error, "float", n_cells)), ("px4", Cubic(error, "px4"))):
@@ -61,7 +61,7 @@ def test_errors_on_rows_held_out_by_hand_and_files_say_so(tmp_path):
             if name == "px4":
                 at = np.linspace(*X.iloc[train].agg(["min", "max"])["temperature"], 50)[:, None]
                 lefts[test] = (off[:, None] + made.piecewise(at) - error(at))[test]
-    rows = calibration.in_range
+    rows = calibration.inside
     for name in ("table", "px4"):
         _, of_target, of_model, *held = numbers_of(told[name][0])
         assert of_target == pytest.approx(rms(left[name][rows]), rel=1e-3)
