@@ -8,7 +8,7 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from ..inspection.labels import as_label
-from ._columns import PER_HOUR, RATE_UNITS, evenly_chosen
+from ._columns import RATE_UNITS, evenly_chosen
 from .metrics import allan_deviation, allan_figures, rms, table_of
 
 # Colours that the colour-blind can tell apart.
@@ -230,8 +230,6 @@ class AllanDisplay(GyroDisplay):
         errors = {side: rows[side].where(both).to_numpy() for side in SIDES}
         curves = {side: allan_deviation(error, time, run) for side, error in errors.items()}
         table = pd.concat(curves, names=["curve"]).reset_index("curve")
-        # allan_deviation takes deg/s and gives deg/h, 3600 times the unit of its argument.
-        table[["deviation", "error"]] /= PER_HOUR
         names = "averaging time [s]", f"Allan deviation [{unit}]", f"error [{unit}]"
         table.columns = ["curve", *names]
         return {"allan": table.reset_index(drop=True)}

@@ -203,9 +203,10 @@ def rate_columns(rate, temperature):
 def allan_deviation(error, time, run=None):
     """Overlapping Allan deviation, by allantools, in octaves up to a tenth of a stretch.
 
-    The error [deg/s] is used on all stretches of a run where it is known and rows are evenly spaced
-    in time; their variances are averaged. Returns a table: averaging_time [s], deviation and its
-    standard error [deg/h], by IEEE 952, from the number of differences of non-overlapping means.
+    The error is used on all stretches of a run where it is known and rows are evenly spaced in
+    time; their variances are averaged. Returns a table: averaging_time [s]; in the unit of the
+    error the deviation and, by IEEE 952 from the number of differences of non-overlapping means,
+    its standard error.
     """
     told = "The Allan deviation needs allantools: pip install allantools."
     oadev = needed("allantools", told).oadev
@@ -228,9 +229,9 @@ def allan_deviation(error, time, run=None):
     if not parts:
         raise ValueError(f"nowhere do {_ROWS_PER_TIME} rows in range follow evenly in time")
     sums = pd.concat(parts).groupby("steps", as_index=False).sum()
-    curve = pd.DataFrame({"averaging_time": sums["steps"] * usual})
-    curve["deviation"] = PER_HOUR * np.sqrt(sums["sum"] / sums["n"])
-    return curve.assign(error=curve["deviation"] / np.sqrt(2.0 * sums["apart"]))
+    deviation = np.sqrt(sums["sum"] / sums["n"])
+    columns = {"averaging_time": sums["steps"] * usual, "deviation": deviation}
+    return pd.DataFrame(columns | {"error": deviation / np.sqrt(2.0 * sums["apart"])})
 
 
 def allan_figures(tau, deviation):

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from sklearn.utils import check_random_state
 
 from . import metrics
-from ._columns import RATE_UNITS, in_rate_unit
+from ._columns import PER_HOUR, RATE_UNITS, in_rate_unit
 
 # With fewer runs than this, blocks of rows are resampled: two or three runs say little of others.
 _FEWEST_RUNS = 5
@@ -186,7 +186,7 @@ def _of_side(rows, side):
 
 def _allan_cells(part, side, is_answered):
     """Coefficients of the Allan deviation, over rows that follow one another."""
-    error = (part[side] - part["rate"]).where(is_answered).to_numpy()
+    error = PER_HOUR * (part[side] - part["rate"]).where(is_answered).to_numpy()
     try:
         curve = metrics.allan_deviation(error, part["time"].to_numpy(), part.get("run"))
         found = metrics.allan_figures(*curve[["averaging_time", "deviation"]].to_numpy().T)
