@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
+from scipy.stats import binned_statistic
 
 from ._columns import PER_HOUR, check_column, check_labels
 from .errors import needed
@@ -285,11 +286,8 @@ def _reduction(rate, before, after):
 
 def _nonlinearity(rate, output, full_scale, size):
     """Nonlinearity of means over bins of the rate: that of single rows would be their noise."""
-    low, width = rate.min(), np.ptp(rate) / _RATE_BINS
-    if width > 0:
-        place = np.minimum(((rate - low) / width).astype(int), _RATE_BINS - 1)
-        counts, *sums = (np.bincount(place, weights) for weights in (None, rate, output))
-        rate, output = (each[counts > 0] / counts[counts > 0] for each in sums)
+    means = binned_statistic(rate, [rate, output], bins=_RATE_BINS).statistic
+    rate, output = means[:, ~np.isnan(means[0])]
     slope, intercept = _line(rate, output)
     return _PPM * size(output - slope * rate - intercept) / (abs(slope) * full_scale)
 
