@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from ..inspection.displays import mark_decades
 from ..inspection.labels import as_label
 from ._columns import RATE_UNITS, evenly_chosen
 from .metrics import allan_deviation, allan_figures, rms, table_of
@@ -197,7 +198,7 @@ class GroupResidualDisplay(GyroDisplay):
         for (side, color), error in zip(SIDES.items(), errors.T, strict=True):
             panel.plot(error, lines, "o", color=color, label=side, markersize=5)
         panel.set(xscale="log", xmargin=0.2)
-        mark_decades(panel.xaxis, *panel.get_xlim())
+        mark_decades(panel.xaxis)
         panel.set_yticks(lines, [as_label(group) for group in shown["group"]])
         panel.set_ylim(-0.7, len(shown) - 0.3)
         extent = f"worst {len(shown)} of {len(groups)}" if len(shown) < len(groups) else len(shown)
@@ -243,8 +244,8 @@ class AllanDisplay(GyroDisplay):
             label = side + self._coefficients(time, deviation)
             panel.loglog(time, deviation, "o-", color=color, label=label, ms=3, lw=1.4)
         dress(panel, "averaging time [s]", f"Allan deviation [{self._unit}]")
-        mark_decades(panel.xaxis, *panel.get_xlim())
-        mark_decades(panel.yaxis, *panel.get_ylim())
+        mark_decades(panel.xaxis)
+        mark_decades(panel.yaxis)
         panel.legend(frameon=False)
         panel.set_title(_CAUTION, loc="left", fontsize="small")
 
@@ -293,14 +294,3 @@ def three_digits(value):
     # The exponent after rounding: 9.996 becomes 10.0.
     decimals = max(2 - int(f"{value:.2e}".partition("e")[2]), 0)
     return f"{value:,.{decimals}f}" if decimals < 8 else f"{value:.2e}"
-
-
-def mark_decades(axis, low, high):
-    """Label a logarithmic axis with plain numbers, 0.01, 0.1, 1, not with powers of ten."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    decades = np.log10(high / low)
-    digits = (1, 2, 3, 5) if decades < 1.0 else (1, 3) if decades < 3.0 else (1,)
-    axis.set_major_locator(LogLocator(subs=digits, numticks=8))
-    axis.set_major_formatter("{x:,g}")
-    axis.set_minor_formatter(NullFormatter())

@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 
 from ..digits import percent
+from ..inspection.displays import mark_decades
 from ._columns import ask, check_column, evenly_chosen
-from .displays import SIDES, GyroDisplay, bins_of, dress, mark_decades, signs, three_digits
+from .displays import SIDES, GyroDisplay, bins_of, dress, signs, three_digits
 from .metrics import HYSTERESIS_BINS, biases_of_branches
 
 # Bands of temperature; bins of the rate, an odd number, so that zero is in the middle of one; part
@@ -170,7 +171,7 @@ class ResidualSurfaceDisplay(GyroDisplay):
         norm = LogNorm(vmin=1, vmax=max(counts.max(), 2))
         mesh = _draw_cells(axes[1], cells, counts.where(counts > 0), cmap="viridis", norm=norm)
         bar = self.figure_.colorbar(mesh, ax=axes[1], label="rows in the cell")
-        mark_decades(bar.ax.yaxis, norm.vmin, norm.vmax)
+        mark_decades(bar.ax.yaxis)
         title = f"{residual.name}: largest {three_digits(residual.abs().max())}"
         dress(axes[0], "temperature [degC]", "true rate [deg/s]", title)
         empty = np.mean(counts == 0)

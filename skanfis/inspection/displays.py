@@ -306,6 +306,18 @@ def pyplot():
     return plt
 
 
+def mark_decades(axis):
+    """Label a logarithmic axis with plain numbers, 0.01, 0.1, 1, not with powers of ten."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
+    low, high = axis.get_view_interval()
+    decades = np.log10(high / low)
+    digits = (1, 2, 3, 5) if decades < 1.0 else (1, 2, 5) if decades < 3.0 else (1,)
+    axis.set_major_locator(LogLocator(subs=digits, numticks=8))
+    axis.set_major_formatter("{x:,g}")
+    axis.set_minor_formatter(NullFormatter())
+
+
 def _section(model, both, n_points, held):
     """A grid over two inputs, its rows with the others held, and the others' values by name.
 

@@ -9,7 +9,7 @@ import pandas as pd
 
 from ..export.folding import last_step
 from ..search.choice import tolerated
-from .displays import axes_or_new, pyplot
+from .displays import axes_or_new, mark_decades
 
 # Colours that the colour-blind can tell apart, and a marker for each kind.
 _KINDS = {"one rule": ("0.3", "s"), "grid": ("#0072b2", "o"), "scattered": ("#d55e00", "^")}
@@ -105,18 +105,12 @@ class StructureDisplay:
         ax.axhline(self.tolerance, linestyle="--", color="0.5", linewidth=1, label=label)
         ax.set_xlabel("reading cost, numerals in the rules")
         ax.set_ylabel("error expected of new rows,\nsd of the target")
-        _on_logarithms(ax.set_xscale, ax.xaxis)
+        ax.set_xscale("log")
+        mark_decades(ax.xaxis)
         if 0.0 < _FAR_APART * errors.min() < errors.max():
-            _on_logarithms(ax.set_yscale, ax.yaxis)
+            ax.set_yscale("log")
+            mark_decades(ax.yaxis)
         # Above the picture, where it hides no candidate.
         place = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.1}
         ax.legend(ncols=2, fontsize="small", frameon=False, **place)
         return self
-
-
-def _on_logarithms(set_scale, axis):
-    """A logarithmic scale with plain numbers."""
-    set_scale("log")
-    axis.set_major_locator(pyplot().LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter("{x:g}")
-    axis.set_minor_formatter(pyplot().NullFormatter())
