@@ -26,9 +26,9 @@ from ._sklearn import (
 from ._threads import N_JOBS, one_blas_thread
 from ._validation import as_frame, check_finite, named_refusals, unchanged_by_failure, warn_user
 from .exceptions import ForgottenRowsWarning, OutOfBoundsWarning
-from .inspection import rules_html
+from .inspection import Readability, rules_html
 from .inspection.effects import importances
-from .inspection.readability import readability_of_rows
+from .inspection.measures import measure
 from .learning import SOLVERS, Solver, VariableProjection
 from .membership import MEMBERSHIPS, NAMES_IN_MATLAB, Membership
 from .model import TSKModel
@@ -570,7 +570,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
             self._sums = before.faded(forgetting**n_rows).plus(latest)
         if not is_solved:
             self._solve_chunks()
-            self.readability_ = replace(readability_of_rows(self.model_, *rows), is_of_chunk=True)
+            found = measure(self.model_, *rows)
+            self.readability_ = Readability(self.model_, found, is_of_chunk=True)
         self.n_samples_seen_ = getattr(self, "n_samples_seen_", 0) + n_rows
 
     def _begin_chunks(self, X, y, data, weight):
@@ -761,7 +762,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         self.noise_std_ = noise[0] if noise is not None and self._single_output else noise
 
     def _readability(self, data):
-        return readability_of_rows(self.model_, data.X, data.y, data.sample_weight)
+        return Readability(self.model_, measure(self.model_, data.X, data.y, data.sample_weight))
 
     def _repr_html_inner(self):
         # For notebooks: scikit-learn 1.6 to 1.9 calls this method or the next, by version.

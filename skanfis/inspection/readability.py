@@ -245,12 +245,7 @@ def readability(
         weight = column_or_1d(check_array(sample_weight, dtype=float, ensure_2d=False))
         positive_weights(weight, len(rows))
     check_consistent_length(rows, target, weight)
-    return readability_of_rows(model, rows, target, weight)
-
-
-def readability_of_rows(model, X, y=None, sample_weight=None):
-    """Measure a model on arrays that have been checked."""
-    return Readability(model, measure(model, X, y, sample_weight))
+    return Readability(model, measure(model, rows, target, weight))
 
 
 def readability_in_training(estimator, model):

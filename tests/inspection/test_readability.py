@@ -13,7 +13,6 @@ from sklearn.preprocessing import StandardScaler
 from skanfis import ANFISRegressor
 from skanfis.digits import in_digits
 from skanfis.inspection import explain, export_text, readability
-from skanfis.inspection.readability import readability_of_rows
 
 from ..export.rule_bases import MODELS, rows_of
 from ..quick import quick
@@ -26,7 +25,7 @@ def found_of(model, **changes):
     """A report with measures that pass, but for what is changed."""
     X = rows_of(model, 1.0)
     y = np.random.default_rng(0).normal(size=(len(X), model.n_outputs))
-    found = readability_of_rows(model, X, y)
+    found = readability(model, X, y)
     ones, rows = np.ones(model.n_outputs), changes.pop("rule_rows", np.full(model.n_rules, 50.0))
     passing = {"alone": 0.5 * ones, "errors": ones, "printed_errors": ones}
     passing["rule_spreads"] = found.measures.rule_errors / 1.05

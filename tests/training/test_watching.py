@@ -117,7 +117,7 @@ class TestCallbacks:
 
 @pytest.mark.parametrize(
     ("where", "name"),
-    [(watching.Printer, "__call__"), (regressor, "readability_of_rows")],
+    [(watching.Printer, "__call__"), (regressor, "measure")],
     ids=["at the end of an iteration", "once the model is there"],
 )
 def test_an_estimator_that_is_interrupted_is_as_before(monkeypatch, where, name):
