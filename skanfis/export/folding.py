@@ -297,8 +297,6 @@ def _model_of(label, estimator):
             f"estimator must be or end in an ANFIS estimator; {_described(label, estimator)} has "
             "no rules."
         )
-    if not hasattr(estimator, "out_of_bounds"):
-        return model
     return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
 
 

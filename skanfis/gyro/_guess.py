@@ -301,10 +301,10 @@ def _settle_units(columns, layout, of_first):
             name = layout.name(part)
             layout.notes.append(f"{name!r} is read in {unit} as told, not in {own[part]}")
     layout.units = own | layout.units
-    lacking = [part for part in values if part not in layout.units and values[part].size]
     if of_first is None:
         found = settle_units(values, layout.units, is_all=False)
     else:
+        lacking = values.keys() - layout.units.keys()
         found = {part: of_first.get(part, CANONICAL[part]) for part in lacking}
     layout.units |= found
     layout.assumed = [part for part in PARTS if part in found]

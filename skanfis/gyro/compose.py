@@ -235,10 +235,7 @@ def law_and_rules(estimator):
             f"base must be an OpenLoopArcsineRegressor, whose law can be written; it is {law!r}. "
             "The law chooses its columns by its own parameters, and needs no Pipeline."
         )
-    rules = FrozenRules.of(found.residual_, law.n_features_in_)
-    if rules.model.n_outputs != 1:
-        raise ValueError(f"residual has {rules.model.n_outputs} outputs; the rate is one.")
-    return law, rules
+    return law, FrozenRules.of(found.residual_, law.n_features_in_)
 
 
 def rules_of(estimator):

@@ -275,10 +275,6 @@ class LogFile:
             self.notes.append(f"{self.path}: the last row comes first; rows are turned round")
             log = log[::-1]
         twice = log.duplicated() & log["time"].notna()
-        # Two runs may be equal because all their values are constant.
-        if log[twice].drop(columns="time").duplicated()[1:].all():
-            # Then only a row that directly repeats the one before is left out.
-            twice &= log["time"].diff() == 0.0
         if twice.any():
             first, last = map(self.source.place_of, log.index[twice][[0, -1]])
             repeated = counted(f"{twice.sum():,}", "repeated row")

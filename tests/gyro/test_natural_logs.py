@@ -165,7 +165,8 @@ def test_many_files_a_pattern_and_headers_that_nearly_agree(tmp_path, truth):
     ],
 )
 def test_runs_are_told_by_the_time(tmp_path, times, runs):
-    table = pd.DataFrame({"time": times, "temperature": 20.0, "output_dps": 1.0})
+    output = 0.01 * np.arange(times.size)
+    table = pd.DataFrame({"time": times, "temperature": 20.0, "output_dps": output})
     log = found_in(tmp_path, table).log
     assert ("run" in log) == (runs is not None)
     if runs is not None:
