@@ -180,9 +180,7 @@ class Readability:
         return f"{numbers}; the text as printed errs {errs} the model"
 
     def __repr__(self):
-        return f"<Readability of {self.model!r}: {self.line}>"
-
-    def __str__(self):
+        # As a notebook shows it.
         nothing = "Nothing measured here speaks against reading the rules one by one."
         of_chunk = ["Errors are of the rows of the latest partial_fit alone."] * self.is_of_chunk
         lines = [f"{self.line}.", *(self.findings or [nothing]), *of_chunk]
