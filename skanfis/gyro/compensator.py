@@ -15,7 +15,7 @@ from ..export import export_json
 from ..export.c.dialect import status_word
 from ..export.folding import found_by_search
 from ..export.json_reader import model_of
-from ..export.limits import MOST_BYTES, SMALLEST_NUMBER, number, read_bytes, shown
+from ..export.limits import MOST_BYTES, SMALLEST_NUMBER, number, numbers, read_bytes, shown
 from ._checks import columns_of
 from ._columns import ask, check_column, declared_units
 from .compose import FrozenRules, Polynomial, ResidualRegressor, cubic_powers, joined, law_and_rules
@@ -286,12 +286,12 @@ def _read_law(document, inputs):
     if not _are_of(columns, inputs) or len(columns) > len(ROLES):
         raise ValueError(f"the law's columns are {columns!r}; they must be 1 to 3 of the inputs")
     longest = 1 + HIGHEST_DEGREE if len(columns) > 1 else 1
-    fitted = {key: _list_of_numbers(document[key], key, 1, longest) for key in _POLYNOMIALS}
+    fitted = {key: _coefficients(document[key], f"law.{key}", longest) for key in _POLYNOMIALS}
     for key in ("amplitude", "sagnac_factor"):
         _divisor(document[key][0], f"law.{key}[0]")
     degrees = [fitted[key].size - 1 for key in _POLYNOMIALS]
     for key in _RANGE:
-        fitted[key] = _list_of_numbers(document[key], key, len(columns), len(columns))
+        fitted[key] = numbers(document[key], f"law.{key}", (len(columns),))
     if (fitted["minimum"] > fitted["maximum"]).any():
         raise ValueError("the law's minimum is above its maximum")
     fitted |= {key: number(document[key], f"law.{key}") for key in _NUMBERS}
@@ -320,7 +320,7 @@ def _read_polynomial(document, rule, inputs):
         raise ValueError("a polynomial goes with a rule on all inputs, and no law")
     n_terms = len(cubic_powers(len(inputs)))
     sizes = zip(_OF_POLYNOMIAL, (len(inputs), len(inputs), n_terms), strict=True)
-    lists = {k: _list_of_numbers(document[k], k, n, n, "polynomial") for k, n in sizes}
+    lists = {key: numbers(document[key], f"polynomial.{key}", (n,)) for key, n in sizes}
     for j, value in enumerate(document["scale"]):
         _divisor(value, f"polynomial.scale[{j}]")
     box, names = (rule.model.minimum, rule.model.maximum), np.array(inputs, dtype=object)
@@ -333,11 +333,10 @@ def _divisor(value, where):
     return size if value > 0 else -size
 
 
-def _list_of_numbers(values, key, fewest, most, where="law"):
-    if not isinstance(values, list) or not fewest <= len(values) <= most:
-        count = f"{fewest}" if fewest == most else f"{fewest} to {most}"
-        raise ValueError(f"{where}.{key}: {shown(values)} must be a list of {count} number(s)")
-    return np.array([number(value, f"{where}.{key}[{k}]") for k, value in enumerate(values)])
+def _coefficients(values, where, most):
+    if not isinstance(values, list) or not 0 < len(values) <= most:
+        raise ValueError(f"{where}: {shown(values)} is not a list of 1 to {most}")
+    return numbers(values, where, (len(values),))
 
 
 def _are_of(names, known):

@@ -237,7 +237,6 @@ def test_bad_logs_are_refused_in_one_sentence(tmp_path, log, spoil, typed, messa
         ("--units time=year", "time has no unit 'year'"),
         ("--terms 2,x", "must be search, or numbers"),
         ("--terms 2,2", "has 2 numbers for 4 inputs: time, temperature, "),
-        ("--terms 2 --inputs time output", "has 1 number for 2 inputs: time, output"),
         ("--physics --inputs temperature", "needs the output"),
         ("--write law-line --inputs temperature", "--write law-line: the arcsine law needs the"),
         ("--inputs rate", "invalid choice: 'rate'"),
