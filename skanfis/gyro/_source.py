@@ -57,7 +57,11 @@ class _TextSource:
         head = list(islice(self._records(), _HEAD_ROWS))
         if not head:
             raise LogError(f"{path}: is empty.")
-        self._place_header(head)
+        place, first, self.header = _header_place(path, [values for _, values in head])
+        self._n_above = first
+        self._n_lines = head[first][0] - 1 if first < len(head) else None
+        if place:
+            self.notes.append(f"the header is line {head[place][0]}; what is above it is skipped")
         self.decimal = self._find_decimal(head)
         self._check_lengths()
 
@@ -80,16 +84,6 @@ class _TextSource:
             return "."
         self.notes.append("decimal fractions are written with a comma")
         return ","
-
-    def _place_header(self, head):
-        try:
-            place, first, self.header = _header_place([values for _, values in head])
-        except LogError as error:
-            raise LogError(f"{self.path}, line {head[0][0]}: {error}") from error
-        self._n_above = first
-        self._n_lines = head[first][0] - 1 if first < len(head) else None
-        if place:
-            self.notes.append(f"the header is line {head[place][0]}; what is above it is skipped")
 
     def _check_lengths(self):
         """Refuse rows longer than the header, which pandas would cut silently."""
@@ -185,7 +179,7 @@ class _TextSource:
             raise _no_text(self.path) from error
 
 
-def _header_place(rows):
+def _header_place(path, rows):
     """Find the header among the first rows: its place, that of the first row below, the names.
 
     The header is the last line before those of numbers. Units may have a line of their own.
@@ -195,7 +189,7 @@ def _header_place(rows):
     start = ends[-1] + 1 if ends else 0
     data = [k >= start and _is_data(values) for k, values in enumerate(rows)]
     if not any(data) and len(rows) == _HEAD_ROWS:
-        raise LogError(f"has no row of numbers in its first {len(rows)} lines.")
+        raise LogError(f"{path}: has no row of numbers in its first {len(rows)} lines.")
     # A line of the preamble may hold numbers too, but no three such lines in a row.
     together = [
         k
@@ -204,7 +198,7 @@ def _header_place(rows):
     ]
     first = next(iter(together), data.index(True) if any(data) else start + 1)
     if first == 0:
-        raise LogError("has numbers where names of columns are due; give the file a header.")
+        raise LogError(f"{path}: has numbers where names are due; give the file a header.")
     n_fields = len(rows[first]) if first < len(rows) else len(rows[start])
     fits = [k for k in range(start, first) if len(rows[k]) == n_fields]
     place = fits[-1] if fits else start
@@ -342,10 +336,8 @@ def _excel_source(path):
         raise LogError(f"{path}: is empty.")
     notes = [f"of {len(sheets)} sheets {name!r} is read"] if len(sheets) > 1 else []
     head = sheet.head(_HEAD_ROWS).astype(object)
-    try:
-        place, first, header = _header_place(head.where(head.notna(), "").astype(str).to_numpy())
-    except LogError as error:
-        raise LogError(f"{path}: {error}") from error
+    cells = head.where(head.notna(), "").astype(str).to_numpy()
+    place, first, header = _header_place(path, cells)
     if place:
         notes.append(f"the header is row {place + 1}; what is above it is skipped")
     table = sheet.iloc[first:].reset_index(drop=True).infer_objects()

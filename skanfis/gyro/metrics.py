@@ -209,8 +209,7 @@ def allan_deviation(error, time, run=None):
     error the deviation and, by IEEE 952 from the number of differences of non-overlapping means,
     its standard error.
     """
-    told = "The Allan deviation needs allantools: pip install allantools."
-    oadev = needed("allantools", told).oadev
+    oadev = needed("allantools", "allantools is not installed (pip install allantools)").oadev
     runs = [rows for rows in rows_by_run(run, time.size) if rows.size >= _ROWS_PER_TIME]
     usual = np.median(np.concatenate([np.diff(time[rows]) for rows in runs])) if runs else np.nan
     stretches, parts = [], []

@@ -183,7 +183,7 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
         (b"", "is empty"),
         (b"\n\n  \n", "is empty"),
         (b"Time [h],Temp (F),FOG (deg/h)\n", "has no rows with values"),
-        (b"1,2,3\n4,5,6\n", "line 1: has numbers where names of columns are due"),
+        (b"1,2,3\n4,5,6\n", "log.csv: has numbers where names are due"),
         (bytes(range(256)), "is not text .* or unpack it"),
         (b"temp,gyro\n20,1\n21,\x81\n", "is not text"),
         (b"time,temp,gyro\n10:00:00,20,2\nnoon,21,2\n10:00:02,22,3\n", "line 3, column 'time': 'n"),
