@@ -221,8 +221,7 @@ class LogFile:
         log = self._converted()
         if self._is_command:
             log = self._in_order(log)
-        missing = log.isna()
-        missing[[part for part in self._optional if part in log]] = False
+        missing = log.drop(columns=list(self._optional), errors="ignore").isna()
         every = log = log.assign(**{part: "" for part in LABELS if part not in log})
         # Rows that lack another value stay for now: their times still belong to the clock.
         log = log[~missing[[part for part in ("time", *LABELS) if part in missing]].any(axis=1)]
