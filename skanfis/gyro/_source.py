@@ -70,7 +70,7 @@ class _TextSource:
         for sign, name in _SEPARATORS.items():
             self._separator = sign
             lengths = [len(values) for _, values in islice(self._records(), _HEAD_ROWS)]
-            # A comma need only be on the last line: blanks, the next choice, are in any text.
+            # A comma need only be on the last line. The next choice, a blank, is in any text.
             ends = lengths[len(lengths) // 3 :] if sign != "," else lengths[-1:]
             if min(ends, default=0) > 1:
                 self.notes += [f"columns are separated by {name}"] if name else []

@@ -196,11 +196,10 @@ def export_c_physics(
 
 
 class _Composition:
-    """Law and rules on the inputs of the C function, ``names``, with constants rounded as in C.
+    """Law and rules on the inputs of the C function, ``names``; the law may be a Polynomial.
 
-    The law's range, the model of the rules, ``reference`` and ``tables`` are rounded to the C type;
-    the law's own coefficients are not. ``arrays`` are all arrays of the law in C, these tables
-    included. A Polynomial may stand for the law.
+    Rounded to the C type are the law's range, the model of the rules, ``reference`` and ``tables``;
+    the law's own coefficients are not. ``arrays`` are all arrays of the law in C.
     """
 
     def __init__(self, law, rules, part, dtype):

@@ -97,15 +97,15 @@ def gyro_report(
     figures = [figure for figure in every if given.issuperset(figure.needs)]
     answered = {name: table[name].to_numpy()[is_answered] for name in table}
     answered["of_bias"] = metrics.rows_of_bias(answered["rate"])
-    units, kind = _units(answered)
+    blocks, kind = _blocks_of(answered)
     # A new generator, so that a given one advances by one number only.
     generator = np.random.RandomState(check_random_state(random_state).randint(2**31 - 1))
-    draws = [generator.randint(0, len(units), size=len(units)) for _ in range(n_resamples)]
+    draws = [generator.randint(0, len(blocks), size=len(blocks)) for _ in range(n_resamples)]
     names = [(figure.name, figure.unit) for figure in figures]
     names += metrics.ALLAN_FIGURES.items() if allan else []
     report, notes = pd.DataFrame(names, columns=["figure", "unit"]), {}
     for side in sides:
-        cells = _cells(answered, side, figures, units, kind, draws)
+        cells = _cells(answered, side, figures, blocks, kind, draws)
         cells += _allan_cells(table, side, is_answered) if allan else []
         *values, notes[side] = zip(*cells, strict=True)
         report[[side, f"{side}_low", f"{side}_high"]] = np.transpose(values)
@@ -126,25 +126,25 @@ def _joined(notes):
     return "; ".join(f"{side}: {note}" for side, note in notes.items() if note)
 
 
-def _units(rows):
-    """Rows to resample together: of each run, or of each block within the runs; and which."""
+def _blocks_of(rows):
+    """Rows that are resampled together, run by run or in blocks of each run; and what they are."""
     n_rows = rows["rate"].size
     runs = metrics.rows_by_run(rows.get("run"), n_rows)
     if len(runs) >= _FEWEST_RUNS:
         return runs, "runs"
-    length = max(1, -(-n_rows // _N_BLOCKS))
+    length = -(-n_rows // _N_BLOCKS)
     blocks = [run[i : i + length] for run in runs for i in range(0, run.size, length)]
     return blocks, "blocks of rows"
 
 
-def _cells(answered, side, figures, units, kind, draws):
+def _cells(answered, side, figures, blocks, kind, draws):
     """Value, ends of the interval, and a note, of each figure."""
-    step = max(1, -(-answered["rate"].size // _MOST_ROWS))
+    step = -(-answered["rate"].size // _MOST_ROWS)
     # At random: every second row might have rates of one sign only.
     choice = np.random.RandomState(0).choice
     places = [
-        np.concatenate([choice(unit, -(-unit.size // step), replace=step > 1) for unit in drawn])
-        for drawn in ([units[i] for i in draw] for draw in draws)
+        np.concatenate([choice(rows, -(-rows.size // step), replace=step > 1) for rows in drawn])
+        for drawn in ([blocks[i] for i in draw] for draw in draws)
     ]
     rows, cells = _of_side(answered, side), []
     with np.errstate(divide="ignore", invalid="ignore"):

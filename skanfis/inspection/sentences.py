@@ -110,12 +110,12 @@ class Sentences:
 
 
 def _from_a_level(model, slopes, places, is_common, is_told):
-    """Slopes, places and shared slopes if rules give their value at one level of a category.
+    """Slopes, places and shared slopes if a rule gives its value at one level of a category.
 
-    If every row has one of the levels, their slopes are known up to a constant, so that one level
-    needs none: the commonest of the rule. If one of two levels has a shared slope, the other needs
-    none, and the difference replaces the shared slope. It must not add to the numbers. If both have
-    one, the difference is shared.
+    If every row has one of the levels, their slopes are known only up to a constant. So one level
+    needs no slope: the commonest of the rule. The others get the difference, if that takes no more
+    numbers. Of two levels, the difference also replaces a slope that only one of them shares; if
+    both share theirs, the difference is shared.
     """
     slopes, places, is_common = slopes.copy(), places.copy(), is_common.copy()
     whole = [one.inputs for one in categories(model).values() if not one.others]
@@ -155,9 +155,9 @@ def _resolution(model, slopes):
 def _written_terms(model, digits):
     """The model with its terms as written, and which of their names tell their place.
 
-    A name that the user has given stays. Unless all digits are written, two things are left out:
-    the width of a cut that has every training row on one side, within the digits, which becomes
-    crisp; and conditions that others of the rule imply, as "no other level of a category".
+    A name that the user has given stays. Unless all digits are written, two things are left out.
+    A cut with no training row near it becomes crisp, if its width changes no digit. A condition
+    goes that others of the rule imply, as "sort is not a" beside "sort is b".
     """
     antecedent = model.antecedent
     default, of_digits = default_term_names(model), default_term_names(model, digits)
