@@ -87,7 +87,6 @@ def check_installed(pdf=False):
 
 
 def _template():
-    check_installed()
     from jinja2 import Environment, StrictUndefined
 
     environment = Environment(
