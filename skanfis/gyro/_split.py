@@ -216,6 +216,8 @@ def _gap(temperature):
     """Ends of the widest gap between temperatures; None if it is small beside their range."""
     # One or two rows far from all others are no soak.
     values = np.sort(temperature)[_ROWS_PER_LEVEL - 1 : 1 - _ROWS_PER_LEVEL]
+    if values.size < 2:
+        return None
     place = np.diff(values).argmax()
     low, high = values[place : place + 2]
     return (low, high) if high - low > _WIDEST_GAP * np.ptp(values) else None
