@@ -35,7 +35,7 @@ class StructureSearch:
 
     def __init__(self, rows: StandardisedData, plan: Plan, simplicity: float):
         self.plan, self.simplicity = plan, simplicity
-        sample = dealt_rows(rows)
+        self.rows = sample = dealt_rows(rows)
         found, is_half = judging_folds(sample)
         n_basis = 1 + plan.consequent_inputs.size
         is_wide = sample.n_rows < ROWS_PER_CONSEQUENT * _FEW_RULES * n_basis
@@ -66,9 +66,8 @@ class StructureSearch:
         error = found.squared_error
         most = tolerated(min(error, best.squared_error), variance, self.simplicity)
         room = most / error if error > 0.0 else 1.0
-        return started(
-            self.trials.tuned(found.candidate), self.plan, room, self._report(found, variance)
-        )
+        tuned = self.trials.tuned(found.candidate)
+        return started(tuned, self.rows, self.plan, room, self._report(found, variance))
 
     def _grow(self, kind, one_rule):
         """Judge a kind from small to large, some steps further than the best.

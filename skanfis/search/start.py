@@ -13,6 +13,7 @@ from ..learning.data import StandardisedData
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
+from ..learning.sampling import SAMPLE_ROWS
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
@@ -24,6 +25,7 @@ from .tuning import (
     cost_of,
     scaled,
     tune,
+    tuned_on,
     with_free_terms,
     with_most_agreement,
     with_sparse_slopes,
@@ -48,12 +50,14 @@ class Start:
     term_names: tuple[str, ...] = ()  # if given with the rules
 
 
-def started(tuned: Tuned, plan: Plan, room: float, candidates) -> Start:
+def started(tuned: Tuned, rows: StandardisedData, plan: Plan, room: float, candidates) -> Start:
     """A start from a training, with as much agreement as the tolerance leaves room for.
 
-    ``room`` is the factor by which the squared error may still rise. Only its root is used up:
+    The training has seen as few of the ``rows`` as it needed; the weights of its penalty take all
+    that a search looks at. ``room`` is the factor by which the squared error may still rise. Only its root is used up:
     agreement costs more on new rows than the training rows show.
     """
+    tuned = tuned_on(tuned, rows)
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
     # Premises make room for agreement by following it. Fixed ones cannot, so none is added.
     room = np.sqrt(room) if plan.premises_move else 1.0
@@ -73,7 +77,8 @@ def started(tuned: Tuned, plan: Plan, room: float, candidates) -> Start:
 
 def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simplicity) -> Start:
     """A start from given rules, with the free weights found on a sample of the rows."""
-    sample, free, inputs = search_sample(rows, FEWEST_SEEN), plan.free, plan.consequent_inputs
+    free, inputs = plan.free, plan.consequent_inputs
+    every, sample = (search_sample(rows, most) for most in (SAMPLE_ROWS, FEWEST_SEEN))
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     premise = Premise.of(antecedent, *sample.inputs.box)
     turns = MOST_TURNS if plan.premises_move and free else 0
@@ -88,7 +93,7 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
         room = most / best.expected_error
     n_rules = antecedent.n_rules
     given = "one rule as given" if n_rules == 1 else f"{n_rules} rules as given"
-    return started(best, plan, room, [described(best, given, best.expected_error, variance)])
+    return started(best, every, plan, room, [described(best, given, best.expected_error, variance)])
 
 
 def described(tuned: Tuned, structure, squared_error, variance, is_chosen=True):

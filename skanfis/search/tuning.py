@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..consequent import MANY_COLUMNS
+from ..learning.data import StandardisedData
 from ..learning.evidence import (
     LARGEST,
     PRIOR_DISPLACEMENT,
@@ -141,6 +142,22 @@ def tune(
         stiffness = start.posterior.noise_variance / (problem.n_rows * PRIOR_DISPLACEMENT**2)
         start = start.with_penalty(replace(start.penalty, stiffness=stiffness))
     return _risen(turned(start, steps), turns - 1, steps)
+
+
+def tuned_on(tuned: Tuned, rows: StandardisedData) -> Tuned:
+    """The same, tuned on from where it is, with more rows than it has seen."""
+    seen = tuned.problem
+    if seen.rows.n_rows == rows.n_rows:
+        return tuned
+    penalty = scaled(tuned.penalty, tuned.free, seen.n_rows / rows.effective_weight)
+    inputs, is_unbounded = seen.consequent_inputs, tuned.premise.is_unbounded
+    problem = SeparableProblem(rows, seen.antecedent, penalty, consequent_inputs=inputs)
+    premise = Premise.of(seen.antecedent, *rows.inputs.box, is_unbounded=is_unbounded)
+    x = premise.displacement(tuned.evaluation.antecedent.parameters)
+    start = Tuned.start(problem, premise, tuned.free, x)
+    if not tuned.curvature.size:
+        return _improved(start, _STEPS)
+    return _risen(turned(start), FEW_TURNS - 1, _STEPS)
 
 
 def with_free_terms(tuned: Tuned) -> Tuned:
