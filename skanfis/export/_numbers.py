@@ -32,11 +32,20 @@ class Numbers:
 
     def __init__(self, model, dtype):
         self.dtype = dtype = np.dtype(dtype)
-        self.low = _rounded(model.minimum, dtype, "the minimum of an input")
-        self.high = _rounded(model.maximum, dtype, "the maximum of an input")
-        self.reference = reference = _rounded(model.reference, dtype, "the mean of an input")
-        what = "the inverse spread of an input"
-        self.inverse_spread = _rounded(1.0 / model.spread, dtype, what, counts=True)
+        names = model.input_names
+        self.low = _rounded(model.minimum, dtype, "the minimum of", names=names)
+        self.high = _rounded(model.maximum, dtype, "the maximum of", names=names)
+        is_lost = (self.low == self.high) & (model.minimum < model.maximum)
+        if is_lost.any():
+            j = np.argmax(is_lost)
+            raise ValueError(
+                f"Single precision holds all values of {names[j]!r} in the training data as one "
+                f"number, {self.low[j]:.9g}. Subtract an offset before training and before the "
+                "call, or export in double precision."
+            )
+        self.reference = reference = _rounded(model.reference, dtype, "the mean of", names=names)
+        what = "the inverse spread of"
+        self.inverse_spread = _rounded(1.0 / model.spread, dtype, what, True, names)
         # The model gets the rounded box: so exported code differs from it by rounding alone.
         box = {"minimum": self.low.astype(float), "maximum": self.high.astype(float)}
         self.model = model = replace(model, **box)
@@ -58,7 +67,7 @@ class Numbers:
         # Coefficients (n_rules, n_outputs, 1 + n_slopes) minus an offset, and inputs with slopes.
         offset, coefficients, slopes = _consequents(model, reference)
         self.slope_input = slopes
-        self.offset = _rounded(offset, dtype, "a typical output")
+        self.offset = _rounded(offset, dtype, "a typical value of", names=model.output_names)
         # A slope matters by what it adds to an output over the box, not by its size.
         adds = np.abs(coefficients) * np.append(1.0, (model.maximum - model.minimum)[slopes])
         counts = adds > np.finfo(dtype).eps * adds.max(axis=(0, 2), keepdims=True)
@@ -75,7 +84,7 @@ class Numbers:
             is_held = np.isfinite(model.tangent_at)
             self.tangent_group = np.where(is_held, np.cumsum(is_held), 0)
             at = np.where(is_held, model.tangent_at - reference, 0.0)
-            self.tangent_at = _rounded(at, dtype, "a median of an input")
+            self.tangent_at = _rounded(at, dtype, "the median of", names=names)
         # (2, n_outputs); None if outputs are not limited.
         self.output_limits = None
         if model.out_of_bounds == "linear" or np.isfinite(model.output_limits).any():
@@ -94,11 +103,11 @@ def rounded_within(limits, dtype):
     return np.stack([low, high])
 
 
-def _rounded(values, dtype, what, counts=None):
+def _rounded(values, dtype, what, counts=None, names=()):
     """Values in a type; numbers that would be subnormal, with fewer digits, become zero.
 
     ValueError if this happens to a value that ``counts`` (default: the largest), or if a value is
-    too large for the type.
+    too large for the type. ``names`` are those of the columns that the values are of, if any.
     """
     values, sizes = np.asarray(values, dtype=float), np.abs(values)
     least, most = float(np.finfo(dtype).tiny), float(np.finfo(dtype).max)
@@ -106,6 +115,7 @@ def _rounded(values, dtype, what, counts=None):
     lost = (sizes > most) | (counts & (sizes > 0.0) & (sizes < least))
     if lost.any():
         name = "Single precision" if dtype == np.float32 else "Double precision"
+        what = f"{what} {names[np.argmax(lost)]!r}" if names else what
         raise ValueError(
             f"{name} cannot hold {what}, {sizes[lost][0]:g}, with all its digits: it goes from "
             f"{least:.2g} to {most:.2g}. Scale the data, or export in double precision."

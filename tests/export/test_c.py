@@ -171,16 +171,25 @@ def test_tangent_without_end_saturates_at_the_largest_number(dtype, tmp_path):
 @pytest.mark.parametrize(
     ("scale_x", "scale_y", "what"),
     [
-        (1e45, 1.0, "an input"),
-        (1.0, 1e42, "output"),
+        (1e45, 1.0, "the minimum of 'x0'"),
+        (1.0, 1e42, "a typical value of 'y'"),
         # All slopes are zero in single precision, where the constants are not.
         (1e9, 1e-30, "a consequent"),
-        ([5.5e35, 1.0, 1.0], 1.0, "inverse spread of an input"),
+        ([5.5e35, 1.0, 1.0], 1.0, "the inverse spread of 'x0'"),
     ],
 )
 def test_numbers_that_float_does_not_hold(scale_x, scale_y, what):
     model = quick(n_mfs=2).fit(X * scale_x, Y * scale_y)
     with pytest.raises(ValueError, match=rf"Single precision cannot hold .*{what}"):
+        export_c(model, name="m", dtype="float")
+    export_c(model, name="m", dtype="double")
+
+
+def test_a_column_that_float_makes_one_number_is_refused():
+    """A time stamp of today, in seconds: float has steps of 128 s there."""
+    stamped = X + np.array([0.0, 1.7e9, 0.0])
+    model = quick(n_mfs=2).fit(stamped, Y)
+    with pytest.raises(ValueError, match="all values of 'x1' in the training data as one"):
         export_c(model, name="m", dtype="float")
     export_c(model, name="m", dtype="double")
 
