@@ -136,7 +136,7 @@ def read_json(path: str | PathLike[str]) -> TSKModel:
     """
     data = read_bytes(path, MOST_BYTES)
     try:
-        return parse_json(data.decode("utf-8"))
+        return parse_json(data.decode("utf-8-sig"))
     except RecursionError:
         raise ValueError(f"{path}: nested too deeply to be a model.") from None
     except ValueError as error:

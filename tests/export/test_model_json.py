@@ -212,6 +212,13 @@ def test_text_in_place_of_a_path_is_named(given):
             read(given)
 
 
+def test_a_file_may_begin_with_a_byte_order_mark(tmp_path):
+    """Editors of Windows write one."""
+    text = export_json(A_GRID)
+    (tmp_path / "model.json").write_text(text, encoding="utf-8-sig")
+    assert export_json(read_json(tmp_path / "model.json")) == text
+
+
 def test_refuses_deep_nesting_other_encodings_and_large_files(tmp_path):
     path = tmp_path / "model.json"
     path.write_text("[" * 1_000_000, encoding="utf-8")
