@@ -368,10 +368,12 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
         ({"name": "2x"}, "name='2x' must be a letter, then letters"),
         ({"name": "a__b"}, "single underscores"),
         ({"name": "x" * 17}, "at most 16 in all"),
+        ({"path": "no/folder/gyro.c"}, "only. It is from path: leave out a suffix"),
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),
         ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of 'double', 'float'"),
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
         ({"name": "m", "saturate": [(0.0, 1.0)] * 2}, "for each of the 1 outputs"),
+        ({"name": "m", "saturate": [("low", "high")]}, r"saturate=\[\('low', 'high'\)\] must have"),
         ({"name": "m", "saturate": [(1.0, 0.0)]}, "must have finite .* with low below high"),
         (
             {"name": "m", "saturate": [(1.0 + 1e-9, 1.0 + 2e-9)], "dtype": "float"},

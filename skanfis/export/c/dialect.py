@@ -165,6 +165,7 @@ def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_N
         raise ValueError(
             f"path ends in {stem!r}; C can include files of letters, digits, '_', '.' and '-'."
         )
+    taken = " It is from path: leave out a suffix, or give name too." if name is None else ""
     name = stem if name is None else name
     # C++ reserves names with two underscores in a row.
     is_identifier = isinstance(name, str) and re.fullmatch(r"[A-Za-z](_?[A-Za-z0-9])*", name)
@@ -172,6 +173,7 @@ def check_arguments(path, name, dtype, std, min_coverage, longest_name=LONGEST_N
         raise ValueError(
             f"name={name!r} must be a letter, then letters, digits and single underscores, at most "
             f"{longest_name} in all: a C compiler may look at 31 characters of an identifier only."
+            f"{taken}"
         )
     return stem or name, name
 
@@ -182,13 +184,17 @@ def read_limits(saturate, numbers):
         return None
     if hasattr(saturate, "lower"):
         saturate = np.stack([saturate.lower, saturate.upper], axis=-1)
-    given, n_outputs = np.array(saturate, dtype=float), numbers.model.n_outputs
+    try:
+        given = np.array(saturate, dtype=float)
+    except (TypeError, ValueError):
+        given = np.empty(0)
+    n_outputs = numbers.model.n_outputs
     if given.shape == (n_outputs, 2) and (given[:, 0] < given[:, 1]).all():
         limits = rounded_within(given.T, numbers.dtype).T
         if np.isfinite([given, limits]).all() and (limits[:, 0] <= limits[:, 1]).all():
             return limits
     raise ValueError(
-        f"saturate={given.tolist()} must have finite (low, high), with low below high and with a "
+        f"saturate={saturate!r} must have finite (low, high), with low below high and with a "
         f"number of {numbers.dtype} between them, for each of the {n_outputs} outputs; or be what "
         "skanfis.bounds.bounds returns for this model."
     )
