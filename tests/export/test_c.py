@@ -323,6 +323,18 @@ def test_self_test_passes_and_notices_a_changed_digit(tmp_path):
     assert run(["./test"], tmp_path).returncode == 1
 
 
+@needs_compiler
+def test_self_test_passes_where_a_range_is_as_narrow_as_rounding(tmp_path):
+    """As of a constant column behind a scaler: ``predict`` takes rows beyond it for in range."""
+    model = build(random_grid(np.random.default_rng(0), [Gaussian] * 3, (2, 1, 1)))
+    low, high = model.minimum.copy(), model.maximum.copy()
+    low[1], high[1] = 4.0 - 4.0 * np.spacing(4.0), 4.0 + 4.0 * np.spacing(4.0)
+    code = export_c(replace(model, minimum=low, maximum=high), name="m")
+    rows = np.array([[low[0], 4.0, low[2]], [low[0], np.nextafter(high[1], 5.0), low[2]]])
+    ((_, status),) = evaluate_all([code], rows, tmp_path, "c99", [1])
+    assert (status & STATUS["OUT_OF_RANGE"]).tolist() == [0, STATUS["OUT_OF_RANGE"]]
+
+
 HOSTILE = [
     *("*/ int x; /*", "??/", "???/", 'quote " and \\', "line\nbreak\r\n#error", "//\\"),
     *("x" * 5000, "\x00\x1b[31m °C 陀螺"),

@@ -89,7 +89,8 @@ def known_answers(source):
     X = (model.minimum + width * (0.5 + reach * (points - 0.5))).astype(numbers.dtype)
     X = np.vstack([numbers.low, numbers.high, X])
     Z = X.astype(float)
-    outside = ~model.in_bounds(Z)
+    # As in C, to the last bit; ``in_bounds`` allows for rounding.
+    outside = ((model.minimum > Z) | (model.maximum < Z)).any(axis=1)
     silent = outside & (model.out_of_bounds in SILENT)
     # Without a least coverage, every row is covered.
     asked = -1.0 if source.min_coverage is None else source.min_coverage
