@@ -80,7 +80,9 @@ class RuleTableAntecedent(Antecedent):
                     places = ", ".join(f"{own[t][2][0]:g}" for t in terms)
                     raise ValueError(
                         f"Rule {r} has {len(terms)} terms of {input_names[j]!r} (at {places}), but "
-                        "only two sides of different cuts can be written as one term."
+                        "only two sides of different cuts can be written as one term. JSON, C and "
+                        "ONNX take such rules; a .fis file takes those of partition='grid' or "
+                        "'scattered'."
                     )
                 made[j, terms] = found
         order = sorted(made, key=lambda key: (made[key][0].name, *key))
