@@ -90,11 +90,11 @@ def _calibrate(options, tell):
         targets = list(write_targets(calibration, options.target, written))
         # Before files are moved: until then Ctrl-C and errors leave nothing behind.
         summary = list(errors_and_verdict(calibration, reading.name_row))
+        names = ", ".join(sorted(path.name for path in written.iterdir()))
     options.written = folder
     for message in calibration.warnings:
         tell(f"warning: {message}")
     _say(summary)
-    names = ", ".join(sorted(path.name for path in folder.iterdir()))
     _say([f"check          {split.sentence}", f"written to     {folder}: {names}"])
     _say(f"note           {note}" for note in reading.notes)
     _say(f"WARNING        {sentence}" for sentence in calibration.cautions())

@@ -159,12 +159,14 @@ def test_progress_and_summary(tmp_path, log, say, monkeypatch):
     monkeypatch.chdir(tmp_path)
     log[log["run"] < 3].to_csv("log.csv", index=False)
     limits = ["residual_rms=90deg/s", "residual_rms=1e-9deg/s"]
+    (tmp_path / "log-compensator").mkdir()
+    (tmp_path / "log-compensator" / "mine.txt").touch()
     # The folder is called after the first file of a pattern.
     code, out, err = say("l*.csv", "--inputs", "temperature", "output", "--limits", *limits)
     # All is written, and a limit is not kept.
     assert code == 6
     assert "specification  1 of 2 limits kept; not kept: residual rms" in out
-    assert (tmp_path / "log-compensator" / "report.html").exists()
+    assert f"written to     log-compensator: {', '.join(FILES)}\n" in out
     for text in ("reading", "270 rows, 3 runs", "fold 3 of 3", "done"):
         assert text in err
     assert "whole runs held out (3 runs, 3 folds; rows of one run are alike)" in out
