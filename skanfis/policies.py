@@ -56,12 +56,16 @@ class TargetRange:
 
         If the tangent is followed without end, only the user's limits count.
         """
-        # No deviation is more than half of the range: that of a constant, stored as one, is zero.
-        spread = np.minimum(self.spread, 0.5 * (self.maximum - self.minimum))
-        margin = max(max_extrapolation, _LEAST_MARGIN) * spread
-        if not is_line and np.isfinite(max_extrapolation):
-            part = max(_PART_OF_RANGE, _PER_DEVIATION * max_extrapolation)
-            margin = part * (self.maximum - self.minimum)
+        width = self.maximum - self.minimum
+        if np.isinf(max_extrapolation):
+            margin = np.inf
+        elif is_line:
+            # No deviation is more than half of the range: that of a constant, stored as one, is
+            # zero.
+            spread = np.minimum(self.spread, 0.5 * width)
+            margin = max(max_extrapolation, _LEAST_MARGIN) * spread
+        else:
+            margin = max(_PART_OF_RANGE, _PER_DEVIATION * max_extrapolation) * width
         low, high = self.minimum - margin, self.maximum + margin
         return np.stack([np.maximum(low, self.lower), np.minimum(high, self.upper)])
 

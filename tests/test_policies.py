@@ -66,3 +66,9 @@ def test_what_is_known_beyond_what_was_seen_counts_as_seen():
 def test_nothing_is_predicted_beyond_a_constant_target(is_line):
     own = TargetRange(np.array([3.0]), np.array([3.0]), np.array([1.0]))
     assert_allclose(own.limits(2.0, is_line), [[3.0], [3.0]], rtol=1e-12)
+
+
+@pytest.mark.parametrize("is_line", [False, True])
+def test_a_constant_target_has_no_limits_where_the_tangent_has_no_end(is_line):
+    own = TargetRange(np.array([3.0]), np.array([3.0]), np.array([1.0]), upper=9.0)
+    np.testing.assert_array_equal(own.limits(np.inf, is_line), [[-np.inf], [9.0]])
