@@ -183,7 +183,7 @@ def read_limits(saturate, numbers):
     if saturate is None:
         return None
     if hasattr(saturate, "lower"):
-        saturate = np.stack([saturate.lower, saturate.upper], axis=-1)
+        saturate = np.stack([saturate.lower, saturate.upper], axis=-1).tolist()
     try:
         given = np.array(saturate, dtype=float)
     except (TypeError, ValueError):
