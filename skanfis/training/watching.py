@@ -83,17 +83,16 @@ class Callbacks:
 def hold_out(rows: StandardisedData, validation_fraction, seed):
     """Indices to train on and to hold out, each in order; groups are not split.
 
-    Without groups, rows with equal inputs form one: so repeats are never on both sides, and a
-    weight acts like repeats. ValueError where either part would have fewer than two rows.
+    Without groups, or in a single one, rows with equal inputs form one: so repeats are never on
+    both sides, and a weight acts like repeats. ValueError where either part would have fewer than
+    two rows.
     """
-    what = f"{rows.n_rows} rows"
-    groups = rows.groups
-    if groups is None:
+    what, groups = f"{rows.n_rows} rows", rows.groups
+    if groups is None or np.ptp(groups) == 0:
         # By the inputs alone, in any order of columns.
         groups = rows.numbers(lambda Z, _: place_in_sample(Z, Z[:0]))
     else:
-        n_groups = np.unique(groups).size
-        what += f" in {n_groups} groups" if n_groups > 1 else " in 1 group"
+        what += f" in {np.unique(groups).size} groups"
     splitter = GroupShuffleSplit(1, test_size=validation_fraction, random_state=seed)
     try:
         training, validation = next(splitter.split(np.empty((rows.n_rows, 0)), groups=groups))

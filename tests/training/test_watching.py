@@ -218,6 +218,13 @@ def test_whole_groups_are_held_out(rng):
     assert grouped.validation_loss_curve_.min() > 1.5 * alone.validation_loss_curve_.min()
 
 
+def test_a_single_group_counts_as_none(rng):
+    X = rng.normal(size=(60, 1))
+    model = ANFISRegressor(n_mfs=2, early_stopping=True)
+    alone, grouped = (clone(model).fit(X, X[:, 0] ** 2, groups=g) for g in (None, np.zeros(60)))
+    assert_array_equal(grouped.predict(X), alone.predict(X))
+
+
 def test_equal_rows_are_on_one_side(rng):
     X = rng.normal(size=(50, 2))[np.arange(200) % 50]
     training, held = hold_out(StandardisedData.of(X, rng.normal(size=(200, 1))), 0.2, 0)
@@ -230,7 +237,7 @@ def test_equal_rows_are_on_one_side(rng):
     [
         (3, None, 0.1, "3 rows"),
         (10, None, 0.95, "10 rows"),
-        (20, np.zeros(20), 0.5, "20 rows in 1 group"),
+        (20, np.arange(20) % 2, 0.95, "20 rows in 2 groups"),
     ],
 )
 def test_too_few_rows_to_hold_out(n_rows, groups, fraction, what):
