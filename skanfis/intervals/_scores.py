@@ -190,6 +190,11 @@ def held_out_scores(estimator, data, rows, least):
 
 def leave_one_out_scores(estimator, data, weight, least):
     """Studentised residuals: |y - y_(-i)| over the deviation of y_(-i)."""
+    if isinstance(estimator, FrozenEstimator):
+        raise ValueError(
+            "method='loo' takes these rows out of the fit again, and a FrozenEstimator was not "
+            "fitted to them here: use method='split' with calibration_fraction=1 and fresh rows."
+        )
     final = final_step(estimator)[0]
     noise = getattr(final, "noise_std_", None)
     if noise is None:

@@ -146,8 +146,8 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         ------
         ValueError
             If the data are not finite, ``cv`` does not hold out every row once and groups as a
-            whole, one group alone has weight, or "loo" has groups; if ``scaled`` is asked of a
-            regressor without ``return_std``.
+            whole, one group alone has weight, or "loo" has groups or a frozen regressor; if
+            ``scaled`` is asked of a regressor without ``return_std``.
         """
         X, y, sample_weight = indexable(X, y, sample_weight)
         targets, weight, numbers = _scores.checked_targets(y, sample_weight, groups)

@@ -208,6 +208,11 @@ class NeverFitted(BayesianRidge):
         ("X has the length 24, groups 23", {}, {"groups": np.zeros(23)}),
         ("leaves out rows, not groups", {"method": "loo"}, {"groups": np.arange(24)}),
         ("nothing of its noise.* another", {"method": "loo", "estimator": BayesianRidge()}, {}),
+        (
+            "not fitted to them here: use method='split'",
+            {"method": "loo", "estimator": FrozenEstimator(LinearRegression().fit([[0.0]], [0.0]))},
+            {},
+        ),
         ("not have: use scaled=False", {"estimator": LinearRegression()}, {}),
         ("every row must be held out once", {"cv": ShuffleSplit(2, random_state=0)}, {}),
         ("An iterator can be used once only", {"cv": iter([])}, {}),
