@@ -62,8 +62,9 @@ def refuse_lazy(**tables):
             )
         if hasattr(table, "__dask_graph__"):
             raise TypeError(
-                f"{what} is a dask collection, which has no values yet: use "
-                f"skanfis.dask.DaskANFISRegressor, or give {what}.compute()."
+                f"{what} is a dask collection, which has no values yet: give {what}.compute(). "
+                "Only the fit, predict and score of skanfis.dask.DaskANFISRegressor take it as it "
+                "is."
             )
 
 

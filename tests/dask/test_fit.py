@@ -19,6 +19,7 @@ import dask.dataframe as dd
 
 from skanfis import ANFISRegressor
 from skanfis.dask import DaskANFISRegressor, rows
+from skanfis.inspection import effects
 from skanfis.learning import sampling
 
 N_ROWS = 6000
@@ -332,3 +333,5 @@ def test_plain_estimator_names_the_one_for_dask():
         ANFISRegressor().fit(*cut(100, X, y))
     with pytest.raises(TypeError, match=r"X\.compute"):
         ANFISRegressor(n_mfs=1).fit(X, y).predict(*cut(100, X))
+    with pytest.raises(TypeError, match=r"X\.compute\(\)\. Only the fit, predict and score of"):
+        effects(DaskANFISRegressor(n_mfs=1).fit(X, y), *cut(100, X))
