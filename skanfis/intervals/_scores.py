@@ -83,7 +83,8 @@ def fit_params(router, regressor, sample_weight, groups):
     given = {name: value for name, value in given.items() if value is not None}
     if get_config()["enable_metadata_routing"]:
         return dict(process_routing(router, "fit", **given).estimator.fit)
-    if "sample_weight" in given and not has_fit_parameter(regressor, "sample_weight"):
+    takes_weights = has_fit_parameter(regressor, "sample_weight")
+    if "sample_weight" in given and not (takes_weights or isinstance(regressor, FrozenEstimator)):
         raise ValueError(
             f"sample_weight was given, but the fit of {type(regressor).__name__} does not take "
             "it. For a Pipeline turn on sklearn.set_config(enable_metadata_routing=True), and "

@@ -40,6 +40,15 @@ def covered(bounds, y):
     return np.mean((bounds[0] <= y) & (y <= bounds[1]))
 
 
+def test_rows_without_weight_are_absent_for_a_frozen_regressor(rng):
+    X, y = bent(rng, 60)
+    frozen = FrozenEstimator(LinearRegression().fit(X, y))
+    model = ConformalRegressor(frozen, method="split", calibration_fraction=1, scaled=False)
+    expected = clone(model).fit(X[:40], y[:40]).predict_interval(X)
+    given = np.arange(60) < 40
+    assert_allclose(model.fit(X, y, sample_weight=given).predict_interval(X), expected, rtol=1e-12)
+
+
 def test_split_is_that_of_crepes(rng):
     with warnings.catch_warnings():
         # When imported it has every UserWarning shown, whosever it is, and none raised.
