@@ -80,7 +80,8 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     free, inputs = plan.free, plan.consequent_inputs
     every, sample = (search_sample(rows, most) for most in (SAMPLE_ROWS, FEWEST_SEEN))
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
-    premise = Premise.of(antecedent, *sample.inputs.box)
+    # Rules whose terms stay may compensate one another: least weights would keep them from it.
+    premise = Premise.of(antecedent, *sample.inputs.box, is_unbounded=not plan.premises_move)
     turns = MOST_TURNS if plan.premises_move and free else 0
     best = with_free_terms(tune(problem, premise, free, turns))
     room, worths = 1.0, SLOPE_WORTHS if turns else ()

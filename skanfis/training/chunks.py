@@ -243,7 +243,9 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     free = [key for key in _FREE if key not in given]
     problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
     if free:
-        tuned = tune(problem, Premise.still(antecedent), free, turns=0, first_steps=ARRIVING)
+        # Rules that stay may compensate one another: least weights would keep them from it.
+        premise = replace(Premise.still(antecedent), is_unbounded=True)
+        tuned = tune(problem, premise, free, turns=0, first_steps=ARRIVING)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
     overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight

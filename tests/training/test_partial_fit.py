@@ -91,6 +91,14 @@ def whole_and_settings(request, premises):
     return chunk(premises, **settings).fit(*surface()), settings
 
 
+@pytest.mark.parametrize("learn", ["fit", "partial_fit"])
+def test_rules_that_compensate_one_another_are_learnt_again(learn, rng):
+    X = rng.uniform(-1.0, 1.0, (200, 1))
+    first = ANFISRegressor(n_mfs=3).fit(X, np.sin(6.0 * X[:, 0]) + 1e-3 * rng.normal(size=200))
+    again = getattr(chunk(first), learn)(X, first.predict(X))
+    assert difference(again, first, X) < 1e-4
+
+
 @pytest.mark.parametrize("chunking", CHUNKINGS)
 def test_any_chunks_equal_one_fit(premises, whole_and_settings, chunking):
     """But for the penalty's extents, which are about the rules' centres in the first model."""
@@ -102,7 +110,7 @@ def test_any_chunks_equal_one_fit(premises, whole_and_settings, chunking):
     assert difference(model, once, X) < tolerance(model, once)
     has_slopes = settings.get("order", 1) == 1 and settings.get("alpha") != 0.0
     assert difference(model, whole, X) < (0.05 if has_slopes else tolerance(model, whole))
-    assert model.agreement_ == pytest.approx(whole.agreement_, rel=0.02)
+    assert model.agreement_ == pytest.approx(whole.agreement_, rel=0.03)
     error = 10.0 * tolerance(model, once)
     assert model.loss_curve_[-1] == pytest.approx(once.loss_curve_[-1], rel=error)
     assert model.redundant_rules_ == whole.redundant_rules_
