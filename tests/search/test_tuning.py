@@ -51,6 +51,30 @@ def test_what_rules_err_one_by_one(two_rules):
     assert_allclose(evaluation.mean_squared_error + tuned.disagreement, expected, rtol=1e-8)
 
 
+@pytest.mark.parametrize("turns", [tuning.MOST_TURNS, 0])
+def test_with_more_rows_rules_are_tuned_on_to_what_these_ask_for(turns, rng):
+    x = rng.uniform(-1.0, 1.0, (2000, 1))
+    rows = StandardisedData.of(x, np.sin(3.0 * x) + 0.3 * rng.normal(size=x.shape))
+    antecedent = grid_antecedent([Gaussian], [3], Spacing(rows))
+    premise = Premise.of(antecedent, *rows.inputs.box)
+
+    def tuned(rows):
+        problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
+        return tuning.tune(problem, premise, FREE, turns)
+
+    whole, few = tuned(rows), tuned(rows.part(slice(100)))
+    assert tuning.tuned_on(whole, rows) is whole
+    penalty = tuning.scaled(few.penalty, FREE, 100 / 2000)
+    as_they_are = tuning.Tuned.start(
+        whole.problem.with_penalty(penalty), premise, FREE, few.displacement
+    )
+    on = tuning.tuned_on(few, rows)
+    assert (on.displacement == 0.0).all() == (turns == 0)
+    least = whole.posterior.minus_twice_log
+    left, before = (one.posterior.minus_twice_log - least for one in (on, as_they_are))
+    assert left < 0.1 * before
+
+
 def with_agreement(tuned, agreement):
     """The same with consequents alone of another agreement."""
     return tuned.with_penalty(replace(tuned.penalty, agreement=agreement))
