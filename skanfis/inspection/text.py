@@ -105,19 +105,19 @@ def export_text(
     >>> model = ANFISRegressor(n_mfs=2, solver="lse", agreement=0.1).fit(hours, drift)
     >>> print(export_text(model, feature_names=["hours"], show_terms=False))
     2 rules, 1 input, 41 rows.
-    y varies by 0.94, about the rules by 0.55 (standard deviation).
+    y varies by 0.94, about the rules by 0.54 (standard deviation).
     <BLANKLINE>
-    Rule 0, strongest on 51 % of the rows, errs by 0.85 there:
+    Rule 0, strongest on 51 % of the rows, errs by 0.84 there:
       IF hours is low
-      THEN y is about 1.17: -0.55 per hours from 3.5
+      THEN y is about 1.16: -0.57 per hours from 3.5
     <BLANKLINE>
-    Rule 1, strongest on 49 % of the rows, errs by 0.42 there:
+    Rule 1, strongest on 49 % of the rows, errs by 0.44 there:
       IF hours is high
-      THEN y is about 0.94: +0.2 per hours from 6.5
+      THEN y is about 0.95: +0.2 per hours from 6.5
     <BLANKLINE>
     6 numbers; the text as printed errs as much as the model.
     Rules go different ways, beyond chance: by hours up in rule 1 and down in rule 0.
-    Errs more on its own rows than a constant would: rule 1 (errs by 0.42, a constant by 0.14).
+    Errs more on its own rows than a constant would: rule 1 (errs by 0.437, a constant by 0.138).
     """
     said, found = _said(estimator, precision, feature_names, output_names)
     model, chosen = said.model, shown_rules(said.model, max_shown)

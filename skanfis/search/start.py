@@ -53,9 +53,8 @@ class Start:
 def started(tuned: Tuned, rows: StandardisedData, plan: Plan, room: float, candidates) -> Start:
     """A start from a training, with as much agreement as the tolerance leaves room for.
 
-    The training has seen as few of the ``rows`` as it needed; the weights of its penalty take all
-    that a search looks at. ``room`` is the factor by which the squared error may still rise. Only its root is used up:
-    agreement costs more on new rows than the training rows show.
+    First it goes on with all ``rows``. ``room`` is the factor by which the squared error may still
+    rise. Only its root is used up: agreement costs more on new rows than the training rows show.
     """
     tuned = tuned_on(tuned, rows)
     problem, n_rows = tuned.problem, tuned.posterior.n_rows
@@ -81,7 +80,8 @@ def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simp
     every, sample = (search_sample(rows, most) for most in (SAMPLE_ROWS, FEWEST_SEEN))
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     # Rules whose terms stay may compensate one another: least weights would keep them from it.
-    premise = Premise.of(antecedent, *sample.inputs.box, is_unbounded=not plan.premises_move)
+    low, high = sample.inputs.box
+    premise = Premise.of(antecedent, low, high, is_unbounded=not plan.premises_move)
     turns = MOST_TURNS if plan.premises_move and free else 0
     best = with_free_terms(tune(problem, premise, free, turns))
     room, worths = 1.0, SLOPE_WORTHS if turns else ()
