@@ -22,8 +22,9 @@ from .solver import Solver, SolverResult
 # First and largest radius. Displacements are in spacings and logarithms: longer steps skip from one
 # arrangement of the terms to another, and may end in bad minima.
 _RADIUS = 1.0
-# Steps up to this factor longer than the radius are accepted: the radius itself is a guess.
-_LENGTH_SLACK = 1.01
+# Steps up to the first factor longer than the radius are accepted: the radius itself is a guess.
+# Steps longer than the second part of it, as after the box has cut them, count as on its edge.
+_LENGTH_SLACK, _ON_EDGE = 1.01, 0.9
 # Added to every curvature: this part of the largest, far above rounding errors and far below the
 # curvature that data give; and this part of the cost, which a step of length one has to earn.
 _SMALLEST_CURVATURE = 1e-6
@@ -103,7 +104,7 @@ def varpro(
             accepted = ratio > 0.0
             if not ratio >= 0.25:  # also where the trial is not finite
                 radius = 0.25 * min(radius, length)  # the length may be NaN
-            elif ratio > 0.75:
+            elif ratio > 0.75 and length > _ON_EDGE * radius:
                 radius = min(2.0 * radius, _RADIUS)
             # The decrease that a smaller step promises is lost in the rounding of the cost.
             if accepted or radius < NEXT_TO_NOTHING:
