@@ -165,7 +165,8 @@ def _written_terms(model, digits):
     groups, start, seen = [], 0, model.seen_values
     sure = np.log(10.0 ** max(digits, PRECISION) - 1.0) if digits < MOST_DIGITS else np.inf
     for group in antecedent.groups:
-        theta = _rounded_theta(group, digits)
+        ends = (end[group.inputs] for end in (model.minimum, model.maximum))
+        theta = _rounded_theta(group, digits, *ends)
         is_written = antecedent.grid_counts is None and group.family in WRITTEN
         for k, t in enumerate(range(start, start + group.n_terms)):
             says_where[t] = is_written and names[t] == default[t]
@@ -187,11 +188,17 @@ def _written_terms(model, digits):
     return replace(model, antecedent=written, term_names=tuple(names)), says_where
 
 
-def _rounded_theta(group, digits):
-    """Rounded parameters of terms: places to digits of the width, others to their own digits."""
+def _rounded_theta(group, digits, low, high):
+    """Rounded parameters of terms: places to digits of the width, others to their own digits.
+
+    Digits suffice to within ten square widths. The logarithm of a membership changes with the
+    square of the distance, so a row that is farther needs more of them.
+    """
     natural = group.family.natural(group.theta)
     parameters = group.family.parameters
     width = natural[[one.kind for one in parameters].index("log_width")]
+    farthest = np.maximum(high - natural[0], natural[0] - low) / width
+    digits = digits + np.log10(np.maximum(farthest**2 / 10.0, 1.0)).astype(int)
     theta = np.empty_like(natural)
     for row, parameter, values in zip(theta, parameters, natural, strict=True):
         if parameter.kind == "location":

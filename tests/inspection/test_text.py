@@ -486,6 +486,17 @@ def test_what_the_text_errs_is_told_in_the_units_of_the_fit_alone(order, rng):
     assert untold.splitlines()[1:] == told.splitlines()[1:]
 
 
+@pytest.mark.parametrize("far", [30.0, 60.0, 100.0])
+def test_terms_are_written_with_the_digits_that_a_far_row_needs(far, rng):
+    x = np.append(rng.normal(size=300), far)[:, None]
+    y = np.abs(x[:, 0]) + 0.01 * rng.normal(size=301)
+    model = ANFISRegressor(n_mfs=2).fit(x, y).model_
+    both = model, Sentences.of(model).printed
+    ratios = [np.diff(one.antecedent.log_memberships(x[-1:].T), axis=0) for one in both]
+    # With two digits of every number, they are 2, 126 and 17 apart.
+    assert_allclose(*ratios, rtol=0.0, atol=0.1)
+
+
 @pytest.mark.parametrize(("unit", "start"), [(1e-15, 0.0), (100.0, 1.7e9)])
 def test_terms_are_written_without_rests_of_rounding_and_places_to_the_last_digit(unit, start, rng):
     z = rng.uniform(size=(80, 1))
