@@ -384,6 +384,7 @@ def test_name_comes_from_path_and_files_are_those_returned(tmp_path):
         ({"path": "no/folder/my model"}, "path ends in 'my model'"),
         ({"name": "m", "dtype": "float32"}, "dtype='float32' must be one of 'double', 'float'"),
         ({"name": "m", "min_coverage": 0.0}, r"min_coverage=0\.0 must be a number above 0"),
+        ({"name": "m", "units": {"x7": "degC"}}, "units has x7, but the columns are time, "),
         ({"name": "m", "saturate": [(0.0, 1.0)] * 2}, "for each of the 1 outputs"),
         ({"name": "m", "saturate": [("low", "high")]}, r"saturate=\[\('low', 'high'\)\] must have"),
         ({"name": "m", "saturate": [(1.0, 0.0)]}, "must have finite .* with low below high"),

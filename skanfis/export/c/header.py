@@ -59,6 +59,9 @@ int $name_self_test(void);
 def header(source, units, notes):
     """The header, whose first comment says what the model is and what it costs."""
     model, numbers, dialect = source.model, source.numbers, source.dialect
+    names = *model.input_names, *model.output_names
+    if strange := sorted(set(units or {}).difference(names)):
+        raise ValueError(f"units has {', '.join(strange)}, but the columns are {', '.join(names)}.")
     asked = (-np.inf, np.inf) if source.limits is None else source.limits.T
     lowest, highest = np.clip(model.output_limits, *asked)
     lines = [
