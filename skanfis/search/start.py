@@ -77,7 +77,8 @@ def started(tuned: Tuned, rows: StandardisedData, plan: Plan, room: float, candi
 def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simplicity) -> Start:
     """A start from given rules, with the free weights found on a sample of the rows."""
     free, inputs = plan.free, plan.consequent_inputs
-    every, sample = (search_sample(rows, most) for most in (SAMPLE_ROWS, FEWEST_SEEN))
+    every = search_sample(rows, SAMPLE_ROWS)
+    sample = search_sample(every, FEWEST_SEEN)
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     # Rules whose terms stay may compensate one another: least weights would keep them from it.
     low, high = sample.inputs.box
