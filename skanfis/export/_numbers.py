@@ -35,14 +35,7 @@ class Numbers:
         names = model.input_names
         self.low = _rounded(model.minimum, dtype, "the minimum of", names=names)
         self.high = _rounded(model.maximum, dtype, "the maximum of", names=names)
-        is_lost = (self.low == self.high) & (model.minimum < model.maximum)
-        if is_lost.any():
-            j = np.argmax(is_lost)
-            raise ValueError(
-                f"Single precision holds all values of {names[j]!r} in the training data as one "
-                f"number, {self.low[j]:.9g}. Subtract an offset before training and before the "
-                "call, or export in double precision."
-            )
+        _check_apart(self.low, self.high, model)
         self.reference = reference = _rounded(model.reference, dtype, "the mean of", names=names)
         what = "the inverse spread of"
         self.inverse_spread = _rounded(1.0 / model.spread, dtype, what, True, names)
@@ -101,6 +94,17 @@ def rounded_within(limits, dtype):
     low = np.where(low < limits[0], np.nextafter(low, inf), low)
     high = np.where(high > limits[1], np.nextafter(high, -inf), high)
     return np.stack([low, high])
+
+
+def _check_apart(low, high, model):
+    is_lost = (low == high) & (model.minimum < model.maximum)
+    if is_lost.any():
+        j = np.argmax(is_lost)
+        raise ValueError(
+            f"Single precision holds all values of {model.input_names[j]!r} in the training data "
+            f"as one number, {low[j]:.9g}. Subtract an offset before training and before the call, "
+            "or export in double precision."
+        )
 
 
 def _rounded(values, dtype, what, counts=None, names=()):

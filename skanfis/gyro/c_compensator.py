@@ -28,9 +28,8 @@ def export_c_compensator(compensator, path, *, std, dtype="double") -> CCode:
     export: Any = export_c_physics
     if not isinstance(found, ResidualRegressor):
         export, found = export_c, FrozenRules.of(found, len(compensator.inputs)).model
-        units = {name: units[name] for name in compensator.inputs} | {
-            found.output_names[0]: "deg/s"
-        }
+        units = {name: units[name] for name in compensator.inputs}
+        units[found.output_names[0]] = "deg/s"
     assumed = [f"Unit assumed: {text}" for text in compensator.assumed.values()]
     return export(
         found,
