@@ -191,8 +191,8 @@ def _written_terms(model, digits):
 def _rounded_theta(group, digits, low, high):
     """Rounded parameters of terms: places to digits of the width, others to their own digits.
 
-    Digits suffice to within ten square widths. The logarithm of a membership changes with the
-    square of the distance, so a row that is farther needs more of them.
+    The logarithm of a membership changes with the square of the distance in widths. From a square
+    of ten on, the farthest row needs more digits.
     """
     natural = group.family.natural(group.theta)
     parameters = group.family.parameters
