@@ -335,7 +335,7 @@ def _divisor(value, where):
 
 def _coefficients(values, where, most):
     if not isinstance(values, list) or not 0 < len(values) <= most:
-        raise ValueError(f"{where}: {shown(values)} is not a list of 1 to {most}")
+        raise ValueError(f"{where}: {shown(values)} must be a list of numbers, {most} at most")
     return numbers(values, where, (len(values),))
 
 
