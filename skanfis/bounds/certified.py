@@ -249,6 +249,8 @@ def _enclosed(model, box, j, scale, tol, max_boxes):
             first = points[:, top], float(attained[top])
             found.append(largest(evaluate, low, high, least, max_boxes, training_box(model), first))
     bound, attained, point, n_boxes, converged = map(np.array, zip(*found, strict=True))
+    # Beyond the part in which predictions change, they are the same: the box has such a point too.
+    point = np.clip(point, *box.T)
     return Bounds(
         lower=-bound[::2],
         upper=bound[1::2],

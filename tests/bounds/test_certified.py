@@ -84,6 +84,19 @@ def test_the_box_is_held_where_the_policy_holds(rng):
     assert 1e90 < ends.max() <= far.upper[0] < np.inf
 
 
+@pytest.mark.parametrize("policy", ["linear", "clip"])
+def test_points_lie_in_a_box_beyond_the_range(policy):
+    model = ONE_RULE.with_out_of_bounds(policy, 0.5)
+    beyond = model.maximum + 100.0 * SCALE
+    box = np.stack([beyond, beyond + SCALE], axis=1)
+    for found in (bounds(model, box), gradient_bounds(model, "rate", box)):
+        for point in (*found.at_lowest, *found.at_highest):
+            assert (box[:, 0] <= point).all()
+            assert (point <= box[:, 1]).all()
+    found = bounds(model, box)
+    assert_allclose(np.diag(model.predict(found.at_lowest)), found.lowest)
+
+
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
