@@ -285,8 +285,11 @@ def read_box(box, model: TSKModel):
     """The box as an array (n_inputs, 2); inputs not given have the range of the training data."""
     rows, given = training_box(model).tolist(), {} if box is None else box
     if isinstance(given, Mapping):
-        for name, ends in given.items():
-            rows[feature_indices([name], model.input_names, "box")[0]] = ends
+        places = [feature_indices([name], model.input_names, "box")[0] for name in given]
+        if len(set(places)) < len(places):
+            raise ValueError(f"box={given!r} names a column twice.")
+        for j, ends in zip(places, given.values(), strict=True):
+            rows[j] = ends
     else:
         rows = given
     try:

@@ -106,6 +106,7 @@ def test_points_lie_in_a_box_beyond_the_range(policy):
             {"box": {"speed": (0.0, 1.0)}},
             "box names 'speed', .* no column .*'rate', at positions 0",
         ),
+        ({"box": {"rate": (0.0, 1.0), 2: (0.0, 2.0)}}, r"box={'rate': .*} names a column twice"),
         ({"box": {"rate": (1.0, 0.0)}}, r"box has \(1, 0\) for 'rate': low must not be above high"),
         ({"box": {"rate": (np.nan, 0.0)}}, "neither may be NaN"),
         ({"box": {"rate": ("a", 1.0)}}, r"got {'rate': \('a', 1.0\)}"),
