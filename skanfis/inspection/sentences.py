@@ -80,7 +80,7 @@ class Sentences:
         # Digits of terms refer to the output's deviation, not to that of the noise.
         more = int(np.floor(np.log10(scale / noise)).max(initial=0.0))
         digits = min(precision + more, MOST_DIGITS)
-        written, says_where = _written_terms(model, digits)
+        written, says_where = _written_terms(model, digits, min(UNSAID, 10.0**-precision))
         values, of_common = (rounded(one, noise, precision) for one in (values, of_common))
         of_rules = places, values, of_common, slopes, is_own
         return cls(written, says_where, *of_rules, common_place, common)
@@ -152,12 +152,12 @@ def _resolution(model, slopes):
     return scale, np.clip(noise, finest * scale, scale)
 
 
-def _written_terms(model, digits):
+def _written_terms(model, digits, unsaid):
     """The model with its terms as written, and which of their names tell their place.
 
     A name that the user has given stays. Unless all digits are written, two things are left out.
     A cut with no training row near it becomes crisp, if its width changes no digit. A condition
-    goes that others of the rule imply, as "sort is not a" beside "sort is b".
+    goes that others of the rule imply up to ``unsaid``, as "sort is not a" beside "sort is b".
     """
     antecedent = model.antecedent
     default, of_digits = default_term_names(model), default_term_names(model, digits)
@@ -184,7 +184,7 @@ def _written_terms(model, digits):
         start += group.n_terms
     written = replace(antecedent, groups=tuple(groups))
     if digits < MOST_DIGITS:
-        written = written.without_implied(UNSAID, columns_of(model))
+        written = written.without_implied(unsaid, columns_of(model))
     return replace(model, antecedent=written, term_names=tuple(names)), says_where
 
 

@@ -497,6 +497,19 @@ def test_terms_are_written_with_the_digits_that_a_far_row_needs(far, rng):
     assert_allclose(*ratios, rtol=0.0, atol=0.1)
 
 
+def test_more_digits_bring_the_text_of_a_tree_as_near_to_the_model(rng):
+    X = rng.uniform(0.0, 24.0, (300, 1))
+    y = np.sin(0.5 * X[:, 0])
+    model = ANFISRegressor(partition="tree", max_rules=6).fit(X, y).model_
+    counts = []
+    for precision in (2, 4, 8):
+        printed = Sentences.of(model, precision).printed
+        counts.append((printed.antecedent.rule_terms >= 0).sum())
+        assert_allclose(printed.predict(X), model.predict(X), atol=10.0**-precision)
+    # A condition that others imply to two digits is written when more are asked for.
+    assert counts[0] < counts[-1] == (model.antecedent.rule_terms >= 0).sum()
+
+
 @pytest.mark.parametrize(("unit", "start"), [(1e-15, 0.0), (100.0, 1.7e9)])
 def test_terms_are_written_without_rests_of_rounding_and_places_to_the_last_digit(unit, start, rng):
     z = rng.uniform(size=(80, 1))
