@@ -98,8 +98,9 @@ def bounds(
     model : fitted estimator or TSKModel
         An ANFIS estimator, or a Pipeline, TransformedTargetRegressor or search around one.
     box : array-like of shape (n_inputs, 2) or dict, default=None
-        Low and high of every input, in the units of X, or {name: (low, high)}; ends may be
-        infinite. Inputs not named, or all with None, have the range of the training data.
+        Low and high of every input, in the units of X, or {name: (low, high)}, or a frame or Series
+        by name; ends may be infinite. Inputs not named, or all with None, have the range of the
+        training data.
     tol : float, default=0.01
         Largest gap between a bound and the value found, relative to the output's range.
     max_boxes : int, default=200_000
@@ -284,6 +285,9 @@ def _checked(model, box, tol, max_boxes):
 def read_box(box, model: TSKModel):
     """The box as an array (n_inputs, 2); inputs not given have the range of the training data."""
     rows, given = training_box(model).tolist(), {} if box is None else box
+    if hasattr(given, "keys") and not isinstance(given, Mapping):
+        # A Series or frame, with the inputs' names as labels of its columns or of its rows.
+        given = dict(given if set(given.keys()) <= set(model.input_names) else given.T)
     if isinstance(given, Mapping):
         places = [feature_indices([name], model.input_names, "box")[0] for name in given]
         if len(set(places)) < len(places):

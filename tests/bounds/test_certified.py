@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from numpy.testing import assert_allclose
 
@@ -95,6 +96,16 @@ def test_points_lie_in_a_box_beyond_the_range(policy):
             assert (point <= box[:, 1]).all()
     found = bounds(model, box)
     assert_allclose(np.diag(model.predict(found.at_lowest)), found.lowest)
+
+
+def test_a_frame_is_read_by_its_labels():
+    names, low = list(ONE_RULE.input_names), OFFSET - SCALE
+    frame = pd.DataFrame({"low": low, "high": low + [1.0, 2.0, 3.0] * SCALE}, index=names)
+    expected = frame.to_numpy()
+    turned = frame.loc[names[::-1]]
+    for box in (frame, turned, turned.T, frame.reset_index(drop=True), frame.apply(tuple, axis=1)):
+        assert_allclose(bounds(ONE_RULE, box).box, expected)
+    assert_allclose(bounds(ONE_RULE, turned[:1]).box[2], expected[2])
 
 
 @pytest.mark.parametrize(
