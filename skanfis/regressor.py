@@ -147,7 +147,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         :func:`skanfis.inspection.effects`. Computed on access; not after ``partial_fit``.
     n_iter_, loss_curve_, status_ : int, ndarray of shape (n_iter + 1,), str
         The last run of the solver: its iterations, counted as one if there are none, its mean
-        squared error on the standardised target from the start on, and why it stopped.
+        squared error on the standardised target, summed over outputs, from the start on, and why it
+        stopped.
     agreement_, alpha_, slope_alpha_, stiffness_ : float
         Weights of the penalties. ``slope_alpha_`` penalises the slopes of the rules' common line,
         ``stiffness_`` movements of the premises.
@@ -157,9 +158,10 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     structures_ : list of dict
         The structures compared, or the one given: "structure" in words, "kind", "rules", "n_mfs" of
         a grid, "reading_cost" (numerals in the rules' sentences), "expected_error" (RMS on new
-        rows, in standard deviations of the target), "rules_beat_mean" (whether the rules one by
-        one, before they are made to agree, err less than the mean), "chosen". The smallest error
-        comes first. Empty if nothing was fitted.
+        rows, in standard deviations of the target; of several outputs, the root of the sum of
+        squares), "rules_beat_mean" (whether the rules one by one, before they are made to agree,
+        err less than the mean), "chosen". The smallest error comes first. Empty if nothing was
+        fitted.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
         Standard deviation of the noise of a row of mean weight, in the units of y.
     readability_ : skanfis.inspection.Readability
