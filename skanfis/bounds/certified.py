@@ -289,11 +289,9 @@ def read_box(box, model: TSKModel):
         # A Series or frame, with the inputs' names as labels of its columns or of its rows.
         given = dict(given if set(given.keys()) <= set(model.input_names) else given.T)
     if isinstance(given, Mapping):
-        places = [feature_indices([name], model.input_names, "box")[0] for name in given]
-        if len(set(places)) < len(places):
-            raise ValueError(f"box={given!r} names a column twice.")
-        for j, ends in zip(places, given.values(), strict=True):
-            rows[j] = ends
+        feature_indices(list(given) or None, model.input_names, "box")  # no column twice
+        for name, ends in given.items():
+            rows[feature_indices([name], model.input_names, "box")[0]] = ends
     else:
         rows = given
     try:
