@@ -37,6 +37,11 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     given, X, y and their numbers, a warning names those that contradict a constraint.
     """
     _check_points(model, constraints)
+    if not len(constraints.points):
+        # A constant within its limits keeps every sign; margins would give its rules slopes.
+        low, high = problem.rows.targets.minimum, problem.rows.targets.maximum
+        keeps = (low == high) & (constraints.lower < low) & (high < constraints.upper)
+        constraints = replace(constraints, signs=np.where(keeps[:, None], 0, constraints.signs))
     # The free fit at premises for which an order may be known.
     free = at_equal_widths(problem, evaluation, constraints)
     found = Consequents(model, free, problem, constraints)
