@@ -257,8 +257,11 @@ class TSKModel:
             followed = self._followed(way) if self.out_of_bounds == "linear" else 0.0 * way
             outputs = self._hold(values + np.einsum("ji,joi->oi", followed, slopes))
             # The deviation is that of the whole tangent. The part that the prediction does not
-            # follow counts in full.
-            left = np.einsum("ji,joi->oi", way - followed, slopes)
+            # follow counts in full, but for what the user's limits rule out.
+            whole = values + np.einsum("ji,joi->oi", way, slopes)
+            if self.target is not None:
+                whole = np.clip(whole, *self.target.limits(np.inf, is_line=False)[:, :, None])
+            left = whole - outputs
             return np.vstack([outputs, np.hypot(posterior.tangent(self, nearest, way), left)])
 
         found = np.full((X.shape[0], n_values), np.nan)

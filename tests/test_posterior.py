@@ -3,6 +3,7 @@
 import json
 import pickle
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -264,6 +265,17 @@ def test_out_of_range_it_is_the_deviation_of_the_tangent(kind, rng):
     assert_array_equal(np.isnan(told), ~model.in_bounds(new))
     with pytest.raises(ValueError, match="lies outside the training data"):
         model.with_out_of_bounds("raise").standard_deviation(new)
+
+
+def test_what_a_limit_of_the_output_takes_away_counts_but_for_what_the_user_rules_out():
+    X = np.linspace(0.0, 1.0, 60)[:, None]
+    model, far = ANFISRegressor(n_mfs=2).fit(X, X[:, 0] ** 2).model_, np.array([[3.0]])
+    tangent, of_tangent = model.with_out_of_bounds("linear", np.inf).predict_with_deviation(far)
+    for policy, upper in product(("linear", "clip"), (np.inf, 4.0, 1.1)):
+        limited = replace(model, target=model.target.within(-np.inf, upper, [[1.0]]))
+        outputs, deviation = limited.with_out_of_bounds(policy, 4.0).predict_with_deviation(far)
+        assert outputs < 1.5 < 4.0 < tangent
+        assert_allclose(deviation, np.hypot(of_tangent, min(tangent.item(), upper) - outputs))
 
 
 def wide(model):
