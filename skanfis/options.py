@@ -51,7 +51,8 @@ class EarlyStopping(BaseEstimator):
     Parameters
     ----------
     validation_fraction : float, default=0.1
-        Fraction of the rows, or of the groups, that is held out; between 0 and 1.
+        Fraction of the rows, those with equal inputs as one, or of the groups, that is held out;
+        between 0 and 1.
     n_iter_no_change : int, default=10
         Training ends after this many iterations in a row in which the held-out error has not fallen
         by ``tol``; 1 or more.

@@ -91,6 +91,8 @@ def hold_out(rows: StandardisedData, validation_fraction, seed):
     if groups is None or np.ptp(groups) == 0:
         # By the inputs alone, in any order of columns.
         groups = rows.numbers(lambda Z, _: place_in_sample(Z, Z[:0]))
+        n_distinct = np.unique(groups).size
+        what += f" ({n_distinct} of them distinct)" if n_distinct < rows.n_rows else ""
     else:
         what += f" in {np.unique(groups).size} groups"
     splitter = GroupShuffleSplit(1, test_size=validation_fraction, random_state=seed)

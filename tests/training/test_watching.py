@@ -230,6 +230,9 @@ def test_equal_rows_are_on_one_side(rng):
     training, held = hold_out(StandardisedData.of(X, rng.normal(size=(200, 1))), 0.2, 0)
     assert held.size == 40
     assert set(training % 50).isdisjoint(held % 50)
+    same = StandardisedData.of(np.ones((9, 2)), rng.normal(size=(9, 1)))
+    with pytest.raises(ValueError, match=r"of 9 rows \(1 of them distinct\), 0 to train on and 9"):
+        hold_out(same, 0.2, 0)
 
 
 @pytest.mark.parametrize(
