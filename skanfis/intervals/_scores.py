@@ -206,7 +206,8 @@ def leave_one_out_scores(estimator, data, weight, least):
     floor = least_deviations(data.targets)
     centers, deviations = predicted(estimator, data.X, floor)
     noise = np.maximum(np.atleast_1d(noise), floor)
-    leverage = (deviations / noise) ** 2 - 1.0
+    # The noise of a constant target is nothing to divide by.
+    leverage = np.minimum(deviations / noise, 1.0 / _LEAST_DEVIATION) ** 2 - 1.0
     own = np.ones((1, 1))
     if weight is not None:
         # How many rows a row of this weight counts as in the fit.

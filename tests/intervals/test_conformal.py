@@ -180,6 +180,14 @@ def test_scaled_by_the_deviation_of_rules_it_covers_and_is_wider_off_the_data(me
     assert (np.diff(upper - lower, axis=0) > 0.0).all()
 
 
+@pytest.mark.parametrize("method", ["folds", "split", "loo"])
+def test_the_interval_of_a_constant_target_has_no_width(method, rng):
+    X, y = bent(rng, 60)
+    model = ConformalRegressor(ANFISRegressor(n_mfs=2), method=method, cv=4)
+    ends = model.fit(X, np.column_stack([y, np.full(60, 2.0)])).predict_interval(X, 0.8)
+    assert_allclose(np.array(ends)[:, :, 1], 2.0, rtol=1e-12)
+
+
 def test_groups_and_weights_reach_a_regressor_in_a_pipeline(rng):
     X, y = bent(rng, 60)
     run, weight = np.arange(60) // 6, rng.integers(0, 3, size=60).astype(float)
