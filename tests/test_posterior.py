@@ -120,6 +120,13 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, 
     assert_allclose(left, of_known * rows.targets.scale[0], rtol=2e-5)
     assert_allclose(posterior.noise[0], noise * rows.targets.scale[0], rtol=1e-8)
     assert_allclose(found, expected * rows.targets.scale[0], rtol=1e-8)
+    # Constraints hold the consequents elsewhere: the premises' part is that of the held ones.
+    held = evaluation.coefficients + rng.normal(size=evaluation.coefficients.shape)
+    there, learnt = replace(evaluation, coefficients=held), premise if is_learnt else None
+    posterior = posterior_of(problem, learnt, evaluation, rows.n_rows, held=held)
+    found = frozen(problem, there, posterior=posterior, **wide_box).standard_deviation(X)[:, 0]
+    noise, expected = dense_deviation(problem, premise, there, new, is_learnt)
+    assert_allclose(found / posterior.noise[0], expected / noise, rtol=1e-8)
 
 
 def wave(rng, n_rows, noise=0.1):

@@ -33,8 +33,9 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     """The consequents nearest to those of an evaluation that provably keep all constraints.
 
     Returns these, in the user's units like ``model``; the evaluation of the free consequents at the
-    same premises; the points in range at which values are known; and a report. If ``rows`` are
-    given, X, y and their numbers, a warning names those that contradict a constraint.
+    same premises; the constrained ones in its units; the points in range at which values are known;
+    and a report. If ``rows`` are given, X, y and their numbers, a warning names those that
+    contradict a constraint.
     """
     _check_points(model, constraints)
     if not len(constraints.points):
@@ -51,7 +52,8 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
     if after > _COSTLY * before:
         nearer, way = found.nearest_proven(local)
         if found.loss(nearer) < after:
-            held, drawn, after = found.model(nearer), way, found.loss(nearer)
+            local, held = nearer, found.model(nearer)
+            drawn, after = way, found.loss(nearer)
         elif way == 1.0:
             drawn = way  # no proof was found before the rules in order
     raised = after / max(before, _OF_MARGINS)  # on exact data, the free fit may have no error
@@ -79,7 +81,7 @@ def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, 
         # A point beyond the range fixes a tangent, not a value in range: it is left out.
         points = points[model.in_bounds(points)]
     points = np.clip(points, model.minimum, model.maximum)
-    return held.coefficients, free, points, report
+    return held.coefficients, free, problem.local.to_global(local), points, report
 
 
 def _check_points(model, constraints):

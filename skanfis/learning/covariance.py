@@ -21,12 +21,18 @@ from .premise import Premise
 
 
 def posterior_of(
-    problem: SeparableProblem, premise: Premise | None, evaluation: Evaluation, n_rows, robust=None
+    problem: SeparableProblem,
+    premise: Premise | None,
+    evaluation: Evaluation,
+    n_rows,
+    robust=None,
+    held=None,
 ) -> Posterior | None:
     """The posterior in the user's units; None for models of more than ``MOST_PARAMETERS``.
 
     ``premise`` is None if the premises were not learnt; ``n_rows`` counts rows by weight;
-    ``robust`` holds the weights that Huber's loss has left the rows, and its epsilon.
+    ``robust`` holds the weights that Huber's loss has left the rows, and its epsilon; ``held`` are
+    the consequents of the model, if constraints hold them away from those of the evaluation.
     """
     antecedent, rows = evaluation.antecedent, problem.rows
     n_columns, n_parameters = problem.n_columns, antecedent.parameters.size
@@ -45,7 +51,9 @@ def posterior_of(
     cross = np.zeros((problem.n_outputs, 0, len(half)))
     n_determined = 0.0
     if premise is not None and premise.size:
-        premises, cross, n_determined = _premises(problem, premise, evaluation)
+        # The slopes by the premises, here and in ``Posterior``, are those of the model.
+        there = evaluation if held is None else replace(evaluation, coefficients=held)
+        premises, cross, n_determined = _premises(problem, premise, there)
     # At least one degree of freedom, even if there are no more rows than parameters.
     freedom = max(n_rows - n_effective - n_determined / problem.n_varying, 1.0)
     noise *= np.sqrt(n_rows / freedom)

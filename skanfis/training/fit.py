@@ -207,8 +207,11 @@ class _Fit:
         """The model with the policy out of bounds that the user asked for."""
         return model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
 
-    def frozen(self, run: SolverRun, weights: np.ndarray | None) -> Fitted:
-        """The results of a run, with the posterior; ``weights`` are those of Huber's loss."""
+    def frozen(self, run: SolverRun, weights: np.ndarray | None, held=None) -> Fitted:
+        """The results of a run, with the posterior.
+
+        ``weights`` are those of Huber's loss, ``held`` the consequents that satisfy constraints.
+        """
         rows = self.rows
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
@@ -217,7 +220,7 @@ class _Fit:
             # Kish's effective number of rows, from the part of its weight that each row keeps.
             share, square = (np.average(weights**k, weights=rows.weights) for k in (1, 2))
             n_rows *= share**2 / square
-        posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust)
+        posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust, held)
         model, redundant = frozen_model(self.data, rows, self.request, run.start, run.evaluation)
         assert model.support is not None
         marginals = input_marginals(rows, run.evaluation.antecedent)
@@ -239,10 +242,9 @@ class _Fit:
         is_here = isinstance(self.data, ValidatedData)
         rows = self.data.numbered(self.trained_on) if is_here else None
         given = fitted.model, evaluation, run.problem, constraints, rows
-        coefficients, free, points, report = constrained(*given)
-        if free is not evaluation:
-            moved = replace(run.result, evaluation=free)
-            fitted = self.frozen(replace(run, result=moved), weights)
+        coefficients, free, held, points, report = constrained(*given)
+        run = replace(run, result=replace(run.result, evaluation=free))
+        fitted = self.frozen(run, weights, held)
         model = replace(fitted.model, coefficients=coefficients)
         target, posterior = model.target, model.posterior
         return replace(
