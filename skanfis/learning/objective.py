@@ -282,10 +282,16 @@ class SeparableProblem:
 
     def residuals(self, evaluation):
         """Blocks of rows in order: slice, residual of the standardised target, weights."""
+        for part, _, _, residual, weight in self._fired(evaluation):
+            yield part, residual, weight
+
+    def _fired(self, evaluation):
+        """The same, with strengths of the rules and basis functions after the slice."""
         by_output = self._design.by_output(evaluation.coefficients)
         for part, Z, target, weight in self._blocks():
             strengths, basis_rows = evaluation.antecedent.strengths(Z), self._design.basis(Z)
-            yield part, target - outputs_of_rules(by_output, strengths, basis_rows), weight
+            residual = target - outputs_of_rules(by_output, strengths, basis_rows)
+            yield part, strengths, basis_rows, residual, weight
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""
