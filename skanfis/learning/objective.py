@@ -35,6 +35,9 @@ from .gram import DesignMoments
 from .passes import Design, FirstPass, JointPass, SecondPass
 from .penalty import CommonLine, Penalty, disagreement_matrix
 
+# Least 1 - h: for a row with a rule to itself it is a rounding error, and r / (1 - h) unbounded.
+_SMALLEST_FREEDOM = 1e-6
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -292,6 +295,22 @@ class SeparableProblem:
             strengths, basis_rows = evaluation.antecedent.strengths(Z), self._design.basis(Z)
             residual = target - outputs_of_rules(by_output, strengths, basis_rows)
             yield part, strengths, basis_rows, residual, weight
+
+    def leave_one_out_error(self, evaluation):
+        """Mean squared error of leaving out each row, at fixed premises (Allen 1974).
+
+        It is the mean of (r_i / (1 - h_i))^2, with the leverage
+        h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. Of a row that stands for several, one is left out.
+        """
+        total, unit = 0.0, self._weight / self.n_rows
+        # L^-1 T', so that the basis of this small matrix changes, and not that of the design.
+        root = self.local.to_global(evaluation.normal.factor.root.T).T
+        for _, strengths, basis_rows, residual, weight in self._fired(evaluation):
+            half = root @ (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)
+            leverage = np.einsum("ij,ij->j", half, half)
+            residual /= np.maximum(1.0 - unit * (leverage / self._weight), _SMALLEST_FREEDOM)
+            total += weight @ np.sum(residual**2, axis=0)
+        return float(total / self._weight)
 
     def _by_global(self, local):
         """T^-T M: the derivative by coefficients on [1, z] from that by the local ones."""

@@ -1,9 +1,9 @@
 r"""Short trainings of candidates on one set of rows: all rows of a search, or those of a fold.
 
-The evidence finds the weights of every candidate's penalty (``tuning``). Generalised
-cross-validation only ranks the possible next steps of one kind, because its rows took part in
-choosing the step. The error expected on new rows is that on rows which no step has seen
-(``judging``).
+The evidence finds the weights of every candidate's penalty (``tuning``). The leave-one-out error
+follows from the training on all rows. It only ranks the possible next steps of one kind, because
+the rows that it leaves out took part in choosing the step. The error expected on new rows is that
+on rows which no step has seen (``judging``).
 """
 
 from collections.abc import Callable, Sequence

@@ -24,6 +24,7 @@ from ..learning.evidence import (
     SMALLEST,
     WORTH,
     Laplace,
+    held_displacements,
     is_settled,
     laplace,
     least_weights,
@@ -105,11 +106,16 @@ class Tuned:
     def expected_error(self):
         """Mean squared error expected on new rows, of the standardised target.
 
-        Generalised cross-validation, MSE / (1 - k / n)^2, k the effective number of all
-        parameters (Craven and Wahba 1979). It is infinite where k reaches the number of rows n.
+        The leave-one-out error, at fixed premises, times the factor of Akaike's final prediction
+        error for the premises, (1 + k / n) / (1 - k / n), k their effective number. It is infinite
+        where k reaches the number of rows n.
         """
-        free = 1.0 - self.posterior.n_effective / self.problem.n_rows
-        return self.solved.mean_squared_error / free**2 if free > 0.0 else np.inf
+        n_held = held_displacements(self.curvature, self.penalty.stiffness)
+        share = (self.curvature.size - n_held) / self.problem.n_rows
+        if share >= 1.0:
+            return np.inf
+        left_out = self.problem.leave_one_out_error(self.solved)
+        return left_out * (1.0 + share) / (1.0 - share)
 
 
 def tune(
@@ -259,6 +265,7 @@ def _most_agreement(tuned: Tuned, most: float) -> float:
     low, high = tuned.penalty.agreement, LARGEST.agreement
     for _ in range(_HALVINGS):
         middle = float(np.sqrt(low * high))
+        # Solving again takes no pass over the rows; only the error of the solution does.
         raised = tuned.with_penalty(replace(tuned.penalty, agreement=middle))
         low, high = (middle, high) if raised.expected_error <= most else (low, middle)
     return low

@@ -222,3 +222,25 @@ def test_cost_of_a_nearly_exact_fit_keeps_its_digits(rng):
     least = np.mean(residual**2)
     assert_allclose(seeing.mean_squared_error, least, rtol=0.02)
     assert abs(blind.mean_squared_error - least) > 0.1 * least
+
+
+@pytest.mark.parametrize("weighted", [False, True])
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs, rng):
+    rows = oracles.bumpy_rows(rng, 40, 2, n_outputs, weighted)
+    penalty = Penalty(agreement=0.3, alpha=1e-2, slope=0.1)
+    antecedent = oracles.random_grid(rng, [Gaussian] * 2, [2, 2])
+    problem = SeparableProblem(rows, antecedent, penalty)
+    evaluation = problem.evaluate(antecedent.parameters)
+    dense = oracles.DenseProblem(rows, antecedent, 1, penalty)
+    phi, total = dense.design(antecedent.parameters), 0.0
+    held = dense.residual_matrix(antecedent.parameters)[40:]
+    # The weights may be those of other numbers of rows than there are of them.
+    n_rows = problem.n_rows = 0.8 * rows.total_weight
+    for i in range(40):
+        weight = dense.weight.copy()
+        weight[i] -= 1.0 / n_rows  # as much as one row has
+        gram = (phi.T * weight) @ phi + held.T @ held
+        beta = np.linalg.solve(gram, (phi.T * weight) @ dense.y)
+        total += dense.weight[i] * np.sum((dense.y[i] - phi[i] @ beta) ** 2)
+    assert_allclose(problem.leave_one_out_error(evaluation), total, rtol=1e-8)

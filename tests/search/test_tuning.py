@@ -15,8 +15,6 @@ from skanfis.membership import Gaussian
 from skanfis.search import tuning
 from skanfis.search.grid import Spacing, grid_antecedent
 
-from .. import oracles
-
 
 def two_rules_of_a_sine(rng, noise):
     """Their problem, and its premise."""
@@ -51,26 +49,6 @@ def test_what_rules_err_one_by_one(two_rules):
     strengths = evaluation.antecedent.strengths(Z)
     expected = np.mean(np.sum(strengths * (target - said) ** 2, axis=0))
     assert_allclose(evaluation.mean_squared_error + tuned.disagreement, expected, rtol=1e-8)
-
-
-@pytest.mark.parametrize("n_outputs", [1, 2])
-def test_expected_error_is_that_of_generalised_cross_validation(n_outputs, rng):
-    """At the traces of the dense matrices of consequents and premises."""
-    rows = oracles.bumpy_rows(rng, 60, 2, n_outputs, weighted=True)
-    antecedent = oracles.random_grid(rng, [Gaussian] * 2, [2, 2])
-    problem = SeparableProblem(rows, antecedent, tuning.FIRST_PENALTY)
-    tuned = tuning.tune(problem, Premise.of(antecedent, *rows.inputs.box), FREE, turns=1)
-    parameters = tuned.evaluation.antecedent.parameters
-    dense = oracles.DenseProblem(rows, antecedent, 1, tuned.penalty)
-    phi, held = dense.design(parameters), dense.residual_matrix(parameters)[60:]
-    gram = (phi.T * dense.weight) @ phi
-    smoother = np.linalg.solve(gram + held.T @ held, (phi.T * dense.weight))
-    moved = np.sum(tuned.curvature / (tuned.curvature + tuned.penalty.stiffness))
-    k = np.trace(phi @ smoother) + moved
-    residual = dense.y - phi @ (smoother @ dense.y)
-    mean_square = np.sum(dense.weight @ residual**2) / np.sum(dense.weight)
-    expected = mean_square / (1.0 - k / rows.effective_weight) ** 2
-    assert_allclose(tuned.expected_error, expected, rtol=1e-6)
 
 
 @pytest.mark.parametrize("turns", [tuning.MOST_TURNS, 0])
