@@ -20,7 +20,7 @@ def counting_weight(rows: StandardisedData):
 
 
 def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
-    """Distinct standardised rows [z, y] of each group, in lexical order; weights and positions.
+    """Distinct standardised rows [z, y] of each group, sorted by values; weights and positions.
 
     Beyond ``most`` rows, a sample: rows are ordered by ``place_in_sample``, and those at evenly
     spaced quantiles of the weight are taken. The order of rows or columns makes no difference, nor
@@ -37,8 +37,11 @@ def representative_rows(rows: StandardisedData, most=SAMPLE_ROWS):
         wanted = (np.arange(most) + 0.5) * (upto[-1] / most)
         chosen, times = np.unique(np.searchsorted(upto, wanted), return_counts=True)
         distinct, weight = distinct[chosen], times.astype(float)
-    table = rows.table(distinct)
-    order = np.lexsort(table.T[::-1])
+    table, n_inputs = rows.table(distinct), rows.X.shape[1]
+    # Constant columns, and the order of columns, do not count.
+    parts = table[:, :n_inputs][:, ~rows.inputs.is_constant], table[:, n_inputs:]
+    values = np.hstack([np.sort(part, axis=1)[:, ::-1] for part in parts])
+    order = np.lexsort(np.round(values, DIGITS).T)
     return table[order], weight[order], distinct[order]
 
 
