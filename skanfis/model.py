@@ -66,7 +66,8 @@ class TSKModel:
     rule_weights : ndarray of shape (n_rules,)
         Mean strength of each rule over the training rows, by their weights; the sum is one.
     rule_rows : ndarray of shape (n_rules,)
-        Number of training rows, by their weights, on which each rule is the strongest.
+        Number of training rows on which each rule is the strongest. A row of weight two counts as
+        two.
     input_names : tuple of str
     out_of_bounds : {"clip", "linear", "nan", "raise"}
     max_extrapolation : float

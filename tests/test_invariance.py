@@ -188,6 +188,7 @@ def test_whole_weights_are_repeated_rows_in_any_order(case):
     difference = weighted.predict(case.X) - other.predict(case.X)
     assert np.abs(difference).max() < TOLERANCE * case.span
     assert_allclose(weighted.coverage(case.X), other.coverage(case.X), atol=1e-4)
+    assert_allclose(weighted.model_.rule_rows, other.model_.rule_rows, rtol=1e-9)
     # The weights matter at all.
     assert np.abs(weighted.predict(case.X) - case.predictions).max() > 1e-5 * case.span
 

@@ -273,7 +273,7 @@ def _model(sums, problem, evaluation):
         minimum=inputs.minimum,
         maximum=inputs.maximum,
         rule_weights=evaluation.masses,
-        rule_rows=sums.rules.strongest * (sums.n_rows / sums.weight),
+        rule_rows=sums.rules.strongest * (sums.effective_weight / sums.weight),
         support=sums.rules.support(inputs, 1 + int(np.sum(~inputs.is_constant[own]))),
         target=TargetRange(targets.minimum, targets.maximum, targets.scale),
         posterior=posterior,

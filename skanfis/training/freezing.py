@@ -50,7 +50,7 @@ def frozen_model(
         minimum=rows.inputs.minimum,
         maximum=rows.inputs.maximum,
         rule_weights=evaluation.masses,
-        rule_rows=firing.strongest * (rows.n_rows / rows.total_weight),
+        rule_rows=firing.strongest * (rows.effective_weight / rows.total_weight),
         input_names=data.input_names,
         support=support.change_units(offset, scale),
         term_names=start.term_names,
