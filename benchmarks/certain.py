@@ -117,7 +117,9 @@ def _gyro_like():
             what = _slope("time")
             one, seconds = found[what]
             measures = [Measure("time", seconds, "s", 2.0)]
-            measures.append(Measure("tightness", one.tightness[0], "", 0.01))
+            gap = np.maximum(one.upper - one.highest, one.lowest - one.lower)
+            tightness = float((gap / np.maximum(-one.lowest, one.highest))[0])
+            measures.append(Measure("tightness", tightness, "", 0.01))
             rows.append(Row(f"{what} of the largest, {name}", measures))
     measures = [Measure("rows and optima beyond", beyond, "", 0)]
     measures.append(Measure("rows", 6 * _SLOPES, ""))
