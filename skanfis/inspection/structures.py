@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 
 from ..export.folding import last_step
+from ..learning.data import never_changes
 from ..search.choice import tolerated
 from .displays import axes_or_new, mark_decades
 
@@ -76,8 +77,10 @@ class StructureDisplay:
             )
         least = min(one["expected_error"] for one in structures) ** 2
         taken = next(one["expected_error"] for one in structures if one["chosen"]) ** 2
-        # The mean's squared error is one for each output, because outputs are standardised.
-        most = max(tolerated(least, float(last.model_.n_outputs), last.simplicity), taken)
+        # The mean's squared error is one for each output that varies: they are standardised.
+        target = last.model_.target
+        variance = np.count_nonzero(~never_changes(target.minimum, target.maximum))
+        most = max(tolerated(least, float(variance), last.simplicity), taken)
         tolerance = float(np.sqrt(most))
         display = cls(structures=structures, tolerance=tolerance, simplicity=last.simplicity)
         return display.plot(ax=ax)

@@ -84,6 +84,14 @@ def test_the_line_is_the_tolerance_of_simplicity(line, structures, simplicity, s
     assert display.tolerance == pytest.approx(np.sqrt(squared), rel=1e-12)
 
 
+def test_a_constant_output_does_not_widen_the_tolerance(rng):
+    X = rng.uniform(-1.0, 1.0, (200, 2))
+    y = X[:, 0] + 2.0 * rng.normal(size=200)
+    every = [y, np.column_stack([y, np.full(200, 3.0)])]
+    one, two = (StructureDisplay.from_estimator(ANFISRegressor().fit(X, Y)) for Y in every)
+    assert two.tolerance == pytest.approx(one.tolerance, rel=1e-9)
+
+
 def test_numbers_on_the_axes_are_plain(line):
     axes = shown(line, [*CLEAR, candidate("grid", 100, 700, 0.01)]).ax_
     written = [text.get_text() for text in axes.get_xticklabels()]
