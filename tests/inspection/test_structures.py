@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis import ANFISRegressor
 from skanfis.inspection import StructureDisplay
 
 from ..quick import quick
