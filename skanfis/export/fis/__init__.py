@@ -76,8 +76,8 @@ def export_fis(estimator: Any, path: str | PathLike[str] | None = None) -> str:
     Warns
     -----
     UserWarning
-        If there are places in the box of the training data at which no rule of the file fires, or
-        outputs are beyond their limits.
+        If no rule of the file fires at some of 1,000 points in the box of the training data, or
+        outputs are beyond their limits there.
 
     Examples
     --------
@@ -219,7 +219,10 @@ def _warn_of_differences(model):
     Where all textbook strengths are zero, the nearest rule answers in skanfis, whose memberships
     have a floor; the file has no answer. Also, the format has no limits of outputs.
     """
-    X = np.random.default_rng(0).uniform(model.minimum, model.maximum, (_N_POINTS, model.n_inputs))
+    low, high = model.minimum, model.maximum
+    room = 0.1 * (high - low)  # some points lie on the edge, which terms may not reach
+    X = np.random.default_rng(0).uniform(low - room, high + room, (_N_POINTS, model.n_inputs))
+    X = np.clip(X, low, high)
     groups = model.antecedent.groups
     with np.errstate(over="ignore"):
         by_group = [group.family.value(X.T[group.inputs], group.theta) for group in groups]
