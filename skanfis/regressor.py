@@ -111,7 +111,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     alpha : "auto" or float, default="auto"
         Ridge penalty on the consequents of standardised inputs and target: on each rule's departure
         from the rules' common line, and on the slopes of that line. With a single rule it is
-        scikit-learn's ``Ridge``. "auto": found by the evidence [3]_.
+        scikit-learn's ``Ridge(n_samples * alpha)``. "auto": found by the evidence [3]_.
     max_iter : int, default=500
         Largest number of iterations (epochs). With 0 the premises stay as they start.
     early_stopping : bool or EarlyStopping, default=False
