@@ -154,7 +154,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         ``stiffness_`` movements of the premises.
     pulls_, slope_pulls_ : list of dict, dict
         For each component of the rules' departures: its "inputs", and "pull", its weight in
-        ``alpha_``. For each input: its slope's weight in ``slope_alpha_``. Empty if alpha is given.
+        ``alpha_``. For each input: its slope's weight in ``slope_alpha_``. Empty if alpha is given
+        or there is only one.
     structures_ : list of dict
         The structures compared, or the one given: "structure" in words, "kind", "rules", "n_mfs" of
         a grid, "reading_cost" (numerals in the rules' sentences), "expected_error" (RMS on new
