@@ -79,8 +79,7 @@ print("self-test:", "passed" if status == 0 else "failed")
 # -------------
 #
 # A small program reads rows and writes answers. The temperatures go 20 degrees beyond the data,
-# where both follow the tangent for a while and then hold. What single precision loses is far below
-# what the gyro can resolve.
+# where both follow the tangent. What single precision loses is far below what the gyro can resolve.
 
 main = """
 #include <stdio.h>
