@@ -164,8 +164,8 @@ axes.legend(loc="upper right")
 # ---------
 #
 # How far is the strongest rule alone from what all say together? Rules that have to agree more come
-# nearer, and leave more of the error. Here are the three of these that weigh most. What
-# may be believed of a rule: :doc:`/reading_rules`.
+# nearer, and leave more of the error. Here are the three of these that are the strongest on most
+# rows. What may be believed of a rule: :doc:`/reading_rules`.
 
 for name in ("ANFIS", "ANFIS, to be read"):
     apart = models[name].readability_.summary["strongest_alone"]
