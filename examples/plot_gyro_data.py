@@ -55,8 +55,9 @@ figure.legend(panels[0].lines[:2], ["chamber", "thermometer"], loc="outside lowe
 # ----------------------------
 #
 # A gyro that turns at 100 °/s while the chamber goes up and down. At one indicated temperature the
-# error is larger while it warms than while it cools: the coil is ahead of the thermometer. Add the
-# rate of the temperature times the lag of the thermometer, 180 s in this gyro, and the loop closes.
+# error is further from zero while it warms than while it cools: the coil is ahead of the
+# thermometer. Add the rate of the temperature times the lag of the thermometer, 180 s in this gyro,
+# and the loop closes.
 
 ramps = make_ofog(
     n_devices=1,
