@@ -22,8 +22,8 @@ from skanfis.intervals import ConformalRegressor
 # Rows are missing between 4 and 5.5, and noise grows to the right. The deviation widens where there
 # are no rows, and grows beyond the range of the data, where the prediction follows its tangent. It
 # takes the noise for the same everywhere: on the left, and at 8, the band is not what the rows
-# show. The interval is the band made as wide as rows held out ask for: nine in ten of *all* rows are
-# in it.
+# show. The interval is the band made as wide as rows held out ask for: nine in ten of *all* rows
+# are in it.
 
 rng = np.random.default_rng(3)
 

@@ -98,7 +98,8 @@ panel.axvline(1 + held_out.argmin(), color="grey", linestyle=":")
 # Outliers
 # --------
 #
-# A tenth of the targets are off by 1 to 4; the others have a range of 2. Least squares follows them; Huber's loss gives them the weight that is left in ``robust_weights_``.
+# A tenth of the targets are off by 1 to 4; the truth has a range of 2. Least squares follows them;
+# Huber's loss gives them the weight that is left in ``robust_weights_``.
 
 x = np.sort(rng.uniform(0.0, 10.0, (300, 1)), axis=0)
 truth = np.sin(x[:, 0])
