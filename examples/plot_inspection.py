@@ -4,7 +4,7 @@ Reading a model
 
 What has the model learnt, from how much data, and why does it say what it says here? This page asks
 a model of a gyro's error, behind a scaler as models usually are: rules, tables, explanations and
-pictures all speak of seconds and degrees. :doc:`/inspection` has the reference.
+pictures all speak of °C and °/s. :doc:`/inspection` has the reference.
 """
 
 import matplotlib.pyplot as plt
@@ -34,7 +34,7 @@ from skanfis.learning import VariableProjection
 # "low" and "high" mean what they say.
 
 data = make_ofog(n_devices=1, n_runs=12, random_state=0)
-X, error = data[["temperature", "rate"]], data["error"]
+X, error = data[["temperature", "output"]], data["error"]  # output: the indicated rate
 model = make_pipeline(
     StandardScaler(), ANFISRegressor(n_mfs=[2, 4], solver=VariableProjection(stiffness=3e-3))
 )
@@ -91,7 +91,7 @@ MembershipDisplay.from_estimator(model, X)
 warming = make_pipeline(
     StandardScaler(), ANFISRegressor(n_mfs=[5, 5, 1], solver=VariableProjection(stiffness=0.1))
 )
-warming.fit(data[["temperature", "temperature_rate", "rate"]], error)
+warming.fit(data[["temperature", "temperature_rate", "output"]], error)
 rules_table(warming)["data"].plot.bar(subplots=True, legend=False, figsize=(5.6, 4.2))
 
 # %%
@@ -118,10 +118,10 @@ ResponseSurfaceDisplay.from_estimator(model, X.iloc[::5])
 # Along one input, the other held: how the rules hand over to each other. Contributions add up to
 # the prediction.
 
-rates = np.linspace(X["rate"].min(), X["rate"].max(), 201)
-told = explain(model, pd.DataFrame({"temperature": 40.0, "rate": rates}))
+rates = np.linspace(X["output"].min(), X["output"].max(), 201)
+told = explain(model, pd.DataFrame({"temperature": 40.0, "output": rates}))
 parts = told.pivot(index="row", columns="rule", values="contribution").set_index(rates)
-axes = parts.plot(xlabel="rate [°/s]", ylabel="contribution [°/s]")
+axes = parts.plot(xlabel="output [°/s]", ylabel="contribution [°/s]")
 axes.legend(loc="lower left", ncols=2, title="rule")
 
 # %%
