@@ -468,8 +468,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         strengths : ndarray of shape (n_samples, n_rules)
-            Positive, with sum one in every row. Rows outside the training range are taken at its
-            edge.
+            Zero or positive, with sum one in every row. Rows outside the training range are taken
+            at its edge.
         """
         return self._fitted_model().strengths(self._check_inputs(X))
 
