@@ -133,8 +133,6 @@ def tune(
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
         first_steps, turns, steps = min(first_steps, FEW_TURNS), min(turns, FEW_TURNS), 1
-    elif premise.size == 0 and turns > 0:
-        first_steps = ARRIVING
     start = _improved(Tuned.start(problem, premise, free), first_steps)
     if premise.size == 0 or turns == 0:
         return start

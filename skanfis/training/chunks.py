@@ -25,7 +25,7 @@ from ..learning.premise import Premise
 from ..model import TSKModel
 from ..policies import TargetRange
 from ..search import Start
-from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
+from ..search.tuning import FIRST_PENALTY, scaled, tune
 from .chunk_checks import check_distance
 from .data import Fitted
 from .pruning import redundant_rules
@@ -245,7 +245,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     if free:
         # Rules that stay may compensate one another: least weights would keep them from it.
         premise = replace(Premise.still(antecedent), is_unbounded=True)
-        tuned = tune(problem, premise, free, turns=0, first_steps=ARRIVING)
+        tuned = tune(problem, premise, free, turns=0)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
     overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight
