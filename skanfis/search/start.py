@@ -13,7 +13,6 @@ from ..learning.data import StandardisedData
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
-from ..learning.sampling import SAMPLE_ROWS
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
@@ -77,7 +76,7 @@ def started(tuned: Tuned, rows: StandardisedData, plan: Plan, room: float, candi
 def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simplicity) -> Start:
     """A start from given rules, with the free weights found on a sample of the rows."""
     free, inputs = plan.free, plan.consequent_inputs
-    every = search_sample(rows, SAMPLE_ROWS)
+    every = search_sample(rows)
     sample = search_sample(every, FEWEST_SEEN)
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     # Rules whose terms stay may compensate one another: least weights would keep them from it.
