@@ -119,9 +119,6 @@ class DaskANFISRegressor(ANFISRegressor):
                 "give X.compute()."
             )
         data = ClusterData.of(Partitions.of(X, y, sample_weight, groups))
-        constraints = Constraints.read(
-            self.monotonic_cst, self.constraints, data.input_names, len(data.output_names)
-        )
         if not is_many(data.rows()):
             here = computed(X, y, sample_weight, groups)
             return super()._check_training_data(*here)
@@ -138,6 +135,9 @@ class DaskANFISRegressor(ANFISRegressor):
                 )
         self._check_columns(X, reset=True)
         self._single_output = y.ndim == 1
+        constraints = Constraints.read(
+            self.monotonic_cst, self.constraints, data.input_names, len(data.output_names)
+        )
         return replace(data, constraints=constraints)
 
     def _readability(self, data):
