@@ -14,7 +14,6 @@ from . import oracles
 def brute_force(rows, antecedent, n_coefficients):
     """Share, centre, covariance and radius of every rule; one rule and one row at a time."""
     Z = (rows.X - rows.inputs.offset) / rows.inputs.scale
-    weight = np.ones(len(Z)) if rows.sample_weight is None else rows.sample_weight
     strengths = antecedent.strengths(np.ascontiguousarray(Z.T))
     strongest = strengths.argmax(axis=0)
     found = []
@@ -23,7 +22,7 @@ def brute_force(rows, antecedent, n_coefficients):
         if not own:
             found.append(None)
             continue
-        part = strengths[r] * weight
+        part = strengths[r] * rows.weights
         center = np.average(Z, axis=0, weights=part)
         covariance = np.cov(Z.T, aweights=part, ddof=0).reshape(Z.shape[1], -1)
         precision = np.linalg.inv(covariance + 0.01 * np.eye(Z.shape[1]))

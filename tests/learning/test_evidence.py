@@ -247,7 +247,7 @@ class OneWidth:
         X = g.uniform(-1.0, 1.0, (n_rows, 1))
         y = np.sin(3.0 * X) + 0.4 * X**2 + noise * g.normal(size=X.shape)
         self.rows = StandardisedData.of(X, y)
-        low, high = oracles.box(self.rows)
+        low, high = self.rows.inputs.box
         self.antecedent = oracles.even_grid([Gaussian], [3], low, high, 0.6)
         self.premise = Premise.of(self.antecedent, low, high)
         self.unit = np.zeros(self.premise.size)

@@ -156,7 +156,7 @@ class TestOnKnownProblems:
 
 
 def start_of(kind, rows):
-    low, high = oracles.box(rows)
+    low, high = rows.inputs.box
     if kind == "scattered":
         centers = np.array([[-1.0, -1.0], [1.0, -0.8], [0.0, 1.0]])
         theta = Gaussian.from_center_and_width(centers, np.ones_like(centers))
@@ -177,7 +177,7 @@ def planted(kind, seed, displaced=0.15, noise=0.0, n_outputs=1):
     rows = StandardisedData.of(X, X[:, :1])
     antecedent = start_of(kind, rows)
     # A truth that is displaced at random lies in the box of free terms, whatever the start.
-    premise = Premise.of(antecedent, *oracles.box(rows), is_unbounded=True)
+    premise = Premise.of(antecedent, *rows.inputs.box, is_unbounded=True)
     truth = premise.parameters(displaced * g.uniform(-1.0, 1.0, premise.size))
     Z = rows.inputs.apply(rows.X.T)
     phi = oracles.dense_design(antecedent, truth, Z, 1)
@@ -217,7 +217,7 @@ class TestStatus:
     def test_gradient_vanishes_where_the_target_is_constant(self, rng):
         X = rng.normal(size=(50, 2))
         rows = StandardisedData.of(X, np.full((50, 1), 3.0))
-        premise = Premise.of(start_of("grid", rows), *oracles.box(rows))
+        premise = Premise.of(start_of("grid", rows), *rows.inputs.box)
         _, result = solve(rows, premise)
         assert (result.status, result.n_iter) == ("gradient", 0)
         assert result.converged
