@@ -74,7 +74,7 @@ class DaskANFISRegressor(ANFISRegressor):
         explained = np.where(target.is_constant, 0.0, 1.0 - error / (weight * target.scale**2))
         return float(np.mean(np.where(error == 0.0, 1.0, explained)))
 
-    def _local(self, has_names=True):
+    def _local(self, has_names):
         """The model alone, to send to the workers; without ``has_names`` it expects no names."""
         local = ANFISRegressor(out_of_bounds=self.out_of_bounds)
         for name in ("model_", "n_features_in_", "feature_names_in_", "_single_output"):
