@@ -66,21 +66,20 @@ SETTINGS = [
 ]
 
 
-class TestOracle:
-    @pytest.mark.theory
-    @pytest.mark.parametrize("setting", SETTINGS)
-    @pytest.mark.parametrize("seed", range(2))
-    def test_centers_and_potentials_are_those_of_the_paper(self, setting, seed):
-        rng = np.random.default_rng(seed)
-        X, weight = cloud(rng), rng.uniform(0.2, 3.0, 150)
-        for w in (None, weight):
-            centers, peaks = chiu(X, **setting, weight=w)
-            found = SubtractiveClustering(**setting).fit(X, sample_weight=w)
-            assert_array_equal(found.cluster_centers_, X[centers])
-            assert_allclose(found.potentials_, peaks, rtol=1e-9)
-            # exp(-4 |x|^2 / radius^2) is a Gaussian of this deviation.
-            width = setting.get("radius", 0.5) * np.ptp(X, axis=0) / np.sqrt(8.0)
-            assert_allclose(found.widths_, width, rtol=1e-14)
+@pytest.mark.theory
+@pytest.mark.parametrize("setting", SETTINGS)
+@pytest.mark.parametrize("seed", range(2))
+def test_centers_and_potentials_are_those_of_the_paper(setting, seed):
+    rng = np.random.default_rng(seed)
+    X, weight = cloud(rng), rng.uniform(0.2, 3.0, 150)
+    for w in (None, weight):
+        centers, peaks = chiu(X, **setting, weight=w)
+        found = SubtractiveClustering(**setting).fit(X, sample_weight=w)
+        assert_array_equal(found.cluster_centers_, X[centers])
+        assert_allclose(found.potentials_, peaks, rtol=1e-9)
+        # exp(-4 |x|^2 / radius^2) is a Gaussian of this deviation.
+        width = setting.get("radius", 0.5) * np.ptp(X, axis=0) / np.sqrt(8.0)
+        assert_allclose(found.widths_, width, rtol=1e-14)
 
 
 class TestInvariance:

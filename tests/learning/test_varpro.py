@@ -200,15 +200,14 @@ def solve(rows, premise, alpha=1e-8, **settings):
     return problem, varpro(problem, premise, **({"max_iter": 200, "tol": 1e-6} | settings))
 
 
-class TestOnRuleBases:
-    @pytest.mark.theory
-    @pytest.mark.parametrize("seed", range(4))
-    @pytest.mark.parametrize("kind", ["one input", "grid", "bells", "two families", "scattered"])
-    def test_planted_model_is_recovered(self, kind, seed):
-        rows, premise, truth, beta = planted(kind, seed)
-        _, result = solve(rows, premise, alpha=1e-14, max_iter=500)
-        assert result.loss_curve[0] > 1e-6
-        assert_is_as_planted(rows, premise, truth, beta, result.evaluation)
+@pytest.mark.theory
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["one input", "grid", "bells", "two families", "scattered"])
+def test_planted_model_is_recovered(kind, seed):
+    rows, premise, truth, beta = planted(kind, seed)
+    _, result = solve(rows, premise, alpha=1e-14, max_iter=500)
+    assert result.loss_curve[0] > 1e-6
+    assert_is_as_planted(rows, premise, truth, beta, result.evaluation)
 
 
 class TestStatus:
