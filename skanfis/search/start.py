@@ -118,22 +118,6 @@ def described(tuned: Tuned, structure, squared_error, variance, is_chosen=True):
     }
 
 
-def check_inputs(model: TSKModel, names, what):
-    """Raise ValueError where a model has other inputs than the data; default names match any."""
-    if model.n_inputs != len(names):
-        raise ValueError(
-            f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
-            f"are {', '.join(names)}: give X the inputs of the rules."
-        )
-    own, given = tuple(model.input_names), tuple(names)
-    if own != given and tuple(f"x{j}" for j in range(len(names))) not in (own, given):
-        raise ValueError(
-            f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
-            f"are {', '.join(names)}: give X the inputs of the rules, with the same names and in "
-            "the same order."
-        )
-
-
 def imported_antecedent(model: TSKModel, rows: StandardisedData) -> Antecedent:
     """The rule base of a model in the rows' standardised units, ready for training."""
     scale = rows.inputs
