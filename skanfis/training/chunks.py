@@ -146,18 +146,12 @@ def joined_scales(one: Scale, other: Scale, weight: float, other_weight: float) 
         # Start from the heavier side: adding a small change to it costs no digits.
         one, other, weight, other_weight = other, one, other_weight, weight
     share = other_weight / (weight + other_weight)
-    is_constant = never_changes(low, high)
     # Relative to the range, squares neither overflow nor vanish.
-    span = np.where(is_constant, 1.0, high - low)
+    span = np.where(never_changes(low, high), 1.0, high - low)
     step = (other.offset - one.offset) / span
     square = (1.0 - share) * _variance(one, span) + share * _variance(other, span)
-    scale = span * np.sqrt(square + share * (1.0 - share) * step**2)
-    return Scale(
-        np.where(is_constant, low, one.offset + share * span * step),
-        np.where(is_constant | (scale == 0.0), 1.0, scale),
-        low,
-        high,
-    )
+    deviation = span * np.sqrt(square + share * (1.0 - share) * step**2)
+    return Scale.of(one.offset + share * span * step, deviation, low, high)
 
 
 def _variance(scale, span):
