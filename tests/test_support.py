@@ -36,9 +36,9 @@ def brute_force(rows, antecedent, n_coefficients):
     return found
 
 
-def table(rng, n_rows=400):
+def table(rng):
     """Clustered, repeated and correlated rows in the units of no one."""
-    X = rng.normal(size=(n_rows, 3)) @ [[1.0, 0.9, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 1.0]]
+    X = rng.normal(size=(400, 3)) @ [[1.0, 0.9, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 1.0]]
     X[::7] = X[0]
     X[1::9] = np.round(X[1::9])
     return X * [1e3, 1e-4, 1.0] + [1e6, 0.0, -3.0]

@@ -87,12 +87,12 @@ def in_raw_units(X, y):
     return StandardisedData(X, y[:, None], None, unit_scale(X), unit_scale(y[:, None]))
 
 
-def two_bells(rows, alpha=0.0):
+def two_bells(rows):
     """The problem and the premise of Jang's examples; neighbours cross at one half."""
     low, high = rows.inputs.box
     n_inputs = low.size
     antecedent = oracles.even_grid([Bell] * n_inputs, [2] * n_inputs, low, high, 0.5)
-    problem = SeparableProblem(rows, antecedent, Penalty(alpha=alpha, slope=alpha))
+    problem = SeparableProblem(rows, antecedent, Penalty())
     return problem, Premise.of(antecedent, low, high, is_unbounded=True)
 
 
