@@ -107,7 +107,7 @@ def _check_kind(table, what, takes_categories):
     dtypes = list(table.dtypes) if is_frame else [getattr(table, "dtype", None)]
     if is_frame and not names:
         raise ValueError(f"{what} has no columns: give a table with at least one.")
-    is_sparse_frame = is_frame and dtypes and all(hasattr(one, "fill_value") for one in dtypes)
+    is_sparse_frame = is_frame and all(hasattr(one, "fill_value") for one in dtypes)
     if issparse(table) or is_sparse_frame:
         dense = f"{what}.sparse.to_dense()" if is_frame else f"{what}.toarray()"
         raise TypeError(
@@ -122,7 +122,7 @@ def _check_kind(table, what, takes_categories):
             f"{masked.size} rows, first at row {masked.argmax()}: drop these rows"
             + (", or impute X.filled(numpy.nan) in a Pipeline." if what == "X" else ".")
         )
-    name, count = Counter(names).most_common(1)[0] if names else ("", 0)
+    name, count = Counter(names).most_common(1)[0]
     if count > 1:
         raise ValueError(
             f"{what} has {count} columns of the name {name!r}: rename or drop all but one."

@@ -58,8 +58,7 @@ def in_user_units(coefficients, inputs, targets, slopes, order, common=(), masse
     Slopes that are ``common``, as in ``Penalty``, become equal to the last bit: their mean by the
     rules' ``masses``.
     """
-    n_basis = 1 + slopes.size if order == 1 else 1
-    solved = coefficients.reshape(-1, n_basis, targets.scale.size).copy()
+    solved = coefficients.reshape(-1, 1 + slopes.size, targets.scale.size).copy()
     for j, rules in common:
         own = list(rules), 1 + int(np.flatnonzero(slopes == j)[0])
         solved[own] = np.average(solved[own], axis=0, weights=masses[own[0]])

@@ -25,7 +25,7 @@ import numpy as np
 
 from ._validation import rows_by_name
 from .antecedent import Antecedent, RuleTableAntecedent, by_group, strongest_rules
-from .blocks import BLOCK_BYTES, FEWEST_ROWS
+from .blocks import BLOCK_BYTES, FEWEST_ROWS, row_blocks
 from .consequent import outputs_of_rules, rule_outputs
 from .digits import counted
 from .naming import default_output_names, default_term_names, listed
@@ -388,9 +388,8 @@ class TSKModel:
         if 0 < n_rows <= step:
             return of_block(np.array(X.T, dtype=float, order="C")).T
         result = np.empty((n_rows, n_columns))
-        for start in range(0, n_rows, step):
-            Z = np.array(X[start : start + step].T, dtype=float, order="C")
-            result[start : start + step] = of_block(Z).T
+        for part in row_blocks(n_rows, step):
+            result[part] = of_block(np.array(X[part].T, dtype=float, order="C")).T
         return result
 
     @property

@@ -20,9 +20,10 @@ MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 # Rows further off, in standard deviations, count as this far, so that nothing overflows.
 FARTHEST_ROW = 1e100
 # How far a prediction may leave the range of the target. A single line: by as many standard
-# deviations as the tangent is followed for, and at least so many. Several rules, which may peak
-# between rows: by this part of the range, or by so much of it for each of those deviations.
-_LEAST_MARGIN, _PART_OF_RANGE, _PER_DEVIATION = 0.5, 0.25, 0.05
+# deviations as the tangent is followed for, and at least as many as if the noise were not known.
+# Several rules, which may peak between rows: by this part of the range, or by so much of it for
+# each of those deviations.
+_PART_OF_RANGE, _PER_DEVIATION = 0.25, 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +64,7 @@ class TargetRange:
             # No deviation is more than half of the range: that of a constant, stored as one, is
             # zero.
             spread = np.minimum(self.spread, 0.5 * width)
-            margin = max(max_extrapolation, _LEAST_MARGIN) * spread
+            margin = max(max_extrapolation, MAX_EXTRAPOLATION) * spread
         else:
             margin = max(_PART_OF_RANGE, _PER_DEVIATION * max_extrapolation) * width
         low, high = self.minimum - margin, self.maximum + margin

@@ -6,7 +6,7 @@ from .antecedent import Antecedent
 UNSAID = 0.01
 
 
-def reading_cost(antecedent: Antecedent, n_slopes: int, n_outputs: int = 1) -> int:
+def reading_cost(antecedent: Antecedent, n_slopes: int, n_outputs: int) -> int:
     """Numerals that a person reads in the rules' sentences.
 
     One is counted for each term in a rule, unless other terms of the rule imply it; and, for every

@@ -219,8 +219,7 @@ class DenseProblem:
         self.inputs = consequent_inputs
         self.Z = ((rows.X - rows.inputs.offset) / rows.inputs.scale).T
         self.y = (rows.y - rows.targets.offset) / rows.targets.scale
-        weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
-        self.weight = weight / weight.sum()
+        self.weight = rows.weights / rows.weights.sum()
         slopes = self.Z[: len(self.Z) * order]
         slopes = slopes if consequent_inputs is None else slopes[consequent_inputs]
         self.basis = np.vstack([np.ones((1, self.y.shape[0])), slopes])
@@ -341,12 +340,6 @@ def bumpy_rows(rng, n_rows=300, n_inputs=2, n_outputs=1, weighted=False):
     bumps = np.sin(np.outer(z[:, 0], 1.5 + np.arange(n_outputs))) * np.cos(z[:, [-1]])
     y = bumps + 0.3 * z.sum(axis=1, keepdims=True) + 0.1 * rng.normal(size=(n_rows, n_outputs))
     return StandardisedData.of(X, y, rng.uniform(0.2, 3.0, n_rows) if weighted else None)
-
-
-def box(rows):
-    """Standardised minimum and maximum of the inputs."""
-    edges = np.stack([rows.inputs.minimum, rows.inputs.maximum])
-    return (edges - rows.inputs.offset) / rows.inputs.scale
 
 
 def even_grid(families, counts, low, high, overlap):

@@ -28,14 +28,14 @@ from .quick import of_given_stiffness
 TOLERANCE = 1e-6
 
 
-def gyro(n_rows=120):
+def gyro():
     """Seconds, degrees Celsius and degrees per second: a warm-up, a curve and a saturation."""
     rng = np.random.default_rng(0)
-    X = rng.uniform([0.0, -40.0, -300.0], [1800.0, 85.0, 300.0], (n_rows, 3))
+    X = rng.uniform([0.0, -40.0, -300.0], [1800.0, 85.0, 300.0], (120, 3))
     time, temperature, rate = X.T
     y = 0.02 * np.exp(-time / 400.0) + 3e-4 * (temperature - 25.0)
     y += 2e-6 * (temperature - 25.0) ** 2
-    y += 1e-4 * np.tanh(rate / 100.0) * (1.0 + temperature / 100.0) + 1e-4 * rng.normal(size=n_rows)
+    y += 1e-4 * np.tanh(rate / 100.0) * (1.0 + temperature / 100.0) + 1e-4 * rng.normal(size=120)
     return X, y
 
 
@@ -94,8 +94,8 @@ class Case:
     def fit(self, X, y, sample_weight=None, **settings):
         return ANFISRegressor(**(self.settings | settings)).fit(X, y, sample_weight)
 
-    def assert_same(self, predictions, tolerance=TOLERANCE):
-        assert_allclose(predictions, self.predictions, rtol=0, atol=tolerance * self.span)
+    def assert_same(self, predictions):
+        assert_allclose(predictions, self.predictions, rtol=0, atol=TOLERANCE * self.span)
 
 
 named_case = lru_cache(maxsize=None)(lambda name: Case(*CASES[name]))

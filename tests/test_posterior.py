@@ -129,10 +129,10 @@ def test_deviation_is_that_of_the_dense_posterior(kind, is_learnt, monkeypatch, 
     assert_allclose(found / posterior.noise[0], expected / noise, rtol=1e-8)
 
 
-def wave(rng, n_rows, noise=0.1):
+def wave(rng, n_rows):
     X = rng.uniform(-1, 1, size=(n_rows, 2)) * [3.0, 500.0] + [20.0, 0.0]
     u, v = (X[:, 0] - 20.0) / 3.0, X[:, 1] / 500.0
-    return X, np.sin(2 * u) + u * v + noise * rng.normal(size=n_rows)
+    return X, np.sin(2 * u) + u * v + 0.1 * rng.normal(size=n_rows)
 
 
 def test_noise_is_that_of_each_output_and_survives_a_file(rng):

@@ -32,10 +32,10 @@ SETTINGS = {
 }
 
 
-def data(n_rows=40):
+def data():
     g = np.random.default_rng(11)
-    X = g.normal(size=(n_rows, 3)) * [1.0, 100.0, 1e-3]
-    return X, np.sin(X[:, 0]) + 1e-2 * X[:, 1] * X[:, 0] + 0.1 * g.normal(size=n_rows)
+    X = g.normal(size=(40, 3)) * [1.0, 100.0, 1e-3]
+    return X, np.sin(X[:, 0]) + 1e-2 * X[:, 1] * X[:, 0] + 0.1 * g.normal(size=40)
 
 
 def digest(name):

@@ -14,7 +14,6 @@ from . import oracles
 def brute_force(rows, antecedent, n_coefficients):
     """Share, centre, covariance and radius of every rule; one rule and one row at a time."""
     Z = (rows.X - rows.inputs.offset) / rows.inputs.scale
-    weight = np.ones(len(Z)) if rows.sample_weight is None else rows.sample_weight
     strengths = antecedent.strengths(np.ascontiguousarray(Z.T))
     strongest = strengths.argmax(axis=0)
     found = []
@@ -23,7 +22,7 @@ def brute_force(rows, antecedent, n_coefficients):
         if not own:
             found.append(None)
             continue
-        part = strengths[r] * weight
+        part = strengths[r] * rows.weights
         center = np.average(Z, axis=0, weights=part)
         covariance = np.cov(Z.T, aweights=part, ddof=0).reshape(Z.shape[1], -1)
         precision = np.linalg.inv(covariance + 0.01 * np.eye(Z.shape[1]))
@@ -37,9 +36,9 @@ def brute_force(rows, antecedent, n_coefficients):
     return found
 
 
-def table(rng, n_rows=400):
+def table(rng):
     """Clustered, repeated and correlated rows in the units of no one."""
-    X = rng.normal(size=(n_rows, 3)) @ [[1.0, 0.9, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 1.0]]
+    X = rng.normal(size=(400, 3)) @ [[1.0, 0.9, 0.0], [0.0, 0.3, 0.0], [0.0, 0.0, 1.0]]
     X[::7] = X[0]
     X[1::9] = np.round(X[1::9])
     return X * [1e3, 1e-4, 1.0] + [1e6, 0.0, -3.0]

@@ -155,7 +155,8 @@ class Constraints:
                 way, free = self.points - point, signs == 0
                 is_above = (way[:, free] == 0.0).all(axis=1) & (way * signs >= 0.0).all(axis=1)
                 is_above &= self.values[:, k] < value[k]
-                for other in np.flatnonzero(is_above):
+                if is_above.any():
+                    other = is_above.argmax()
                     raise ValueError(
                         f"constraints contradicts itself or monotonic_cst: output {k} is "
                         f"fixed to {value[k]:g} at {point}, so it must be at least that at "

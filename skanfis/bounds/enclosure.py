@@ -98,8 +98,8 @@ class Enclosure:
         """Values, or bounds, held within the limits of the output."""
         return np.clip(values, self.lowest, self.highest)
 
-    def evaluate(self, j=None):
-        """The function for ``search.largest``: that of the slope by input j, or of values."""
+    def evaluate(self, j):
+        """The function for ``search.largest``: of the slope by input j; of values if j is None."""
         return self.values if j is None else partial(self.slope, j=j)
 
     def values(self, low, high):

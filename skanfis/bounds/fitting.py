@@ -13,7 +13,7 @@ import numpy as np
 from .._validation import warn_user
 from ..antecedent import TreeAntecedent
 from ..consequent import NormalFactor
-from ..digits import percent
+from ..digits import counted, percent
 from ..exceptions import ConstraintWarning, InfeasibleConstraintsError
 from ..model import TSKModel
 from ..policies import SILENT
@@ -107,11 +107,11 @@ def _in_order(found: Consequents):
 
 def _refusal(found):
     n_points, n_rules = len(found.constraints.points), found.problem.antecedent.n_rules
-    rules = "1 rule" if n_rules == 1 else f"{n_rules} rules"
-    points = "the 1 fixed point" if n_points == 1 else f"the {n_points} fixed points"
+    points = f"the {counted(n_points, 'fixed point')}" if n_points else ""
     names = " and ".join(one.name for one in found.inequalities)
-    kept = " together with ".join(filter(None, [names, points if n_points else ""]))
+    kept = " together with ".join(filter(None, [names, points]))
     more = "more rules" if found.columns.order else "order=1 or more rules"
+    rules = counted(n_rules, "rule")
     return f"No consequents of {rules} keep {kept}. Drop a constraint, or use {more}."
 
 

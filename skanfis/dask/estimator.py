@@ -74,7 +74,7 @@ class DaskANFISRegressor(ANFISRegressor):
         explained = np.where(target.is_constant, 0.0, 1.0 - error / (weight * target.scale**2))
         return float(np.mean(np.where(error == 0.0, 1.0, explained)))
 
-    def _local(self, has_names=True):
+    def _local(self, has_names):
         """The model alone, to send to the workers; without ``has_names`` it expects no names."""
         local = ANFISRegressor(out_of_bounds=self.out_of_bounds)
         for name in ("model_", "n_features_in_", "feature_names_in_", "_single_output"):
@@ -119,9 +119,6 @@ class DaskANFISRegressor(ANFISRegressor):
                 "give X.compute()."
             )
         data = ClusterData.of(Partitions.of(X, y, sample_weight, groups))
-        constraints = Constraints.read(
-            self.monotonic_cst, self.constraints, data.input_names, len(data.output_names)
-        )
         if not is_many(data.rows()):
             here = computed(X, y, sample_weight, groups)
             return super()._check_training_data(*here)
@@ -138,6 +135,9 @@ class DaskANFISRegressor(ANFISRegressor):
                 )
         self._check_columns(X, reset=True)
         self._single_output = y.ndim == 1
+        constraints = Constraints.read(
+            self.monotonic_cst, self.constraints, data.input_names, len(data.output_names)
+        )
         return replace(data, constraints=constraints)
 
     def _readability(self, data):

@@ -30,12 +30,11 @@ from .._validation import (
 )
 from ..exceptions import OutOfBoundsWarning
 from ..export.folding import final_step
+from ..learning.objective import SMALLEST_FREEDOM
 from ..naming import target_names
 
 # Least deviation, relative to the target's range: that of an exact fit is zero.
 _LEAST_DEVIATION = 1e-12
-# Least 1 - leverage: for a row that the model fits exactly it is zero.
-_SMALLEST_FREEDOM = 1e-6
 # Rounding error of a sum of masses.
 ROUNDING = 1e-9
 
@@ -212,7 +211,7 @@ def leave_one_out_scores(estimator, data, weight, least):
     if weight is not None:
         # How many rows a row of this weight counts as in the fit.
         own = weight[:, None] * max(1.0, weight.sum() / np.sum(weight**2))
-    freedom = np.clip(1.0 - own * leverage, _SMALLEST_FREEDOM, 1.0)
+    freedom = np.clip(1.0 - own * leverage, SMALLEST_FREEDOM, 1.0)
     residual = np.abs(data.targets.reshape(centers.shape) - centers) / freedom
     # The leverage of the row in the model without it is h / (1 - w h).
     return residual if least is None else residual / (np.sqrt(1.0 + leverage / freedom) * noise)

@@ -53,6 +53,14 @@ class Scale:
     minimum: np.ndarray
     maximum: np.ndarray
 
+    @classmethod
+    def of(cls, mean, deviation, minimum, maximum):
+        """From these numbers of columns; a constant column has its own value, and scale one."""
+        constant = never_changes(minimum, maximum)
+        offset = np.where(constant, minimum, mean)
+        scale = np.where(constant | (deviation == 0.0), 1.0, deviation)
+        return cls(offset, scale, minimum, maximum)
+
     @cached_property
     def is_constant(self):
         """Which columns never change, but for rounding errors."""
@@ -79,7 +87,7 @@ def column_statistics(values, sample_weight=None):
     """The :class:`Scale` of every column of ``values`` (n_rows, n_columns), in two passes.
 
     The first sums differences from the first row, the second those from the mean, so that columns
-    far from the origin lose no digits. A constant column has scale one.
+    far from the origin lose no digits.
     """
     weight = np.ones(len(values)) if sample_weight is None else sample_weight
     minimum, maximum = np.full((2, values.shape[1]), [[np.inf], [-np.inf]])
@@ -92,19 +100,12 @@ def column_statistics(values, sample_weight=None):
         total += float(weight[part].sum())
         first += (block - origin) @ weight[part]
     mean = origin + (first / total)[:, None]
-    constant = never_changes(minimum, maximum)
     # Relative to the range: else squares of tiny deviations would vanish unseen.
-    span = np.where(constant, 1.0, maximum - minimum)
+    span = np.where(never_changes(minimum, maximum), 1.0, maximum - minimum)
     for part in row_blocks(values.shape[0], BLOCK_ROWS):
         deviations = (_columns(values, part) - mean) / span[:, None]
         second += deviations**2 @ weight[part]
-    scale = span * np.sqrt(second / total)
-    return Scale(
-        np.where(constant, minimum, mean[:, 0]),
-        np.where(constant | (scale == 0.0), 1.0, scale),
-        minimum,
-        maximum,
-    )
+    return Scale.of(mean[:, 0], span * np.sqrt(second / total), minimum, maximum)
 
 
 def never_changes(minimum, maximum):

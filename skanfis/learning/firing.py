@@ -33,7 +33,7 @@ class RuleFiring:
         (overlap, products, strongest), peak, distinct = rows.reduce(
             partial(_sums, antecedent=antecedent, enough=enough), partial(_added, enough=enough)
         )
-        second = products[:, pair_index(int(np.sqrt(2 * products.shape[1])))]
+        second = products[:, pair_index(1 + rows.inputs.scale.size)]
         return cls(overlap, second, strongest, peak, np.array([len(own) for own in distinct]))
 
 

@@ -36,7 +36,7 @@ from .passes import Design, FirstPass, JointPass, SecondPass
 from .penalty import CommonLine, Penalty, disagreement_matrix
 
 # Least 1 - h: for a row with a rule to itself it is a rounding error, and r / (1 - h) unbounded.
-_SMALLEST_FREEDOM = 1e-6
+SMALLEST_FREEDOM = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,7 +308,7 @@ class SeparableProblem:
         for _, strengths, basis_rows, residual, weight in self._fired(evaluation):
             half = root @ (strengths[:, None, :] * basis_rows).reshape(self.n_columns, -1)
             leverage = np.einsum("ij,ij->j", half, half)
-            residual /= np.maximum(1.0 - unit * (leverage / self._weight), _SMALLEST_FREEDOM)
+            residual /= np.maximum(1.0 - unit * (leverage / self._weight), SMALLEST_FREEDOM)
             total += weight @ np.sum(residual**2, axis=0)
         return float(total / self._weight)
 

@@ -34,7 +34,7 @@ GRADIENT_FACTOR = 1e-2
 TOLERANCE = 1e-3
 
 
-def trust_region_step(gradient, hessian, radius, damping=0.0):
+def trust_region_step(gradient, hessian, radius, damping):
     """Minimise g's + s'(H + damping I)s/2 over |s| <= radius, to 1 %, H not negative."""
     values, vectors = np.linalg.eigh(hessian)
     slope = vectors.T @ gradient

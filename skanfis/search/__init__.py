@@ -2,12 +2,11 @@
 
 from .request import StructureRequest, report_constant
 from .sample import representative_rows, weighted_quantile
-from .start import Start, check_inputs, imported_antecedent
+from .start import Start, imported_antecedent
 
 __all__ = [
     "Start",
     "StructureRequest",
-    "check_inputs",
     "imported_antecedent",
     "report_constant",
     "representative_rows",

@@ -108,7 +108,7 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
         return tree
     if not candidate.n_clusters:
         return grid_antecedent(families, candidate.counts, spacing, known=known)
-    n_known = 0 if known is None or known.n_rules == 1 else known.n_rules
+    n_known = 0 if known.n_rules == 1 else known.n_rules
     clusterer = KMeans(candidate.n_clusters - n_known, n_init=1, random_state=seed)
 
     def label(table, weight):

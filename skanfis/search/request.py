@@ -147,7 +147,7 @@ class StructureRequest(Plan):
 
     def _warn_if_underdetermined(self, n_rules, rows):
         """Warn where distinct rows are fewer than consequent parameters."""
-        n_basis = 1 + np.count_nonzero(~rows.inputs.is_constant[self.consequent_inputs])
+        n_basis = 1 + self.consequent_inputs.size
         n_columns = n_rules * n_basis
         n_distinct = np.unique(rows.numbers(lambda Z, _: fingerprint(Z))).size
         if n_distinct < n_columns:

@@ -81,7 +81,7 @@ def term_counts(n_mfs, names):
     """``n_mfs`` as one count per input, or ValueError or TypeError that says what it must be."""
     is_number = isinstance(n_mfs, Integral) and not isinstance(n_mfs, bool)
     given: Any = [n_mfs] * len(names) if is_number else n_mfs
-    if isinstance(given, str | bytes) or np.ndim(given) != 1:
+    if np.ndim(given) != 1:
         raise TypeError(
             f"n_mfs={n_mfs!r} must be 'auto', a whole number, or one whole number per input."
         )

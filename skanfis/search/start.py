@@ -13,7 +13,6 @@ from ..learning.data import StandardisedData
 from ..learning.objective import SeparableProblem
 from ..learning.penalty import Penalty
 from ..learning.premise import Premise
-from ..learning.sampling import SAMPLE_ROWS
 from ..learning.sparse_slopes import SLOPE_WORTHS
 from ..model import TSKModel
 from .choice import tolerated
@@ -77,7 +76,7 @@ def started(tuned: Tuned, rows: StandardisedData, plan: Plan, room: float, candi
 def tuned_start(antecedent: Antecedent, rows: StandardisedData, plan: Plan, simplicity) -> Start:
     """A start from given rules, with the free weights found on a sample of the rows."""
     free, inputs = plan.free, plan.consequent_inputs
-    every = search_sample(rows, SAMPLE_ROWS)
+    every = search_sample(rows)
     sample = search_sample(every, FEWEST_SEEN)
     problem = SeparableProblem(sample, antecedent, plan.first, consequent_inputs=inputs)
     # Rules whose terms stay may compensate one another: least weights would keep them from it.
@@ -117,22 +116,6 @@ def described(tuned: Tuned, structure, squared_error, variance, is_chosen=True):
         "rules_beat_mean": bool(squared_error + tuned.disagreement <= variance),
         "chosen": is_chosen,
     }
-
-
-def check_inputs(model: TSKModel, names, what):
-    """Raise ValueError where a model has other inputs than the data; default names match any."""
-    if model.n_inputs != len(names):
-        raise ValueError(
-            f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
-            f"are {', '.join(names)}: give X the inputs of the rules."
-        )
-    own, given = tuple(model.input_names), tuple(names)
-    if own != given and tuple(f"x{j}" for j in range(len(names))) not in (own, given):
-        raise ValueError(
-            f"{what} has rules on the inputs {', '.join(model.input_names)}, but the columns of X "
-            f"are {', '.join(names)}: give X the inputs of the rules, with the same names and in "
-            "the same order."
-        )
 
 
 def imported_antecedent(model: TSKModel, rows: StandardisedData) -> Antecedent:

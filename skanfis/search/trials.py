@@ -194,7 +194,7 @@ class Trials:
                 trained = self.tuned(replace(candidate, slope_worth=None))
                 found = with_sparse_slopes(trained, candidate.slope_worth)
             elif candidate.n_rules == 1:
-                found = self._train(self._problem(candidate), turns=0, first_steps=ARRIVING)
+                found = self._train(self._problem(candidate), turns=0)
             else:
                 # Terms of a grid serve many rules. More turns would fit them to runs that lie far
                 # from one another, and make the rules wild in between.
@@ -231,9 +231,10 @@ class Trials:
         inputs = self._inputs_with_slopes(candidate)
         return SeparableProblem(rows, antecedent, penalty, consequent_inputs=inputs)
 
-    def _train(self, problem, turns, first_steps=_STEPS_TO_PROMISE):
-        if turns and not self.plan.premises_move:
-            turns, first_steps = 0, ARRIVING
+    def _train(self, problem, turns):
+        turns = turns if self.plan.premises_move else 0
+        # If the premises stay, the weights take all of their steps at once.
+        first_steps = _STEPS_TO_PROMISE if turns else ARRIVING
         premise = Premise.of(problem.antecedent, *problem.rows.inputs.box)
         return tune(problem, premise, self.plan.free, turns, first_steps)
 

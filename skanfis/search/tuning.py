@@ -41,7 +41,8 @@ from ..reading_cost import reading_cost
 FIRST_PENALTY = Penalty(agreement=1e-2, alpha=1e-2, slope=1e-2, stiffness=1e-2)
 # Steps of the weights at given premises. Most weights settle within ten.
 ARRIVING = 50
-# Steps and turns beyond ``MANY_COLUMNS``; turns of grids (``trials``), and of raising agreement.
+# Steps and turns beyond ``MANY_COLUMNS``; turns of grids (``trials``), with more rows than before,
+# and of raising agreement.
 FEW_TURNS = 2
 # A turn: a few iterations of the premises, then steps of the weights. Neither converges while the
 # other moves; the training that follows does the rest.
@@ -133,8 +134,6 @@ def tune(
     steps = _STEPS
     if problem.n_columns > MANY_COLUMNS:
         first_steps, turns, steps = min(first_steps, FEW_TURNS), min(turns, FEW_TURNS), 1
-    elif premise.size == 0 and turns > 0:
-        first_steps = ARRIVING
     start = _improved(Tuned.start(problem, premise, free), first_steps)
     if premise.size == 0 or turns == 0:
         return start

@@ -25,7 +25,7 @@ from ..learning.premise import Premise
 from ..model import TSKModel
 from ..policies import TargetRange
 from ..search import Start
-from ..search.tuning import ARRIVING, FIRST_PENALTY, scaled, tune
+from ..search.tuning import FIRST_PENALTY, scaled, tune
 from .chunk_checks import check_distance
 from .data import Fitted
 from .pruning import redundant_rules
@@ -146,18 +146,12 @@ def joined_scales(one: Scale, other: Scale, weight: float, other_weight: float) 
         # Start from the heavier side: adding a small change to it costs no digits.
         one, other, weight, other_weight = other, one, other_weight, weight
     share = other_weight / (weight + other_weight)
-    is_constant = never_changes(low, high)
     # Relative to the range, squares neither overflow nor vanish.
-    span = np.where(is_constant, 1.0, high - low)
+    span = np.where(never_changes(low, high), 1.0, high - low)
     step = (other.offset - one.offset) / span
     square = (1.0 - share) * _variance(one, span) + share * _variance(other, span)
-    scale = span * np.sqrt(square + share * (1.0 - share) * step**2)
-    return Scale(
-        np.where(is_constant, low, one.offset + share * span * step),
-        np.where(is_constant | (scale == 0.0), 1.0, scale),
-        low,
-        high,
-    )
+    deviation = span * np.sqrt(square + share * (1.0 - share) * step**2)
+    return Scale.of(one.offset + share * span * step, deviation, low, high)
 
 
 def _variance(scale, span):
@@ -245,7 +239,7 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     if free:
         # Rules that stay may compensate one another: least weights would keep them from it.
         premise = replace(Premise.still(antecedent), is_unbounded=True)
-        tuned = tune(problem, premise, free, turns=0, first_steps=ARRIVING)
+        tuned = tune(problem, premise, free, turns=0)
         problem = problem.with_penalty(scaled(tuned.penalty, free, 1.0))
     evaluation = problem.evaluate(antecedent.parameters)
     overlap = sums.gram[:: sums.n_basis, :: sums.n_basis] / sums.weight

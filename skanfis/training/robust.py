@@ -19,6 +19,7 @@ import warnings
 from dataclasses import replace
 
 import numpy as np
+from scipy.special import ndtri
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
@@ -27,7 +28,7 @@ from ..learning.sampling import SAMPLE_ROWS, with_sample
 from ..search import weighted_quantile
 
 # The median of |u| for a standard normal u.
-_NORMAL_MEDIAN = 0.6744897501960817
+_NORMAL_MEDIAN = ndtri(0.75)
 # Robust standard deviations from the linear model that no sound target exceeds, however it bends.
 _FAR = 10.0
 # Steps and tolerance of the linear fit: so tight that the order of rows does not matter.

@@ -35,7 +35,7 @@ class RuleRows:
         """The sums over no rows."""
         extent, zeros = np.zeros((n_rules, n_slopes)), np.zeros(n_rules)
         second = np.zeros((n_rules, 1 + n_inputs, 1 + n_inputs))
-        return cls(second, zeros, zeros, extent, np.empty((0, 2)), second[:0, 0])
+        return cls(second, zeros, zeros, extent, np.empty((0, 2)), np.empty((0, 1 + n_inputs)))
 
     @classmethod
     def of(cls, X, basis_rows, strengths, weight, numbers, slope_inputs, centers):

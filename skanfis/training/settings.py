@@ -7,7 +7,7 @@ from .._validation import feature_indices, in_column_order
 from ..learning import SOLVERS, Solver
 from ..membership import Gaussian, membership_families
 from ..model import TSKModel
-from ..search import StructureRequest, check_inputs
+from ..search import StructureRequest
 
 
 def solver_of(estimator) -> Solver:
@@ -81,7 +81,7 @@ def _partition(estimator, names, sample_weight):
             "discards the fit (scikit-learn's searches clone estimators). Give the model_ of the "
             "fitted estimator instead."
         )
-    check_inputs(model, names, "partition")
+    _check_inputs(model, names)
     refused = {"premise_features": "has no effect on imported rules, which have their own inputs:"}
     if model.n_rules > (estimator.max_rules or model.n_rules):
         what = f"partition has {model.n_rules:,} rules"
@@ -97,3 +97,16 @@ def _partition(estimator, names, sample_weight):
             given = f"{name}={getattr(estimator, name)!r}"
             raise ValueError(f"{given} {why} leave it at None.")
     return model
+
+
+def _check_inputs(model, names):
+    """Raise ValueError where a model has other inputs than the data; default names match any."""
+    own, given, advice = tuple(model.input_names), tuple(names), ""
+    if len(own) == len(given):
+        if own == given or tuple(f"x{j}" for j in range(len(names))) in (own, given):
+            return
+        advice = ", with the same names and in the same order"
+    raise ValueError(
+        f"partition has rules on the inputs {', '.join(own)}, but the columns of X are "
+        f"{', '.join(given)}: give X the inputs of the rules{advice}."
+    )

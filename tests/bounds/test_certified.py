@@ -98,6 +98,14 @@ def test_points_lie_in_a_box_beyond_the_range(policy):
     assert_allclose(np.diag(model.predict(found.at_lowest)), found.lowest)
 
 
+def test_what_rises_in_the_range_may_fall_beyond_that_of_another_input(rng):
+    X = rng.uniform(-1.0, 1.0, (200, 2))
+    model = ANFISRegressor(n_mfs=2, out_of_bounds=LinearExtrapolation(5.0))
+    model.fit(X, X[:, 0] * (1.5 + X[:, 1]))
+    assert monotonicity(model, 0) == 1
+    assert monotonicity(model, 0, {"x1": (-3.0, 1.0)}) == 0
+
+
 def test_a_frame_is_read_by_its_labels():
     names, low = list(ONE_RULE.input_names), OFFSET - SCALE
     frame = pd.DataFrame({"low": low, "high": low + [1.0, 2.0, 3.0] * SCALE}, index=names)

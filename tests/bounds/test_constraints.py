@@ -37,12 +37,12 @@ def points_on_a_line(*places):
     return [FixedPoint([0.0, x], x) for x in places]
 
 
-def falls(model, j, rng, n_rows=4000):
+def falls(model, j, rng):
     """The most that predictions fall over steps up along an input, in the range."""
     low, high = model.model_.minimum, model.model_.maximum
-    X = rng.uniform(low, high, (n_rows, 2))
+    X = rng.uniform(low, high, (4000, 2))
     higher = X.copy()
-    higher[:, j] = np.minimum(X[:, j] + rng.uniform(0.0, 0.3, n_rows), high[j])
+    higher[:, j] = np.minimum(X[:, j] + rng.uniform(0.0, 0.3, 4000), high[j])
     return (model.predict(X) - model.predict(higher)).max()
 
 

@@ -48,11 +48,11 @@ KINDS = {
 }
 
 
-def problem_of(antecedent, rng, order=1, n_inputs=2, alpha=1e-3):
-    X = rng.uniform(-1.5, 1.5, (40, n_inputs)) * [1.0, 20.0] + [0.0, 500.0]
+def problem_of(antecedent, rng, order=1):
+    X = rng.uniform(-1.5, 1.5, (40, 2)) * [1.0, 20.0] + [0.0, 500.0]
     y = rng.normal(size=(40, 1)) * 7.0 + 30.0
     rows = StandardisedData.of(X, y, None)
-    penalty, inputs = Penalty(alpha=alpha, slope=alpha), np.arange(order * n_inputs)
+    penalty, inputs = Penalty(alpha=1e-3, slope=1e-3), np.arange(order * 2)
     return SeparableProblem(rows, antecedent, penalty, consequent_inputs=inputs)
 
 

@@ -59,34 +59,32 @@ class TestIteration:
         assert cost == pytest.approx(np.sum(X**2))
 
 
-class TestClusters:
-    def test_becomes_k_means_as_m_tends_to_one(self, rng):
-        X, weight = rng.normal(size=(300, 3)), rng.uniform(0.5, 2.0, 300)
-        hard = KMeans(4, init=X[:4], n_init=1, tol=0).fit(X, sample_weight=weight)
-        errors = []
-        for m in (1.1, 1.01, 1.001, 1.0 + 1e-9):
-            soft = FuzzyCMeans(4, m=m, init=hard.cluster_centers_, tol=1e-10)
-            soft.fit(X, sample_weight=weight)
-            errors.append(np.abs(soft.cluster_centers_ - hard.cluster_centers_).max())
-        assert errors == sorted(errors, reverse=True)
-        assert errors[-1] < 1e-9
-        assert_array_equal(soft.labels_, hard.labels_)
-        assert soft.inertia_ == pytest.approx(hard.inertia_, rel=1e-9)
+def test_becomes_k_means_as_m_tends_to_one(rng):
+    X, weight = rng.normal(size=(300, 3)), rng.uniform(0.5, 2.0, 300)
+    hard = KMeans(4, init=X[:4], n_init=1, tol=0).fit(X, sample_weight=weight)
+    errors = []
+    for m in (1.1, 1.01, 1.001, 1.0 + 1e-9):
+        soft = FuzzyCMeans(4, m=m, init=hard.cluster_centers_, tol=1e-10)
+        soft.fit(X, sample_weight=weight)
+        errors.append(np.abs(soft.cluster_centers_ - hard.cluster_centers_).max())
+    assert errors == sorted(errors, reverse=True)
+    assert errors[-1] < 1e-9
+    assert_array_equal(soft.labels_, hard.labels_)
+    assert soft.inertia_ == pytest.approx(hard.inertia_, rel=1e-9)
 
 
-class TestCoincidentCenters:
-    # With m < m* the mean is unstable, above it is not: seen from a start next to it.
-    @pytest.mark.parametrize(("factor", "coincide"), [(0.8, False), (1.25, True)])
-    def test_largest_exponent_parts_the_two(self, rng, factor, coincide):
-        X = rng.normal(size=(400, 4))
-        X -= X.mean(axis=0)
-        largest = largest_exponent(X, np.ones(400))
-        m = 1.0 + factor * (largest - 1.0)
-        model = FuzzyCMeans(2, m=m, init=0.05 * X[:2], tol=1e-7, max_iter=5000)
-        if coincide:
-            told = f"Only 1 of n_clusters=2 .* from m={largest:.3g} on"
-            with pytest.warns(ConvergenceWarning, match=told):
-                model.fit(X)
-        else:
+# With m < m* the mean is unstable, above it is not: seen from a start next to it.
+@pytest.mark.parametrize(("factor", "coincide"), [(0.8, False), (1.25, True)])
+def test_largest_exponent_parts_the_two(rng, factor, coincide):
+    X = rng.normal(size=(400, 4))
+    X -= X.mean(axis=0)
+    largest = largest_exponent(X, np.ones(400))
+    m = 1.0 + factor * (largest - 1.0)
+    model = FuzzyCMeans(2, m=m, init=0.05 * X[:2], tol=1e-7, max_iter=5000)
+    if coincide:
+        told = f"Only 1 of n_clusters=2 .* from m={largest:.3g} on"
+        with pytest.warns(ConvergenceWarning, match=told):
             model.fit(X)
-        assert (np.ptp(model.cluster_centers_, axis=0).max() < 1e-3) == coincide
+    else:
+        model.fit(X)
+    assert (np.ptp(model.cluster_centers_, axis=0).max() < 1e-3) == coincide

@@ -48,13 +48,13 @@ def chiu(X, radius=0.5, squash=1.25, accept=0.5, reject=0.15, weight=None):
             potential[i] -= peak * np.exp(-4.0 * ((u[i] - u[k]) ** 2).sum() / squash**2)
 
 
-def cloud(rng, n_rows=150, n_columns=3):
+def cloud(rng):
     """Clusters of several sizes in columns of several units, with a background."""
-    centers = rng.uniform(size=(6, n_columns))
-    rows = centers[rng.choice(6, n_rows, p=[0.4, 0.2, 0.15, 0.1, 0.1, 0.05])]
+    centers = rng.uniform(size=(6, 3))
+    rows = centers[rng.choice(6, 150, p=[0.4, 0.2, 0.15, 0.1, 0.1, 0.05])]
     rows = rows + 0.07 * rng.normal(size=rows.shape)
     rows[::10] = rng.uniform(size=rows[::10].shape)
-    return rows * np.logspace(-2, 3, n_columns) + np.linspace(-5, 50, n_columns)
+    return rows * np.logspace(-2, 3, 3) + np.linspace(-5, 50, 3)
 
 
 SETTINGS = [
@@ -66,21 +66,20 @@ SETTINGS = [
 ]
 
 
-class TestOracle:
-    @pytest.mark.theory
-    @pytest.mark.parametrize("setting", SETTINGS)
-    @pytest.mark.parametrize("seed", range(2))
-    def test_centers_and_potentials_are_those_of_the_paper(self, setting, seed):
-        rng = np.random.default_rng(seed)
-        X, weight = cloud(rng), rng.uniform(0.2, 3.0, 150)
-        for w in (None, weight):
-            centers, peaks = chiu(X, **setting, weight=w)
-            found = SubtractiveClustering(**setting).fit(X, sample_weight=w)
-            assert_array_equal(found.cluster_centers_, X[centers])
-            assert_allclose(found.potentials_, peaks, rtol=1e-9)
-            # exp(-4 |x|^2 / radius^2) is a Gaussian of this deviation.
-            width = setting.get("radius", 0.5) * np.ptp(X, axis=0) / np.sqrt(8.0)
-            assert_allclose(found.widths_, width, rtol=1e-14)
+@pytest.mark.theory
+@pytest.mark.parametrize("setting", SETTINGS)
+@pytest.mark.parametrize("seed", range(2))
+def test_centers_and_potentials_are_those_of_the_paper(setting, seed):
+    rng = np.random.default_rng(seed)
+    X, weight = cloud(rng), rng.uniform(0.2, 3.0, 150)
+    for w in (None, weight):
+        centers, peaks = chiu(X, **setting, weight=w)
+        found = SubtractiveClustering(**setting).fit(X, sample_weight=w)
+        assert_array_equal(found.cluster_centers_, X[centers])
+        assert_allclose(found.potentials_, peaks, rtol=1e-9)
+        # exp(-4 |x|^2 / radius^2) is a Gaussian of this deviation.
+        width = setting.get("radius", 0.5) * np.ptp(X, axis=0) / np.sqrt(8.0)
+        assert_allclose(found.widths_, width, rtol=1e-14)
 
 
 class TestInvariance:

@@ -25,6 +25,8 @@ def test_statistics_are_mean_deviation_and_range(rng, weighted):
     assert_allclose(found.scale, np.sqrt(variance), rtol=1e-12)
     assert_array_equal(found.minimum, values.min(axis=0))
     assert_array_equal(found.maximum, values.max(axis=0))
+    ends = [values.min(axis=0), values.max(axis=0)]
+    assert_allclose(found.box, (ends - mean) / np.sqrt(variance), rtol=1e-11)
     assert not found.is_constant.any()
 
 

@@ -11,12 +11,13 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from skanfis.datasets import make_jang_three_input
 from skanfis.learning import GradientDescent, Hybrid
-from skanfis.learning.data import Scale, StandardisedData
+from skanfis.learning.data import StandardisedData
 from skanfis.learning.descent import NaturalPremise
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
 from skanfis.membership import MEMBERSHIPS, Bell
+from skanfis.search.sample import unit_scale
 
 from .. import oracles
 from .test_varpro import planted
@@ -83,20 +84,15 @@ class Jang1993:
 
 def in_raw_units(X, y):
     """Rows that are not standardised, as Jang's were not."""
-
-    def raw(values):
-        n = values.shape[1]
-        return Scale(np.zeros(n), np.ones(n), values.min(axis=0), values.max(axis=0))
-
-    return StandardisedData(X, y[:, None], None, raw(X), raw(y[:, None]))
+    return StandardisedData(X, y[:, None], None, unit_scale(X), unit_scale(y[:, None]))
 
 
-def two_bells(rows, alpha=0.0):
+def two_bells(rows):
     """The problem and the premise of Jang's examples; neighbours cross at one half."""
-    low, high = oracles.box(rows)
+    low, high = rows.inputs.box
     n_inputs = low.size
     antecedent = oracles.even_grid([Bell] * n_inputs, [2] * n_inputs, low, high, 0.5)
-    problem = SeparableProblem(rows, antecedent, Penalty(alpha=alpha, slope=alpha))
+    problem = SeparableProblem(rows, antecedent, Penalty())
     return problem, Premise.of(antecedent, low, high, is_unbounded=True)
 
 

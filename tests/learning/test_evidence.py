@@ -132,24 +132,23 @@ KINDS = {
 }
 
 
-class TestAtGivenPremises:
-    @pytest.mark.theory
-    @pytest.mark.parametrize("kind", KINDS)
-    @pytest.mark.parametrize("order", [0, 1])
-    @pytest.mark.parametrize("n_outputs", [1, 2])
-    def test_it_is_the_marginal_likelihood_of_normal_data(self, order, kind, n_outputs, rng):
-        """To the last constant, so that rule bases of any size and order can be compared."""
-        n_inputs, build = KINDS[kind]
-        rows, antecedent = oracles.bumpy_rows(rng, 20, n_inputs, n_outputs), build(rng)
-        line = problem_of(rows, antecedent, order).common_line
-        for plain in PENALTIES:
-            # And with a pull for every component.
-            for penalty in (plain, with_pulls(plain, line, rng)):
-                found = posterior(rows, antecedent, order, penalty)
-                dense = Dense(rows, antecedent, order, penalty)
-                expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
-                assert_allclose(in_full(found), expected + prior_of_pulls(penalty), atol=1e-7)
-                assert_allclose(found.noise_variance, variance, rtol=1e-5)
+@pytest.mark.theory
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("order", [0, 1])
+@pytest.mark.parametrize("n_outputs", [1, 2])
+def test_it_is_the_marginal_likelihood_of_normal_data(order, kind, n_outputs, rng):
+    """To the last constant, so that rule bases of any size and order can be compared."""
+    n_inputs, build = KINDS[kind]
+    rows, antecedent = oracles.bumpy_rows(rng, 20, n_inputs, n_outputs), build(rng)
+    line = problem_of(rows, antecedent, order).common_line
+    for plain in PENALTIES:
+        # And with a pull for every component.
+        for penalty in (plain, with_pulls(plain, line, rng)):
+            found = posterior(rows, antecedent, order, penalty)
+            dense = Dense(rows, antecedent, order, penalty)
+            expected, variance = dense.at_its_noise(dense.by_the_normal_distribution)
+            assert_allclose(in_full(found), expected + prior_of_pulls(penalty), atol=1e-7)
+            assert_allclose(found.noise_variance, variance, rtol=1e-5)
 
 
 def at_fixed_premises(seed):
@@ -247,7 +246,7 @@ class OneWidth:
         X = g.uniform(-1.0, 1.0, (n_rows, 1))
         y = np.sin(3.0 * X) + 0.4 * X**2 + noise * g.normal(size=X.shape)
         self.rows = StandardisedData.of(X, y)
-        low, high = oracles.box(self.rows)
+        low, high = self.rows.inputs.box
         self.antecedent = oracles.even_grid([Gaussian], [3], low, high, 0.6)
         self.premise = Premise.of(self.antecedent, low, high)
         self.unit = np.zeros(self.premise.size)

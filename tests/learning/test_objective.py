@@ -168,7 +168,7 @@ def test_joint_gradient_is_that_at_any_consequents(case):
 
 @pytest.mark.parametrize("alpha", [1e-6, 1e-8, 1e-10])
 def test_duplicated_rule_with_little_ridge_leaves_the_gradient_exact(alpha, rng):
-    # Solving with one factorisation and projecting with another is 4 % wrong here (anchors.md).
+    # Solving with one factorisation and projecting with another is 4 % wrong here.
     penalty = Penalty(alpha=alpha, slope=alpha)
     case = Case(duplicated_rule(rng), 1, oracles.bumpy_rows(rng, 250), penalty)
     point = case.problem.antecedent.parameters  # the two rules are the same still

@@ -21,8 +21,7 @@ def rows():
 
 def table(rows):
     """Rows with their weights, in lexical order."""
-    weight = np.ones(rows.n_rows) if rows.sample_weight is None else rows.sample_weight
-    whole = np.column_stack([rows.X, rows.y, weight])
+    whole = np.column_stack([rows.X, rows.y, rows.weights])
     return whole[np.lexsort(whole.T)]
 
 

@@ -24,7 +24,7 @@ TREE = STUMP.split(0, 2, 0.3, -0.7)
 PENALTY = Penalty(agreement=1e-4, alpha=1e-4, slope=1e-4)
 
 
-def planted(rng, n_rows=600, noise=0.1):
+def planted(rng, n_rows=600):
     """By the second input all rules rise alike; by the first, the last rule does otherwise.
 
     By the fourth none does, by the fifth the last one alone.
@@ -33,7 +33,7 @@ def planted(rng, n_rows=600, noise=0.1):
     slopes = [[1.0, 0.7, 0.5, 0.0, 0.0], [1.0, 0.7, -1.0, 0.0, 0.0], [-1.0, 0.7, 2.0, 0.0, 0.6]]
     values = np.array([0.0, 1.0, -1.0]) + X @ np.transpose(slopes)
     y = np.sum(TREE.strengths(X.T).T * values, axis=1)
-    return X, y + noise * rng.standard_normal(n_rows)
+    return X, y + 0.1 * rng.standard_normal(n_rows)
 
 
 def posterior_of(X, y, antecedent=TREE, penalty=PENALTY):

@@ -41,9 +41,9 @@ NEAR = np.concatenate([[-30.0, -12.5, 1e-3, -1e-6, 11.0, 29.0], np.linspace(-6.0
 FAR = np.array([-1e8, -3e5, 1e3, 4e6, 1e8])
 
 
-def random_theta(family, rng, n_terms=7):
-    centers = rng.normal(size=n_terms)
-    theta = family.start(centers, rng.uniform(0.1, 10.0, n_terms), 0.5)
+def random_theta(family, rng):
+    centers = rng.normal(size=7)
+    theta = family.start(centers, rng.uniform(0.1, 10.0, 7), 0.5)
     theta[1:] += 0.3 * rng.normal(size=theta[1:].shape)
     return theta
 

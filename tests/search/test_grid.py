@@ -8,26 +8,19 @@ from skanfis.learning.data import StandardisedData
 from skanfis.membership import Gaussian
 from skanfis.search.grid import _EDGE, OVERLAP, Spacing, grid_antecedent
 
-N_ROWS = 1001
-
 
 def rows_of(*columns, weight=None):
     X = np.column_stack(columns)
     return StandardisedData.of(X, np.arange(len(X), dtype=float)[:, None], weight)
 
 
-def evenly(n_inputs, n_rows=N_ROWS):
-    """Even values on every input, in orders of their own; the spacing and its box."""
-    g = np.random.default_rng(7)
-    rows = rows_of(*(g.permutation(np.linspace(-1.0, 3.0, n_rows)) for _ in range(n_inputs)))
+def test_even_values_give_even_terms_between_the_outer_quantiles(rng):
+    """On two inputs, in orders of their own."""
+    values = np.linspace(-1.0, 3.0, 1001)
+    rows = rows_of(rng.permutation(values), rng.permutation(values))
     z = np.sort(rows.table(slice(None))[:, 0])
-    low, high = (z[int(np.ceil(q * n_rows)) - 1] for q in (_EDGE, 1.0 - _EDGE))
-    return Spacing(rows), low, high
-
-
-def test_even_values_give_even_terms_between_the_outer_quantiles():
-    spacing, low, high = evenly(2)
-    antecedent = grid_antecedent([Gaussian] * 2, [3, 2], spacing)
+    low, high = (z[int(np.ceil(q * 1001)) - 1] for q in (_EDGE, 1.0 - _EDGE))
+    antecedent = grid_antecedent([Gaussian] * 2, [3, 2], Spacing(rows))
     assert antecedent.counts == (3, 2)
     assert_array_equal(antecedent.term_inputs, [0, 0, 0, 1, 1])
     centers = [low, 0.5 * (low + high), high, low, high]

@@ -9,11 +9,11 @@ from skanfis.search import representative_rows
 from skanfis.search.sample import search_sample
 
 
-def many(rng, n_rows=300):
+def many(rng):
     """Rows of whole numbers, some of them equal, with whole weights."""
-    X = rng.integers(0, 12, (n_rows, 2)).astype(float)
-    y = rng.integers(0, 3, (n_rows, 1)).astype(float)
-    return X, y, rng.integers(1, 6, n_rows)
+    X = rng.integers(0, 12, (300, 2)).astype(float)
+    y = rng.integers(0, 3, (300, 1)).astype(float)
+    return X, y, rng.integers(1, 6, 300)
 
 
 class TestRepresentativeRows:

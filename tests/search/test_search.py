@@ -120,10 +120,10 @@ def test_noise_free_data_get_next_to_no_penalty():
     assert model.score(X, y) > 0.9995
 
 
-def runs(n_runs=6, n_rows=90, seed=0):
+def runs(n_runs=6, seed=0):
     """Runs of an instrument: each has a bias of its own, which a wiggle in the run's input fits."""
     g = np.random.default_rng(seed)
-    run = np.repeat(np.arange(n_runs), n_rows)
+    run = np.repeat(np.arange(n_runs), 90)
     temperature = g.uniform(-1, 1, n_runs)[run] + 0.02 * g.normal(size=run.size)
     rate = g.uniform(-1, 1, run.size)
     y = np.sin(2 * rate) + 0.3 * g.normal(size=n_runs)[run] + 0.02 * g.normal(size=run.size)

@@ -11,11 +11,11 @@ from skanfis.search.grid import Spacing, grid_antecedent
 from .test_trials import plan_of
 
 
-def of_grid(count, truth, rng, noise=0.0, n_rows=300, weights=(), simplicity=0.0):
-    x = rng.uniform(-1.0, 1.0, (n_rows, 1))
+def of_grid(count, truth, rng, noise, weights=(), simplicity=0.0):
+    x = rng.uniform(-1.0, 1.0, (300, 1))
     rows = StandardisedData.of(x, truth(x) + noise * rng.normal(size=x.shape))
     antecedent = grid_antecedent([Gaussian], [count], Spacing(rows))
-    plan = plan_of(1, float(n_rows), weights)
+    plan = plan_of(1, 300.0, weights)
     return rows, start.tuned_start(antecedent, rows, plan, simplicity)
 
 

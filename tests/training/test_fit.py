@@ -11,10 +11,9 @@ from skanfis.learning import VariableProjection
 from skanfis.search.request import _labels
 
 
-def data(n_rows=120, n_inputs=2):
-    rng = np.random.default_rng(0)
-    X = rng.uniform(-1.0, 1.0, (n_rows, n_inputs))
-    return X, np.sin(4.0 * X[:, 0]) + X[:, -1] ** 2
+def data(n_rows=120):
+    X = np.random.default_rng(0).uniform(-1.0, 1.0, (n_rows, 2))
+    return X, np.sin(4.0 * X[:, 0]) + X[:, 1] ** 2
 
 
 def test_clusterer_without_weights_sees_repeated_rows(rng):

@@ -157,15 +157,17 @@ def test_drift_of_inputs_costs_no_digits(premises):
     assert difference(model, whole, near) < EXACT
 
 
-def test_first_call_is_a_fit_and_premises_stay():
+@pytest.mark.parametrize("order", [0, 1])
+def test_first_call_is_a_fit_and_premises_stay(order):
     X, y = surface(600)
-    fitted = quick([3, 2], **GIVEN).fit(X[:200], y[:200])
-    model = quick([3, 2], **GIVEN).partial_fit(X[:200], y[:200])
+    given = GIVEN | {"order": order}
+    fitted = quick([3, 2], **given).fit(X[:200], y[:200])
+    model = quick([3, 2], **given).partial_fit(X[:200], y[:200])
     assert np.array_equal(model.predict(X[:200]), fitted.predict(X[:200]))
     assert model.n_samples_seen_ == 200
     model.partial_fit(X[200:], y[200:])
     assert model.memberships_ == fitted.memberships_
-    held = chunk(fitted, **GIVEN).partial_fit(X, y)
+    held = chunk(fitted, **given).partial_fit(X, y)
     assert difference(model, held, X) < EXACT
     # And what fit says afterwards is of its own rows.
     model.fit(X[:200], y[:200])
