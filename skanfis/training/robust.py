@@ -33,6 +33,8 @@ _NORMAL_MEDIAN = ndtri(0.75)
 _FAR = 10.0
 # Steps and tolerance of the linear fit: so tight that the order of rows does not matter.
 _MOST_STEPS, _TIGHT = 1000, 1e-9
+# A residual of rounding errors alone, in standard deviations of the target.
+_EXACT = 1e-12
 # Decimals of the first weights: more would only carry errors of the linear fit on.
 _DIGITS = 2
 # Rows that keep less of their weight are left out of a start: with the default epsilon, those
@@ -45,10 +47,8 @@ def huber_weights(problem, evaluation, epsilon, own):
     sizes = np.empty(problem.rows.n_rows)
     for part, residual, _ in problem.residuals(evaluation):
         sizes[part] = np.sqrt(np.mean(residual**2, axis=0))
-    scale = _weighted_median(sizes, own) / _NORMAL_MEDIAN
-    if scale == 0.0:
-        # At least half of the rows are met exactly. The others then count next to nothing.
-        return np.where(sizes == 0.0, 1.0, np.finfo(float).eps / np.maximum(sizes, 1.0))
+    # If at least half of the rows are met to rounding, the others count next to nothing.
+    scale = max(_weighted_median(sizes, own) / _NORMAL_MEDIAN, _EXACT)
     return np.minimum(1.0, epsilon * scale / np.maximum(sizes, np.finfo(float).tiny))
 
 
