@@ -148,6 +148,10 @@ REFUSED = {
         ["sample_weight must have one entry per row", "(60, 2)"],
     ),
     "noise": ({"partition": DBSCAN(eps=1e-9)}, ["partition found no cluster", "noise"]),
+    "clusters of a few rows": (
+        {"partition": KMeans(3), "X": FRAME.iloc[[0, 1] * 30], "y": Y[[0, 1] * 30]},
+        ["partition=KMeans(", "rows that count: 2", "n_clusters=3"],
+    ),
     "no rules": ({"partition": ANFISRegressor()}, ["has no rules", "not been fitted", "model_"]),
     "a class": ({"partition": KMeans}, ["is a class", "KMeans(...)"]),
     "terms and clusters": (

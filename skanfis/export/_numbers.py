@@ -118,11 +118,13 @@ def _rounded(values, dtype, what, counts=None, names=()):
     counts = sizes == sizes.max(initial=0.0) if counts is None else counts
     lost = (sizes > most) | (counts & (sizes > 0.0) & (sizes < least))
     if lost.any():
-        name = "Single precision" if dtype == np.float32 else "Double precision"
+        name, way_out = "Double precision", "Scale the data."
+        if dtype == np.float32:
+            name, way_out = "Single precision", "Scale the data, or export in double precision."
         what = f"{what} {names[np.argmax(lost)]!r}" if names else what
         raise ValueError(
             f"{name} cannot hold {what}, {sizes[lost][0]:g}, with all its digits: it goes from "
-            f"{least:.2g} to {most:.2g}. Scale the data, or export in double precision."
+            f"{least:.2g} to {most:.2g}. {way_out}"
         )
     return np.where(sizes < least, 0.0, values).astype(dtype)
 

@@ -310,8 +310,9 @@ def _with_raw_inputs(model, columns, order):
     # Computed edges are widened by a few rounding errors: the training rows stay inside.
     low, high = offset + scale * model.minimum, offset + scale * model.maximum
     is_computed = (offset != 0.0) | (scale != 1.0)
+    few = 4.0 * np.finfo(float).eps * is_computed  # an edge at zero stays there
     low, high = (
-        edge + is_computed * side * 4.0 * np.spacing(np.maximum(np.abs(edge), np.abs(offset)))
+        edge + side * few * np.maximum(np.abs(edge), np.abs(offset))
         for edge, side in ((low, -1.0), (high, 1.0))
     )
     place = np.argsort(order)

@@ -112,7 +112,13 @@ class StructureRequest(Plan):
 
     def _label(self, n_outputs, table, weight):
         """Labels by the clusterer; too many clusters raise before any rule is made of them."""
-        labels = np.asarray(_labels(self.partition, self.seed, table, weight))
+        try:
+            labels = np.asarray(_labels(self.partition, self.seed, table, weight))
+        except ValueError as error:
+            raise ValueError(
+                f"partition={self.partition!r} does not suit the training data (distinct rows "
+                f"that count: {len(table)}): {error}"
+            ) from error
         n_rules = np.unique(labels[labels >= 0]).size
         self._check_number(n_rules)
         check_rules_fit(

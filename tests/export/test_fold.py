@@ -27,7 +27,7 @@ from sklearn.preprocessing import (
 )
 
 from skanfis import ANFISRegressor
-from skanfis.export import fold, fold_with_rows
+from skanfis.export import export_c, fold, fold_with_rows
 
 NAMES = ["hours", "kelvin", "rate"]
 KINDS = {
@@ -99,6 +99,13 @@ def test_folded_model_predicts_what_the_pipeline_does(kind, scaler, policy, n_ou
     assert_same_predictions(pipe, around(X), np.ptp(y, axis=0).max() * 20)
     assert fold(FrozenEstimator(pipe)).in_bounds(X).all()
     assert_array_equal(fold(pipe).predict(X).shape, (len(X), n_outputs))
+
+
+def test_an_edge_at_zero_stays_there():
+    ratios = np.linspace(0.0, 5.0, 30)[:, None] ** [1, 2]
+    model = fold(make_pipeline(MinMaxScaler(), regressor(n_mfs=[2, 1])).fit(ratios, ratios[:, 1]))
+    assert_array_equal(model.minimum, 0.0)
+    export_c(model, name="m")  # less than zero by a rounding error is a number that C cannot hold
 
 
 def test_moved_and_dropped_columns_go_back_to_their_place():
