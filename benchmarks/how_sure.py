@@ -8,7 +8,6 @@ Before widths are compared, intervals are stretched about their centres until th
 """
 
 import numpy as np
-from sklearn.frozen import FrozenEstimator
 
 from skanfis import ANFISRegressor
 from skanfis.datasets import make_ofog
@@ -85,8 +84,7 @@ def intervals(X, y, groups, new):
     given = {} if groups is None else {"groups": groups}
 
     def conformal(method, confidence=None):
-        own = FrozenEstimator(fitted) if method == "loo" else regressor
-        model = ConformalRegressor(own, method=method)
+        model = ConformalRegressor(regressor, method=method)
         if method == "split" and groups is not None:
             model.set_params(calibration_fraction=0.5)
         return model.fit(X, y, **given).predict_interval(new, COVERAGE, confidence)
