@@ -207,20 +207,20 @@ class _Fit:
         """The model with the policy out of bounds that the user asked for."""
         return model.with_out_of_bounds(*policy_of(self.estimator.out_of_bounds))
 
-    def frozen(self, run: SolverRun, weights: np.ndarray | None, held=None) -> Fitted:
-        """The results of a run, with the posterior.
-
-        ``weights`` are those of Huber's loss, ``held`` the consequents that satisfy constraints.
-        """
-        rows = self.rows
+    def _posterior(self, run, weights, held=None):
+        """That of a run; ``held`` are the consequents of the model, if constraints hold them."""
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
-        n_rows = rows.effective_weight
+        n_rows = self.rows.effective_weight
         if weights is not None:
             # Kish's effective number of rows, from the part of its weight that each row keeps.
-            share, square = (np.average(weights**k, weights=rows.weights) for k in (1, 2))
+            share, square = (np.average(weights**k, weights=self.rows.weights) for k in (1, 2))
             n_rows *= share**2 / square
-        posterior = posterior_of(run.problem, learnt, run.evaluation, n_rows, robust, held)
+        return posterior_of(run.problem, learnt, run.evaluation, n_rows, robust, held)
+
+    def frozen(self, run: SolverRun, weights: np.ndarray | None) -> Fitted:
+        """The results of a run, with the posterior; ``weights`` are those of Huber's loss."""
+        rows, posterior = self.rows, self._posterior(run, weights)
         model, redundant = frozen_model(self.data, rows, self.request, run.start, run.evaluation)
         assert model.support is not None
         marginals = input_marginals(rows, run.evaluation.antecedent)
@@ -244,9 +244,10 @@ class _Fit:
         given = fitted.model, evaluation, run.problem, constraints, rows
         coefficients, free, held, points, report = constrained(*given)
         run = replace(run, result=replace(run.result, evaluation=free))
-        fitted = self.frozen(run, weights, held)
+        if free is not evaluation:
+            fitted = self.frozen(run, weights)  # its premises are others
         model = replace(fitted.model, coefficients=coefficients)
-        target, posterior = model.target, model.posterior
+        target, posterior = model.target, self._posterior(run, weights, held)
         return replace(
             fitted,
             model=replace(
