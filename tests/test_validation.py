@@ -59,7 +59,7 @@ def test_check_is_switched_off_with_that_of_scikit_learn():
     assert "first at row 0" in message_of(bad)
 
 
-@pytest.mark.parametrize("missing", [None, np.nan, np.datetime64("NaT"), pd.NaT, pd.NA])
+@pytest.mark.parametrize("missing", [None, np.nan, np.datetime64("NaT", "s"), pd.NaT, pd.NA])
 def test_a_missing_group_is_named_whatever_stands_for_it(missing):
     with pytest.raises(ValueError, match="no value for 1 of 3 rows, first at row 1"):
         group_numbers([1, missing, 2], 3)

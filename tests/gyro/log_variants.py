@@ -207,13 +207,13 @@ def _written(frame, header, headless, rng):
     quoting = csv.QUOTE_ALL if rng.random() < 0.15 else csv.QUOTE_MINIMAL
     # Some programs end every line with the separator, and begin the header like a comment.
     tail = separator if separator == ";" and rng.random() < 0.3 else ""
-    writer = csv.writer(buffer, delimiter=separator, lineterminator=tail + end, quoting=quoting)
+    writer = csv.writer(buffer, delimiter=separator, lineterminator=end, quoting=quoting)
     if not headless:
         buffer.write("% " if quoting == csv.QUOTE_MINIMAL and rng.random() < 0.1 else "")
         writer.writerow(header)
     for row in frame.itertuples(index=False):
         writer.writerow([_cell(value, decimal) for value in row])
-    text = "".join(line + end for line in lines) + buffer.getvalue()
+    text = "".join(line + end for line in lines) + buffer.getvalue().replace(end, tail + end)
     return str(rng.choice([".csv", ".txt", ".dat"])), text.encode(encoding, "replace")
 
 
