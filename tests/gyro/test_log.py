@@ -255,6 +255,15 @@ def test_glitches_are_named_that_the_curve_of_the_gyro_would_hide():
     assert glitches(log) == rows
 
 
+def test_more_outputs_than_are_named_are_counted():
+    log = simulated(sampling_interval=2.0)
+    rows = [77, 300, 500, 901, 1200]
+    log.loc[rows, "output"] += [-70.0, 200.0, 30.0, 90.0, -50.0]
+    named = dict(find_glitches(log, (log["output"] - log["rate"]).to_numpy()))
+    assert list(named) == [77, 300, 901]  # the largest
+    assert [row for row, told in named.items() if "(and that of 2 rows more)" in told] == [77]
+
+
 def test_however_many_temperatures_are_glitches_and_a_step_is_none():
     log = simulated(sampling_interval=2.0)
     cold = log.loc[log.index[::400], "temperature"].index
