@@ -359,7 +359,7 @@ def find_glitches(log, error):
     The error of a row, less what follows the rate, is compared with those of the rows nearest in
     temperature, rate and order; its temperature should lie between those of the rows before and
     after in the run. Least squares bends the whole model towards one such row. If there are many,
-    the first ones are named.
+    three of a kind are named, and the others counted.
     """
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)

@@ -131,8 +131,10 @@ def _read(options, paths, tell):
     if reading.assumed:
         reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
     if "time" not in reading.log:
-        told = "no column of the time is found, so neither it nor the temperature's rate is an input"
-        reading.notes.append(f"{told} (--columns time=NAME)")
+        reading.notes.append(
+            "no column of the time is found, so neither it nor the temperature's rate is an input "
+            "(--columns time=NAME)"
+        )
     for note in reading.notes:
         tell(f"note: {note}")
     layout = reading.files[0].layout
