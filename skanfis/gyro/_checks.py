@@ -258,9 +258,11 @@ def _check_plausible(values, part, unit):
     if others and bad.mean() > 0.5:
         advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
     row = int(np.argmax(bad))
+    told = f"{values[row]:.1f} {CANONICAL[part]}"
+    told += "" if unit == CANONICAL[part] else f" ({convert_back(values[row], unit):g} in {unit})"
     raise LogError(
-        f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
-        f"outside {low:g} to {high:g}){advice}.",
+        f"{told} is not plausible ({bad.sum()} of {bad.size} rows outside {low:g} to "
+        f"{high:g}){advice}.",
         part,
         row,
     )

@@ -223,6 +223,12 @@ def test_a_log_at_rest_is_told_from_one_that_moves(log):
         check_at_rest(levels, "counts")
 
 
+def test_a_value_that_is_implausible_is_named_as_the_file_has_it(log):
+    colder = log["temperature"].where(log.index != 5, -237.0 * 5.0 / 9.0 - 160.0 / 9.0)
+    with pytest.raises(LogError, match=r"^column 'temperature', row 5: -149.4 degC \(-237 in degF"):
+        check_log(log.assign(temperature=colder), units={"temperature": "degF"})
+
+
 def simulated(**options):
     return make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=0, **options)
 
