@@ -44,8 +44,7 @@ _FEWEST_AT_REST, _NOISY = 50, 0.2
 # Placeholder in messages: if a file was read, ``LogFile.located`` puts in the column's name.
 RATE_COLUMN = "column of the rate"
 
-# Largest number of rows named; more rows of alike errors support one another.
-_MOST_GLITCHES = 3
+_MOST_GLITCHES = 3  # of a kind, that are named
 # A row is alone if it deviates this many times as much as the next one. Gaussian noise never comes
 # near; Student's t with three degrees of freedom did not in a thousand logs.
 _ALONE = 5.0
@@ -259,9 +258,11 @@ def _check_plausible(values, part, unit):
     if others and bad.mean() > 0.5:
         advice = f"; is it in {' or '.join(others)}? Say so by units: {part}={others[0]}"
     row = int(np.argmax(bad))
+    told = f"{values[row]:.1f} {CANONICAL[part]}"
+    told += "" if unit == CANONICAL[part] else f" ({convert_back(values[row], unit):g} in {unit})"
     raise LogError(
-        f"{values[row]:.1f} {CANONICAL[part]} is not plausible ({bad.sum()} of {bad.size} rows "
-        f"outside {low:g} to {high:g}){advice}.",
+        f"{told} is not plausible ({bad.sum()} of {bad.size} rows outside {low:g} to "
+        f"{high:g}){advice}.",
         part,
         row,
     )
@@ -360,7 +361,7 @@ def find_glitches(log, error):
     The error of a row, less what follows the rate, is compared with those of the rows nearest in
     temperature, rate and order; its temperature should lie between those of the rows before and
     after in the run. Least squares bends the whole model towards one such row. If there are many,
-    the first ones are named.
+    three of a kind are named, and the others counted.
     """
     temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
     runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
@@ -370,11 +371,7 @@ def find_glitches(log, error):
     _, low, high, _ = np.sort(np.column_stack(shifted), axis=1).T
     beyond = np.nan_to_num(np.maximum(low - temperature, temperature - high))
     least = max(_SMOOTH * _spread(temperature), _ALONE * np.quantile(beyond, _SOUND))
-    jumps = np.flatnonzero(beyond > least).tolist()
-    named, more = jumps[:_MOST_GLITCHES], len(jumps) - _MOST_GLITCHES
-    found = {row: f"the temperature of {temperature[row]:.4g} degC" for row in named}
-    if more > 0:
-        found[named[-1]] += f" (and that of {counted(f'{more:,}', 'row')} more)"
+    jumps = np.flatnonzero(beyond > least)
     # Of a gyro that is far from linear, the curve would hide a glitch; clipped, none bends the fit.
     columns = np.column_stack([np.ones_like(rate), rate_columns(rate, temperature)])
     low, high = np.quantile(error, [0.05, 0.95])
@@ -390,13 +387,22 @@ def find_glitches(log, error):
     # The row itself is among its neighbours, which does not upset the median.
     nearest = tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
     sizes = np.abs(error[far] - np.median(error[nearest], axis=1))
-    order = np.argsort(-sizes, kind="stable")[: _MOST_GLITCHES + 1]
+    order = np.argsort(-sizes, kind="stable")
     first, next_one = sizes[order[:-1]], sizes[order[1:]]
     alone = np.flatnonzero(first > np.maximum(_ALONE * next_one, _spread(error)))
-    for row in far[order[: alone.max(initial=-1) + 1]].tolist():
-        output = log["output"].iloc[row]
-        found.setdefault(row, f"the output of {output:.4g} at a rate of {rate[row]:.4g} deg/s")
+    output, alone = log["output"].to_numpy(), far[order[: alone.max(initial=-1) + 1]]
+    found = _named(alone, "the output of {:.4g} at a rate of {:.4g} deg/s", output, rate)
+    found |= _named(jumps, "the temperature of {:.4g} degC", temperature)
     return sorted(found.items())
+
+
+def _named(rows, told, *columns):
+    """What is odd about the first of these rows, in words, and how many more there are."""
+    named, more = rows[:_MOST_GLITCHES].tolist(), len(rows) - _MOST_GLITCHES
+    found = {row: told.format(*(values[row] for values in columns)) for row in named}
+    if more > 0:
+        found[named[-1]] += f" (and that of {counted(f'{more:,}', 'row')} more)"
+    return found
 
 
 def _spread(values):

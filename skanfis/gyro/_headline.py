@@ -102,7 +102,7 @@ def flagged_text(calibration):
     if share > _MANY_FLAGGED:
         advice = (
             "That is much: the figures say nothing of these rows. Log groups that overlap more, "
-            "above all at both ends of the range."
+            "above all at both ends of the range, or hold out another kind (--groups)."
         )
     flagged = f"{n_flagged:,} of {n_rows:,} held-out rows ({percent(share)})"
     return f"{flagged} were flagged{named}. {advice}"

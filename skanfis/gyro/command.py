@@ -130,6 +130,11 @@ def _read(options, paths, tell):
     reading = read(paths, request, tell=tell)
     if reading.assumed:
         reading.notes.append(f"units assumed: {'; '.join(reading.assumed.values())}")
+    if "time" not in reading.log:
+        reading.notes.append(
+            "no column of the time is found, so neither it nor the temperature's rate is an input "
+            "(--columns time=NAME)"
+        )
     for note in reading.notes:
         tell(f"note: {note}")
     layout = reading.files[0].layout

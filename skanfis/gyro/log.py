@@ -302,7 +302,7 @@ class LogFile:
             return pd.Categorical.from_codes(code, [""])
         self.notes.append(
             f"{self.path}: is split into {code[-1] + 1} runs, where the time begins anew or steps "
-            f"by more than {longest:.4g} s"
+            f"by more than {longest:.4g} s; if that is no power-on, number the runs in a column"
         )
         return pd.Categorical.from_codes(code, [str(k + 1) for k in range(code[-1] + 1)])
 

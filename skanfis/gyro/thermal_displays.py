@@ -28,8 +28,8 @@ _COLORS = ["#c8654a", "#f0c9b8", "#f7f7f7", "#cfe3ef", "#8ebbd8"]  # none, some,
 class ScaleFactorErrorDisplay(GyroDisplay):
     """Scale-factor error against rate in three bands of temperature, before and after.
 
-    It is the error minus the bias (from the least-squares line of each band), divided by the rate.
-    Rates below 5 % of the largest are left out.
+    It is the error minus the bias, divided by the rate; the bias is from a least-squares fit to
+    each band, linear in rate and temperature. Rates below 5 % of the largest are left out.
 
     ``from_predictions`` takes ``temperature`` [degC].
 
@@ -56,12 +56,11 @@ class ScaleFactorErrorDisplay(GyroDisplay):
         means = {"true rate [deg/s]": rows["rate"][far].groupby(keys).mean()}
         for side in SIDES:
             known = rows[["rate", side]].dropna()
-            # The intercept of the least-squares line of each band.
-            biases = {
-                band: np.polyfit(part["rate"], part[side], 1)[1] if np.ptp(part["rate"]) else 0.0
-                for band, part in known.groupby(bands)
-            }
-            known[side] -= bands.map(biases)
+            for _, part in rows.loc[known.index].groupby(bands):
+                heat = part["temperature"] - part["temperature"].mean()
+                design = np.column_stack([part["rate"], heat, np.ones(len(part))])
+                _, *bias = np.linalg.lstsq(design, part[side], rcond=None)[0]
+                known.loc[part.index, side] -= design[:, 1:] @ bias
             parts = known[far[known.index]].groupby(keys).mean()
             means[f"scale-factor error {side} [ppm]"] = 1e6 * parts[side] / parts["rate"]
         names = ["temperature, from [degC]", "temperature, to [degC]", "bin"]

@@ -394,6 +394,16 @@ def test_a_glitch_is_named_by_its_line(tmp_path, log, run, monkeypatch, no_pictu
         assert page.index(told) < page.index("<section>")
 
 
+def test_what_a_log_without_times_or_runs_lacks_is_told(log, run):
+    code, said, _ = run(log.drop(columns="time"), SMALL)
+    told = "no column of the time is found, so neither it nor the temperature's rate is an input"
+    assert (code, told in said) == (0, True)
+    code, said, _ = run(log.drop(columns="run"), f"{SMALL} --force")
+    told = "is split into 5 runs, where the time begins anew or steps by more than"
+    assert (code, told in said) == (0, True)
+    assert "if that is no power-on, number the runs in a column" in said
+
+
 def thermal_cycle(*turns, n_rows=300, lag=0.05):
     """A MEMS log: a bias that is a parabola of the temperature, and lags behind by its rate."""
     legs = [np.linspace(a, b, n_rows, endpoint=False) for a, b in pairwise(turns)]

@@ -151,7 +151,8 @@ def test_a_band_between_bands_without_rows_is_drawn_too():
 
 def test_scale_factor_error_is_that_of_the_law(log):
     rate = log["rate"]
-    before = rate * (1 + 1e-6 * (300.0 + 0.02 * rate**2)) + 0.5  # a bias is no scale factor
+    bias = 0.5 + 0.02 * log["temperature"]  # is no scale factor, wherever it goes in a band
+    before = rate * (1 + 1e-6 * (300.0 + 0.02 * rate**2)) + bias
     planted = log.assign(output=before, after=rate)
     display = display_of(ScaleFactorErrorDisplay, planted)
     table = display.tables()["scale-factor"]

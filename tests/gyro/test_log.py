@@ -223,6 +223,12 @@ def test_a_log_at_rest_is_told_from_one_that_moves(log):
         check_at_rest(levels, "counts")
 
 
+def test_a_value_that_is_implausible_is_named_as_the_file_has_it(log):
+    colder = log["temperature"].where(log.index != 5, -237.0 * 5.0 / 9.0 - 160.0 / 9.0)
+    with pytest.raises(LogError, match=r"^column 'temperature', row 5: -149.4 degC \(-237 in degF"):
+        check_log(log.assign(temperature=colder), units={"temperature": "degF"})
+
+
 def simulated(**options):
     return make_ofog(n_devices=1, n_runs=4, duration=900.0, random_state=0, **options)
 
@@ -253,6 +259,15 @@ def test_glitches_are_named_that_the_curve_of_the_gyro_would_hide():
     rows = [60, 150, 290]
     log.loc[rows, "output"] += [3.0, -4.0, 2.0]
     assert glitches(log) == rows
+
+
+def test_more_outputs_than_are_named_are_counted():
+    log = simulated(sampling_interval=2.0)
+    rows = [77, 300, 500, 901, 1200]
+    log.loc[rows, "output"] += [-70.0, 200.0, 30.0, 90.0, -50.0]
+    named = dict(find_glitches(log, (log["output"] - log["rate"]).to_numpy()))
+    assert list(named) == [77, 300, 901]  # the largest
+    assert [row for row, told in named.items() if "(and that of 2 rows more)" in told] == [77]
 
 
 def test_however_many_temperatures_are_glitches_and_a_step_is_none():

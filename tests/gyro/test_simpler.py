@@ -1,8 +1,9 @@
 """Simple compensations as they are written: the same rates as the model, the flags of its rows."""
 
 import numpy as np
+import pandas as pd
 import pytest
-from sklearn.linear_model import LinearRegression
+from sklearn.linear_model import BayesianRidge, LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
 
@@ -11,11 +12,12 @@ from skanfis.gyro import GyroCompensator
 from skanfis.gyro._simpler import kinds, make_law
 from skanfis.gyro.c_compensator import export_c_compensator
 from skanfis.gyro.compensator import as_written
+from skanfis.gyro.metrics import rms
 
 from .targets.models import polynomial
 
 INPUTS = ("time", "temperature", "output")
-CUBIC = make_pipeline(StandardScaler(), PolynomialFeatures(3), LinearRegression())
+CUBIC = make_pipeline(StandardScaler(), PolynomialFeatures(3, include_bias=False), BayesianRidge())
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +82,20 @@ def test_beyond_the_box_a_polynomial_keeps_its_policy(log, policy):
     expected[outside & (policy == "nan")] = np.nan
     np.testing.assert_allclose(estimator.predict(far), expected, atol=1e-7)
     np.testing.assert_allclose(estimator.predict(X), model.predict(X), atol=1e-12)
+
+
+def test_a_cubic_stays_sane_between_inputs_that_the_log_ties_together():
+    """A sine of temperature draws an ellipse, on which terms cancel; a slower one goes within."""
+    rng, phase = np.random.default_rng(0), np.linspace(0.0, 6.0 * np.pi, 3_000)
+
+    def cycle(thermal_rate):
+        temperature = 20.0 + 40.0 * np.sin(phase) + 0.001 * rng.normal(size=phase.size)
+        X = {"temperature": temperature, "temperature_rate": thermal_rate * np.cos(phase)}
+        u = (temperature - 20.0) / 40.0
+        return pd.DataFrame(X), u - 0.5 * u**2 + 0.4 * u**3 + 30.0 * X["temperature_rate"]
+
+    (fast, drift), (slow, slow_drift) = cycle(0.02), cycle(0.012)
+    fits = {name: fit for name, _, fit in kinds(list(fast), "linear")}
+    cubic = fits["cubic polynomial"](fast, drift + 0.3 * rng.normal(size=phase.size))
+    assert rms(cubic.predict(fast) - drift) < 0.05
+    assert rms(cubic.predict(slow) - slow_drift) < 0.5 * rms(slow_drift)
