@@ -203,11 +203,13 @@ class Polynomial:
         The evidence shrinks the terms that the rows do not tell apart: in a sine of temperature,
         T and dT/dt lie on an ellipse, and least squares may give any value within it.
         """
-        scaler, line = StandardScaler(), BayesianRidge()
-        make_pipeline(scaler, PolynomialFeatures(3, include_bias=False), line).fit(X, y)
-        coefficients, names = [line.intercept_, *line.coef_], np.array(X.columns, dtype=object)
+        # The priors of BayesianRidge are for targets of about one.
+        unit, scaler, line = float(np.std(y)) or 1.0, StandardScaler(), BayesianRidge()
+        make_pipeline(scaler, PolynomialFeatures(3, include_bias=False), line).fit(X, y / unit)
+        coefficients = unit * np.array([line.intercept_, *line.coef_])
         low, high = box
-        return cls(low, high, scaler.mean_, scaler.scale_, np.array(coefficients), names)
+        names = np.array(X.columns, dtype=object)
+        return cls(low, high, scaler.mean_, scaler.scale_, coefficients, names)
 
     powers = property(lambda self: cubic_powers(self.center.size))  # (n_terms, n_inputs)
     columns_ = property(lambda self: np.arange(self.center.size))

@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from sklearn.compose import TransformedTargetRegressor
 from sklearn.linear_model import BayesianRidge, LinearRegression
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import PolynomialFeatures, StandardScaler
@@ -17,7 +18,10 @@ from skanfis.gyro.metrics import rms
 from .targets.models import polynomial
 
 INPUTS = ("time", "temperature", "output")
-CUBIC = make_pipeline(StandardScaler(), PolynomialFeatures(3, include_bias=False), BayesianRidge())
+CUBIC = TransformedTargetRegressor(
+    make_pipeline(StandardScaler(), PolynomialFeatures(3, include_bias=False), BayesianRidge()),
+    transformer=StandardScaler(),
+)
 
 
 @pytest.fixture(scope="module")
