@@ -115,10 +115,10 @@ def test_quantile_of_groups_is_the_median_of_draws_of_one_row_from_each(rng):
     masses = row_masses(scores.size, groups=np.arange(scores.size))[0]
     found = one_row_per_group(scores, masses, np.arange(scores.size), 0.9)
     assert found == score_quantile(scores, row_masses(scores.size)[0], 0.9)
-    # The eleventh of nineteen, though 20 times 0.55 is more than eleven.
-    scores = np.arange(19.0)
-    assert one_row_per_group(scores, np.full(19, 0.05), np.arange(19), 0.55) == 10.0
-    assert score_quantile(scores, np.full(19, 0.05), 0.55) == 10.0
+    # The fourteenth of 24, though 25 * 0.56 is more than 14 when rounded.
+    scores, masses = np.arange(24.0), np.full(24, 0.04)
+    assert one_row_per_group(scores, masses, np.arange(24), 0.56) == 13.0
+    assert score_quantile(scores, masses, 0.56) == 13.0
 
 
 @pytest.mark.theory
@@ -208,15 +208,23 @@ def test_groups_and_weights_reach_a_regressor_in_a_pipeline(rng):
         assert_allclose(estimator.predict(X), fitted.predict(alone.transform(X)), rtol=1e-12)
 
 
-@pytest.mark.parametrize(("method", "n_models"), [("folds", 5), ("split", 1)])
-def test_groups_are_held_out_whole_from_a_regressor_that_takes_none(method, n_models, rng):
-    class Keeping(LinearRegression):
-        def fit(self, X, y):
-            self.rows_ = X
-            return super().fit(X, y)
+class Keeping(LinearRegression):
+    def fit(self, X, y):
+        self.rows_ = X
+        return super().fit(X, y)
 
+
+class KeepingGroups(Keeping):
+    def fit(self, X, y, groups):
+        assert len(groups) == len(X)
+        return super().fit(X, y)
+
+
+@pytest.mark.parametrize("regressor", [Keeping(), KeepingGroups()], ids=["without", "with"])
+@pytest.mark.parametrize(("method", "n_models"), [("folds", 5), ("split", 1)])
+def test_groups_are_held_out_whole_and_told_to_who_takes_them(method, n_models, regressor, rng):
     X, y = bent(rng, 60)
-    model = ConformalRegressor(Keeping(), method=method, scaled=False)
+    model = ConformalRegressor(regressor, method=method, scaled=False)
     model.fit(X, y, groups=np.arange(60) // 12)
     trained = model.estimators_ or [model.estimator_]
     assert len(trained) == n_models  # folds are no more than groups
