@@ -38,8 +38,12 @@ class TestMemberships:
             with pytest.raises(ValueError, match="no fuzzy terms, so there is nothing to draw"):
                 MembershipDisplay.from_estimator(model)
             return
-        table = pd.DataFrame(model.memberships())
-        for one in MembershipDisplay.from_estimator(model).inputs:
+        table, X = pd.DataFrame(model.memberships()), rows_of(model, 1.0, 9)
+        display = MembershipDisplay.from_estimator(model, X)
+        for one, axes in zip(display.inputs, display.axes_, strict=True):
+            j = model.input_names.index(one.input_name)
+            assert_array_equal(axes.get_xlim(), [model.minimum[j], model.maximum[j]])
+            assert_array_equal(one.counts, np.histogram(X[:, j], one.edges)[0])
             own = table[table["input"] == one.input_name]
             # Of a cut the side above says all.
             own = own[own["function"] != "sigmoid_falling"]
