@@ -90,6 +90,7 @@ def test_inputs_that_go_together_are_told(rng):
     found = effects(model, X)
     assert len(found.notes) == 1
     assert found.notes[0].startswith("Inputs go together in the rows, which changes shares: x0 0.")
+    assert "; x1 0." in found.notes[0]
     assert repr(found) == str(found)
     assert str(found).endswith(found.notes[0])
 

@@ -546,6 +546,8 @@ def test_there_is_a_line_per_rule(model):
     for t in np.unique(terms[terms >= 0]):
         assert Sentences.of(model).model.term_names[t] in page.text
     assert f"{model.n_rules} rule" in page.text
+    left = f"and {model.n_rules - 1} rule"
+    assert (left in Outline(rules_html(model, max_shown=1)).text) == (model.n_rules > 1)
 
 
 def test_names_of_many_letters_keep_to_the_lines():
