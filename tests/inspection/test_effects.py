@@ -127,6 +127,8 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
     with pytest.raises(ValueError, match="has the same name as a column that is not in it"):
         effects(fitted, table, groups={fibre: [rate]})
     # A category is called by its name in a group too.
+    named = effects(fitted, table, groups={"sort": [fibre]}).table
+    assert_allclose(named.loc[[rate, "sort"], "sobol"], expected, rtol=0, atol=1e-9)
     assert list(effects(fitted, table, groups={"both": [rate, fibre]}).table.index) == ["both"]
 
 

@@ -70,7 +70,8 @@ def test_a_constant_output_is_told_in_its_own_digits(rng, value):
     X = rng.uniform(-1, 1, size=(60, 2))
     found = read_text(export_text(quick(1).fit(X, np.full(60, value))), ["x0", "x1"])
     assert found.limits["y"] == (value, value)
-    assert_allclose(found.predict({"x0": 0.3, "x1": -0.2}), value, rtol=1e-4)
+    # Without the limits too, which hold any prediction at the value.
+    assert_allclose(replace(found, limits={}).predict({"x0": 0.3, "x1": -0.2}), value, rtol=1e-4)
 
 
 def test_a_constant_output_asks_for_no_digits_of_the_terms(rng):
