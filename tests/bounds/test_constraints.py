@@ -175,6 +175,8 @@ def test_limits_hold():
     held = ANFISRegressor(**QUICK, constraints=known, monotonic_cst=[[0, 0], [-1, 0]]).fit(X, y)
     found = bounds(held, tol=1e-3)
     assert held.constraints_["certified"]
+    left = (np.mean((held.predict(X) - y) ** 2, axis=0) / y.var(axis=0)).sum()
+    assert_allclose(held.constraints_["loss_after"], left, rtol=1e-9)
     assert found.highest[0] <= 1.0
     assert found.lowest[0] >= -0.9
     assert found.highest[1] <= 1.7
