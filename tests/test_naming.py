@@ -146,6 +146,8 @@ def test_a_cut_between_two_values_has_no_width():
     found = tree((0, 0.5, crisp), (1, 3.5, 3.0 * crisp), (2, 0.4, 0.1))
     assert default_term_names(model(found, box))[:3] == ("1", "> 3.5", "> 0.4 ± 0.1")
     assert default_term_names(model(found, box))[3:] == ("0", "< 3.5", "< 0.4 ± 0.1")
+    # One that blurs both values has a width, in their middle too.
+    assert default_term_names(model(tree((0, 0.5, 0.1)), box))[0] == "> 0.5 ± 0.1"
     # In its middle, whatever rounding has left of that.
     box = np.array([[-1.0], [1.0]])
     assert default_term_names(model(tree((0, -3e-17, 2.0 * crisp)), box)) == ("> 0", "< 0")

@@ -52,17 +52,17 @@ class _Parts:
             enclosed(one, place - len(rules.counts) - 1, terms, at_middle, half)
             for place, one in enumerate(rules.factors)
         ]
-        # Ranges of D and of d^2 log w / dx_j^2, which broadcast to the shape of f.
-        self.departure = {j: ends for one in self.shares for j, ends in one.departure.items()}
-        self.curvature = {j: ends for one in self.shares for j, ends in one.curvature.items()}
+        # The shares that change with x_j, and ranges of D_j, which broadcast to the shape of f.
+        self.moved = {j: one for one in self.shares for j in one.departure}
+        self.departure = {j: one.departure[j] for j, one in self.moved.items()}
         self.strength = prod(one.high for one in self.shares)  # upper bound for every rule
         # f at the middle of the box, of shape (*counts, n_boxes), and its range.
         centre = rules.height + rules.slopes @ (middle - model.reference[:, None])
         radius = np.abs(rules.slopes) @ half
         self.middle = rules.shaped(centre)
         self.value = rules.shaped(np.stack([centre - radius, centre + radius]))
-        # For each factor, f less its mean along the factor's axis.
-        self.centred = [rules.centred(self, [one]) for one in self.shares]
+        # For each factor, by its axis, f less its mean along it.
+        self.centred = {one.axis: rules.centred(self, [one]) for one in self.shares}
         self.there: dict = {}  # cache
         self.slack, self.slope_slack = rules.slacks(self)
 
@@ -83,7 +83,6 @@ class Enclosure:
         ]
         self.height = sign * model.coefficients[:, :1, output]
         self.slopes = sign * model.consequents[:, 1:, output]
-        self.place = {j: place for place, one in enumerate(self.factors) for j in one}
         self.reach, self.tangents = reach_of(model), model.tangent_groups
         answering = model.with_out_of_bounds("clip") if model.out_of_bounds in SILENT else model
         # The bounds are those of the rules. Holding outputs is monotone, and is applied to bounds.
@@ -157,12 +156,12 @@ class Enclosure:
         strength = parts.strength
         # How much errors of the strengths change the output, rule by rule.
         moved = np.zeros(parts.middle.shape)
-        for one, centred in zip(parts.shares, parts.centred, strict=True):
-            moved += 2.0 * strength * np.fmin(one.error, 1.0) * size(centred)
+        for one in parts.shares:
+            moved += 2.0 * strength * np.fmin(one.error, 1.0) * size(parts.centred[one.axis])
         slopes = np.tile(part * np.abs(self.slopes).max(axis=0)[:, None], largest.size)
         for j, ends in parts.departure.items():
             # Where one rule fires alone, D is zero, but its slope is still rounded.
-            steepness = np.maximum(parts.shares[self.place[j]].steepness[j], size(ends))
+            steepness = np.maximum(parts.moved[j].steepness[j], size(ends))
             slopes[j] += part * (strength * steepness).sum(axis=self.axes) * largest
             slopes[j] += 2.0 * (size(ends) * moved).sum(axis=self.axes)
         ahead = size(parts.way)
@@ -178,7 +177,7 @@ class Enclosure:
         own = self.shaped(self.slopes[:, j, None])
         if j not in parts.departure:
             return np.stack([own, own])
-        return own + product(parts.departure[j], parts.centred[self.place[j]])
+        return own + product(parts.departure[j], parts.centred[parts.moved[j].axis])
 
     def centred(self, parts, every):
         """Range of f less its means along the axes of these factors, by shares at the middle."""
@@ -245,16 +244,16 @@ class Enclosure:
         for one, other in ((i, j), (j, i)):
             if one in parts.departure:
                 own = self.shaped(self.slopes[:, other, None])
-                own = _less_means(own, [parts.shares[self.place[one]]])
+                own = _less_means(own, [parts.moved[one]])
                 found = found + product(parts.departure[one], (own, own))
         if i in parts.departure and j in parts.departure:
-            first, second = (parts.shares[self.place[k]] for k in (i, j))
+            first, second = parts.moved[i], parts.moved[j]
             both = product(parts.departure[i], parts.departure[j])
             if i == j:
-                both = square(parts.departure[i]) + parts.curvature[i]
+                both = square(parts.departure[i]) + first.curvature[i]
             if first is second:
                 # E D_i D_j is not zero within one factor: f loses its mean for any shares.
-                off = parts.centred[self.place[i]]
+                off = parts.centred[first.axis]
                 off = off - mean_range(off, [first])[::-1]
             else:
                 off = self.centred(parts, [first, second])

@@ -142,16 +142,17 @@ class TestOneTermEach:
 )
 def test_sides_that_follow_from_others_are_left_out(cuts, widths, left):
     theta = np.array([cuts, np.log(np.array(widths) / np.log(9.0))])
-    # Down one path, ever below; and up one, ever above, on a mirror.
-    for sign, is_above in ((1.0, False), (-1.0, True)):
+    # Down one path, ever below; and up one, ever above, on a mirror, in other units.
+    for unit, is_above in ((1.0, False), (-1e3, True)):
         path = [(node, is_above) for node in range(len(cuts))]
         others = [[*path[:k], (k, not is_above)] for k in range(len(cuts))]
-        found = TreeAntecedent.build([0] * len(cuts), theta * [[sign], [1.0]], [path, *others])
+        told = theta * [[unit], [1.0]] + [[0.0], [np.log(abs(unit))]]
+        found = TreeAntecedent.build([0] * len(cuts), told, [path, *others])
         assert found.without_implied(0.0) is found
         shorter = found.without_implied(0.011)
         kept = [t % len(cuts) for t in shorter.rule_terms[0] if t >= 0]
         assert kept == left
-        Z = np.linspace(-15.0, 15.0, 2001)[None]
+        Z = unit * np.linspace(-15.0, 15.0, 2001)[None]
         assert np.abs(shorter.strengths(Z) - found.strengths(Z)).max() < 0.011
 
 

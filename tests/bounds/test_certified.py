@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from skanfis import ANFISRegressor
 from skanfis.antecedent import RuleTableAntecedent, TermGroup
 from skanfis.bounds import bounds, gradient_bounds, monotonicity
+from skanfis.bounds.construction import is_in_order
 from skanfis.learning import VariableProjection
 from skanfis.membership import Gaussian
 from skanfis.options import LinearExtrapolation
@@ -34,10 +35,20 @@ def test_a_line_is_bounded_by_its_corners(model):
     assert_allclose([slope.lower, slope.upper], [slopes[2], slopes[2]], rtol=1e-9)
     assert (slope.tightness >= 0.0).all()
     assert_allclose(monotonicity(model, 2, box), np.sign(slopes[2]))
+    assert (found.n_boxes, found.converged) == (4, True)
     # As written, too, no value is beyond.
     ends = {"lower": np.array([-1.02616491]), "upper": np.array([1.91238491])}
     found = replace(found, **ends, output_names=("y0",))
     assert repr(found) == "Bounds(y0 in [-1.02617, 1.91239])"
+    found = replace(found, lowest=found.lower + 0.2, highest=found.upper - 0.1)
+    assert_allclose(found.tightness, 0.2 / (1.91238491 + 1.02616491 - 0.3))
+
+
+def test_a_search_has_converged_if_it_has_for_every_output():
+    model = MODELS["scattered, order 0, 2 outputs"]
+    found = bounds(replace(model, coefficients=model.coefficients * [0.0, 1.0]), max_boxes=1)
+    assert found.lower[0] == found.upper[0] == 0.0
+    assert not found.converged
 
 
 def test_two_rules_of_order_zero_are_a_sigmoid():
@@ -75,6 +86,9 @@ def test_the_box_is_held_where_the_policy_holds(rng):
         inside = bounds(estimator)
         assert_allclose([held.lower, held.upper], [inside.lower, inside.upper])
         assert held.upper < found.upper
+        # Where the edge is held the slope is none; where nothing is predicted there is none.
+        is_rising = gradient_bounds(estimator, 1, without_end).lower[0] > 0.0
+        assert is_rising == (policy != "clip")
     estimator.set_params(out_of_bounds=LinearExtrapolation(np.inf))
     with pytest.raises(ValueError, match=r"'x0', but the model extrapolates without limit"):
         bounds(estimator, without_end)
@@ -101,9 +115,16 @@ def test_points_lie_in_a_box_beyond_the_range(policy):
 def test_what_rises_in_the_range_may_fall_beyond_that_of_another_input(rng):
     X = rng.uniform(-1.0, 1.0, (200, 2))
     model = ANFISRegressor(n_mfs=2, out_of_bounds=LinearExtrapolation(5.0))
-    model.fit(X, X[:, 0] * (1.5 + X[:, 1]))
-    assert monotonicity(model, 0) == 1
-    assert monotonicity(model, 0, {"x1": (-3.0, 1.0)}) == 0
+    rising = model.fit(X, X[:, 0] * (1.5 + X[:, 1])).model_
+    # With both slopes positive the rules are in order, which says nothing beyond their range.
+    ordered = model.set_params(n_mfs=[1, 2]).fit(X, X[:, 0]).model_
+    terms = ordered.antecedent.with_parameters(np.array([-1.0, 1.0, 0.0, 0.0]))
+    slopes = np.array([[0.0, 0.5, 0.0], [0.0, 2.5, 0.0]])[:, :, None]
+    ordered = replace(ordered, antecedent=terms, coefficients=slopes)
+    assert is_in_order(ordered, 0, np.array([1, 0]))
+    for one in (rising, ordered):
+        assert monotonicity(one, 0) == 1
+        assert monotonicity(one, 0, {"x1": (-3.0, 1.0)}) == 0
 
 
 def test_a_frame_is_read_by_its_labels():

@@ -3,6 +3,7 @@
 import re
 from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from sklearn.cluster import KMeans
 
 from skanfis import ANFISRegressor
 from skanfis.bounds import FixedPoint, OutputLimits, bounds, monotonicity
+from skanfis.bounds.consequents import Consequents
 from skanfis.bounds.construction import is_in_order
 from skanfis.exceptions import ConstraintWarning
 from skanfis.export import export_json
@@ -173,6 +175,8 @@ def test_limits_hold():
     held = ANFISRegressor(**QUICK, constraints=known, monotonic_cst=[[0, 0], [-1, 0]]).fit(X, y)
     found = bounds(held, tol=1e-3)
     assert held.constraints_["certified"]
+    left = (np.mean((held.predict(X) - y) ** 2, axis=0) / y.var(axis=0)).sum()
+    assert_allclose(held.constraints_["loss_after"], left, rtol=1e-9)
     assert found.highest[0] <= 1.0
     assert found.lowest[0] >= -0.9
     assert found.highest[1] <= 1.7
@@ -287,6 +291,18 @@ def test_rules_drawn_all_the_way_are_said_to_be_and_of_a_false_sign_they_are_no_
         held.set_params(monotonic_cst=[-1, 1, 0]).fit(X, y)
     assert held.constraints_["drawn"]
     assert ["The data contradict" in str(one.message) for one in told] == [True]
+
+
+@pytest.mark.parametrize("least", [0.0, 0.01, 0.3, 0.6, 0.99])
+def test_the_way_to_rules_in_order_is_halved(least):
+    """What is proven from some point of it on is found to a 32nd of the way."""
+    way = object.__new__(Consequents)
+    way.free = SimpleNamespace(antecedent=SimpleNamespace(groups=()))
+    way._nearest_at_points = lambda ordered: 0.0 * ordered
+    way._is_proven = lambda local: local >= least
+    local, drawn = way.nearest_proven(1.0)
+    assert local == drawn
+    assert least <= drawn < least + 1.0 / 32.0
 
 
 def test_there_is_always_a_line(rng):

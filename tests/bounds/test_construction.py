@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.optimize import LinearConstraint, minimize
 
-from skanfis.antecedent import GridAntecedent
+from skanfis.antecedent import GridAntecedent, RuleTableAntecedent
 from skanfis.bounds.certified import training_box
 from skanfis.bounds.construction import RuleOrder, is_in_order, nearest_in_order, with_equal_widths
 from skanfis.bounds.enclosure import Enclosure
@@ -201,8 +201,12 @@ def test_the_least_change_that_is_in_order(rng):
         # Of unequal widths shares cross twice; of bells slopes of logarithms are in no order.
         GridAntecedent.build([Gaussian], [0], [np.array([[0.0, 1.0], [0.0, 1.0]])]),
         GridAntecedent.build([Bell], [0], [np.array([[0.0, 1.0], [0.0, 0.0], [1.0, 1.0]])]),
+        # One rule has no term on the input, so that its share may go either way.
+        RuleTableAntecedent.of_own_terms(
+            [Gaussian], {0: np.array([[0.0, 1.0, np.nan], 3 * [0.0]])}
+        ),
     ],
-    ids=["unequal widths", "bells"],
+    ids=["unequal widths", "bells", "no term"],
 )
 def test_where_no_order_is_known_there_is_none(antecedent):
     slopes = np.array([0])

@@ -13,9 +13,9 @@ POLICIES = [("linear", 0.5), ("clip", 0.5), ("linear", np.inf)]
 
 
 def some_boxes(rng, model):
-    """Of all sizes, in and out of the range."""
-    width = model.maximum - model.minimum
-    size = 10.0 ** rng.uniform(-7.0, 0.2, (N_BOXES, 3)) * width
+    """Of all sizes, in and out of the range; on some only rounding errors are left."""
+    width, least = model.maximum - model.minimum, np.repeat([-17.0, -7.0], N_BOXES // 2)
+    size = 10.0 ** rng.uniform(least[:, None], 0.2, (N_BOXES, 3)) * width
     middle = rng.uniform(model.minimum - 0.4 * width, model.maximum + 0.4 * width, (N_BOXES, 3))
     return (middle - 0.5 * size).T, (middle + 0.5 * size).T
 

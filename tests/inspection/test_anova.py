@@ -85,6 +85,14 @@ def test_a_fit_keeps_the_moments_of_every_input_and_its_quantiles(n_rows, rng):
         below = np.searchsorted(z, values, side="right") / z.size
         parts = (np.arange(200) + 0.5) / 200
         assert np.abs(below - parts).max() < (0.2 if n_rows == 25 else 0.02)
+        # Kept of all rows: those next to the places of terms.
+        places = model.antecedent.term_places[model.antecedent.term_inputs == j, None]
+        sides = (
+            np.where(X[:, j] <= places, X[:, j], -np.inf),
+            np.where(X[:, j] > places, X[:, j], np.inf),
+        )
+        expected = np.unique([sides[0].max(axis=1), sides[1].min(axis=1)])
+        assert_allclose(model.seen_values[j][1], expected, rtol=1e-12)
 
 
 def test_of_rules_that_do_not_factor_a_fit_keeps_quantiles():

@@ -38,8 +38,12 @@ class TestMemberships:
             with pytest.raises(ValueError, match="no fuzzy terms, so there is nothing to draw"):
                 MembershipDisplay.from_estimator(model)
             return
-        table = pd.DataFrame(model.memberships())
-        for one in MembershipDisplay.from_estimator(model).inputs:
+        table, X = pd.DataFrame(model.memberships()), rows_of(model, 1.0, 9)
+        display = MembershipDisplay.from_estimator(model, X)
+        for one, axes in zip(display.inputs, display.axes_, strict=True):
+            j = model.input_names.index(one.input_name)
+            assert_array_equal(axes.get_xlim(), [model.minimum[j], model.maximum[j]])
+            assert_array_equal(one.counts, np.histogram(X[:, j], one.edges)[0])
             own = table[table["input"] == one.input_name]
             # Of a cut the side above says all.
             own = own[own["function"] != "sigmoid_falling"]
@@ -106,6 +110,7 @@ class TestSurface:
         n_more = np.unique(display.strongest).size - 1
         assert len(display.ax_.collections) == n_more + len(plain.ax_.collections)
         assert "lines: another rule" in " ".join(display.ax_.get_title(loc="left").split())
+        assert "lines" not in plain.ax_.get_title(loc="left")
         # A single rule has no borders.
         model = MODELS["one rule, order 1, 1 outputs"]
         one = drawn(ResponseSurfaceDisplay.from_estimator(model, show_rules=True))
@@ -182,6 +187,7 @@ def test_a_model_without_data_is_not_said_to_lack_them():
     )
     surface = ResponseSurfaceDisplay.from_estimator(model, grid_resolution=5)
     assert_array_equal(surface.coverage, 1.0)
+    assert "pale" not in surface.ax_.get_title(loc="left")
     assert surface.held == {"rate": pytest.approx((model.minimum[2] + model.maximum[2]) / 2)}
 
 
@@ -238,6 +244,7 @@ def test_every_picture_takes_every_name():
     [
         (None, {}, {"day": "Sat", "wet": "no"}, {"day_Sat"}),
         ("first", {}, {"day": "Sat", "wet": "no"}, {"day_Sat"}),
+        (None, {"day_Sun": 1}, {"day": "Sun", "wet": "no"}, {"day_Sun"}),
         (["Sat", "no"], {}, {"day": "Sat", "wet": "no"}, set()),
         (["Sat", "no"], {"day_Sun": 1}, {"day": "Sun", "wet": "no"}, {"day_Sun"}),
         (["Sat", "no"], {"wet_yes": 1}, {"day": "Sat", "wet": "yes"}, {"wet_yes"}),

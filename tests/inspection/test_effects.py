@@ -60,6 +60,7 @@ def test_both_shares_are_those_of_the_definition(rules, order):
 def test_what_fit_keeps_is_what_its_rows_give(rng):
     X = rng.uniform([250.0, -1e-3, 0.0], [330.0, 1e-3, 5.0], (60, 3))
     y = np.column_stack([np.sin(X[:, 0] / 20.0) + 1e6 * X[:, 1] ** 2 + X[:, 2], X[:, 2]])
+    y *= 0.01
     model, weight = quick(n_mfs=[3, 2, 1]).fit(X, y), np.full(60, 1 / 60)
     scaled = make_pipeline(StandardScaler(), quick(n_mfs=[3, 2, 1])).fit(X, y)
     for k in range(2):
@@ -89,6 +90,7 @@ def test_inputs_that_go_together_are_told(rng):
     found = effects(model, X)
     assert len(found.notes) == 1
     assert found.notes[0].startswith("Inputs go together in the rows, which changes shares: x0 0.")
+    assert "; x1 0." in found.notes[0]
     assert repr(found) == str(found)
     assert str(found).endswith(found.notes[0])
 
@@ -125,6 +127,8 @@ def test_columns_of_one_category_enter_as_one(drop, has_names):
     with pytest.raises(ValueError, match="has the same name as a column that is not in it"):
         effects(fitted, table, groups={fibre: [rate]})
     # A category is called by its name in a group too.
+    named = effects(fitted, table, groups={"sort": [fibre]}).table
+    assert_allclose(named.loc[[rate, "sort"], "sobol"], expected, rtol=0, atol=1e-9)
     assert list(effects(fitted, table, groups={"both": [rate, fibre]}).table.index) == ["both"]
 
 

@@ -93,6 +93,7 @@ def test_a_category_is_drawn_by_its_levels(drop, levels):
         display = drawn(EffectsDisplay.from_estimator(model, table))
         curve = next(one for one in display.curves if one["input"] == "fibre")
         assert curve["levels"] == list(levels)
+        assert_array_equal(curve["edges"], np.arange(len(levels) + 1) - 0.5)
         frequent = X["fibre"].value_counts(normalize=True)[list(levels)]
         assert_allclose(curve["counts"], frequent, atol=1e-9)
         # Along a level the other columns of the category are zero, not at their means.

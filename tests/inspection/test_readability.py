@@ -125,6 +125,9 @@ def test_rules_that_go_different_ways_beyond_chance(rng):
     posterior = replace(model.posterior, consequents=100.0 * model.posterior.consequents)
     unsure = replace(found, model=replace(model, posterior=posterior))
     assert not [one for one in unsure.findings if "ways" in one]
+    for sign in (1.0, -1.0):
+        line = ANFISRegressor(n_mfs=1).fit(X, sign * X["time"] + 0.1 * rng.standard_normal(500))
+        assert not line.readability_.findings
 
 
 def test_errors_name_the_row_and_the_column():

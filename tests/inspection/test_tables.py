@@ -56,6 +56,9 @@ def test_contributions_add_up_to_the_prediction(case):
     assert_allclose(strengths, 1.0, rtol=1e-12)
     said, (low, high) = replace(model, target=None).predict(rows), model.output_limits
     assert (table["if"] == "held").sum() == ((said < low) | (said > high)).sum()
+    is_out = (rows < model.minimum) | (rows > model.maximum)
+    n_lines = is_out.sum() * model.n_outputs if model.out_of_bounds == "linear" else 0
+    assert table["if"].str.startswith("beyond").sum() == n_lines
 
 
 def test_among_these_are_outputs_that_are_held_and_tangents_that_are_taken_elsewhere():

@@ -59,6 +59,11 @@ def test_branches_are_as_thick_as_the_rows_that_take_them():
     # The first two come from the root, which all rows pass.
     assert_allclose(widths[:2].sum(), 2 * 0.6 + 6.0)
     assert_allclose(widths[0], 0.6 + 6.0 * LEADS[:3].sum())
+    # Both from a cut begin where the branch to it ends: half-way between theirs, a step before.
+    paths = np.array([line.get_xydata() for line in lines])
+    starts, ends = (paths[:, k].reshape(-1, 2, 2) for k in (0, -1))
+    assert_allclose(starts, np.repeat(ends.mean(axis=1, keepdims=True) - [1.0, 0.0], 2, axis=1))
+    assert {*map(tuple, starts[1:, 0])} < {*map(tuple, ends.reshape(-1, 2))}
 
 
 def test_cuts_are_called_as_in_the_text(rng):

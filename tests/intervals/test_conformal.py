@@ -91,6 +91,7 @@ def test_units_count_and_not_the_size_of_weights(rng):
     # The ninth of nine scores, and of eight none.
     assert score_quantile(np.arange(9.0), row_masses(9)[0], 0.9) == 8.0
     assert score_quantile(np.arange(8.0), row_masses(8)[0], 0.9) == np.inf
+    assert score_quantile(np.array([0.0, np.nan, np.nan]), row_masses(3)[0], 0.6) == np.inf
 
 
 def hierarchical(rng, n_groups, within):
@@ -114,6 +115,10 @@ def test_quantile_of_groups_is_the_median_of_draws_of_one_row_from_each(rng):
     masses = row_masses(scores.size, groups=np.arange(scores.size))[0]
     found = one_row_per_group(scores, masses, np.arange(scores.size), 0.9)
     assert found == score_quantile(scores, row_masses(scores.size)[0], 0.9)
+    # The fourteenth of 24, though 25 * 0.56 is more than 14 when rounded.
+    scores, masses = np.arange(24.0), np.full(24, 0.04)
+    assert one_row_per_group(scores, masses, np.arange(24), 0.56) == 13.0
+    assert score_quantile(scores, masses, 0.56) == 13.0
 
 
 @pytest.mark.theory
@@ -203,6 +208,30 @@ def test_groups_and_weights_reach_a_regressor_in_a_pipeline(rng):
         assert_allclose(estimator.predict(X), fitted.predict(alone.transform(X)), rtol=1e-12)
 
 
+class Keeping(LinearRegression):
+    def fit(self, X, y):
+        self.rows_ = X
+        return super().fit(X, y)
+
+
+class KeepingGroups(Keeping):
+    def fit(self, X, y, groups):
+        assert len(groups) == len(X)
+        return super().fit(X, y)
+
+
+@pytest.mark.parametrize("regressor", [Keeping(), KeepingGroups()], ids=["without", "with"])
+@pytest.mark.parametrize(("method", "n_models"), [("folds", 5), ("split", 1)])
+def test_groups_are_held_out_whole_and_told_to_who_takes_them(method, n_models, regressor, rng):
+    X, y = bent(rng, 60)
+    model = ConformalRegressor(regressor, method=method, scaled=False)
+    model.fit(X, y, groups=np.arange(60) // 12)
+    trained = model.estimators_ or [model.estimator_]
+    assert len(trained) == n_models  # folds are no more than groups
+    for one in trained:
+        assert set(np.isin(X, one.rows_).reshape(5, 12).mean(axis=1)) == {0.0, 1.0}
+
+
 RULES = ANFISRegressor(n_mfs=1, alpha=0.1)
 
 
@@ -231,7 +260,7 @@ class NeverFitted(BayesianRidge):
             {},
         ),
         ("not have: use scaled=False", {"estimator": LinearRegression()}, {}),
-        ("every row must be held out once", {"cv": ShuffleSplit(2, random_state=0)}, {}),
+        (r"row 0 0 times; every row must be held", {"cv": ShuffleSplit(2, random_state=0)}, {}),
         ("An iterator can be used once only", {"cv": iter([])}, {}),
         (
             "holds out row 3 and trains on its group; a model may not have seen",
@@ -249,7 +278,10 @@ class NeverFitted(BayesianRidge):
             {"estimator": make_pipeline(StandardScaler(), RULES)},
             {"sample_weight": np.ones(24)},
         ),
-        ("Negative values in sample_weight", {}, {"sample_weight": -np.ones(24)}),
+        (
+            *("Negative values in sample_weight", {"estimator": NeverFitted()}),
+            {"sample_weight": -np.ones(24)},
+        ),
         (r"n_jobs.*\[1, inf\)", {"n_jobs": 0}, {}),
     ],
 )
@@ -267,7 +299,7 @@ def test_levels_and_missing_numbers_are_refused_by_name():
     for name in ("y", "drift"):
         bad = pd.Series(np.where(np.arange(24) == 3, np.nan, y), name=name)
         with pytest.raises(ValueError, match=f"y contains NaN in column '{name}', first at row 3"):
-            ConformalRegressor(RULES).fit(X, bad)
+            ConformalRegressor(NeverFitted()).fit(X, bad)
     model = ConformalRegressor(RULES, cv=4).fit(X, y)
     with pytest.raises(ValueError, match=r"coverage=90 must be a number between 0 and 1"):
         model.predict_interval(X, 90)
@@ -277,6 +309,7 @@ def test_levels_and_missing_numbers_are_refused_by_name():
     assert model.n_units_ == 12
     # By default it is every group that counts.
     assert_array_equal(model.predict_interval(X, 0.7), model.predict_interval(X, 0.7, 0.7))
+    assert np.isfinite(model.predict_interval(X, 0.7, 12 / 13)).all()
     with pytest.raises(ValueError, match="confidence='all' must be a number between 0 and 1"):
         model.predict_interval(X, confidence="all")
     with pytest.raises(ValueError, match=r"confidence=0\.95 needs 19 groups or more; there are 12"):
