@@ -97,7 +97,7 @@ _POSTERIOR = ["noise", "inputs", "consequents", "premises", "cross", "pinned"]
 
 def parse_json(text):
     """The model that a JSON text describes; ValueError if it is none."""
-    return model_of(json.loads(text, parse_constant=_refuse, object_pairs_hook=_without_repetition))
+    return model_of(json.loads(text, object_pairs_hook=_without_repetition))
 
 
 def model_of(document):
@@ -143,10 +143,6 @@ def model_of(document):
 def key_of(parameter):
     """The name in the file of one parameter of a term."""
     return parameter.name if parameter.kind == "location" else f"log_{parameter.name}"
-
-
-def _refuse(constant):
-    raise ValueError(f"{constant} is not a number of JSON; every number must be finite.")
 
 
 def _without_repetition(pairs):
