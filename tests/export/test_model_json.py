@@ -174,6 +174,11 @@ NO_TREE = [
     (_set("rules", 5, "terms", [5, 6, 9]), "the paths are no tree"),
     (_set("rules", 5, "terms", [9, 1, 5]), "the paths are no tree"),
     (_idle, "the paths are no tree"),
+    # A rule is gone, and its weight another's: a cut has one side.
+    (
+        lambda d: d["rules"][0].update(weight=d["rules"][0]["weight"] + d["rules"].pop()["weight"]),
+        "the paths are no tree",
+    ),
 ]
 A_TABLE = MODELS["rule table, order 1, 1 outputs"]
 
