@@ -70,14 +70,13 @@ _positive = partial(number, lowest=SMALLEST_NUMBER)
 _not_negative = partial(number, lowest=0.0)
 _log = partial(number, lowest=-float(np.log(LARGEST_NUMBER)), highest=float(np.log(LARGEST_NUMBER)))
 _FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
-    "format": partial(_one_of, (FORMAT,)),
-    "version": _whole(1, VERSION),
+    # These are checked by themselves.
+    **dict.fromkeys(["format", "version", "posterior"], lambda value, where: value),
     "out_of_bounds": partial(_one_of, OUT_OF_BOUNDS),
     "max_extrapolation": _or_null(_not_negative, inf),
     "rule_base": partial(_one_of, tuple(KINDS.values())),
     "terms": _list_or_empty,
     "support": _or_null(_list),
-    "posterior": lambda value, where: value,
 }
 INPUT = {
     "name": _text,
