@@ -207,7 +207,7 @@ def _columns_after(label, step, columns):
         return [
             column
             for name, part, chosen in step.transformers_
-            if not (isinstance(part, str) and part == "drop")
+            if part != "drop"
             for column in _columns_after(name, part, [columns[j] for j in _chosen(chosen, step)])
         ]
     units = _offsets_and_scales(label, step, len(columns))

@@ -70,14 +70,13 @@ _positive = partial(number, lowest=SMALLEST_NUMBER)
 _not_negative = partial(number, lowest=0.0)
 _log = partial(number, lowest=-float(np.log(LARGEST_NUMBER)), highest=float(np.log(LARGEST_NUMBER)))
 _FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
-    "format": partial(_one_of, (FORMAT,)),
-    "version": _whole(1, VERSION),
+    # These are checked by themselves.
+    **dict.fromkeys(["format", "version", "posterior"], lambda value, where: value),
     "out_of_bounds": partial(_one_of, OUT_OF_BOUNDS),
     "max_extrapolation": _or_null(_not_negative, inf),
     "rule_base": partial(_one_of, tuple(KINDS.values())),
     "terms": _list_or_empty,
     "support": _or_null(_list),
-    "posterior": lambda value, where: value,
 }
 INPUT = {
     "name": _text,
@@ -97,7 +96,7 @@ _POSTERIOR = ["noise", "inputs", "consequents", "premises", "cross", "pinned"]
 
 def parse_json(text):
     """The model that a JSON text describes; ValueError if it is none."""
-    return model_of(json.loads(text, parse_constant=_refuse, object_pairs_hook=_without_repetition))
+    return model_of(json.loads(text, object_pairs_hook=_without_repetition))
 
 
 def model_of(document):
@@ -143,10 +142,6 @@ def model_of(document):
 def key_of(parameter):
     """The name in the file of one parameter of a term."""
     return parameter.name if parameter.kind == "location" else f"log_{parameter.name}"
-
-
-def _refuse(constant):
-    raise ValueError(f"{constant} is not a number of JSON; every number must be finite.")
 
 
 def _without_repetition(pairs):

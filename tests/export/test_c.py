@@ -11,9 +11,11 @@ import pytest
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import RobustScaler
 
+from skanfis.antecedent import RuleTableAntecedent, TreeAntecedent
 from skanfis.bounds import bounds
 from skanfis.export import export_c
-from skanfis.export.c.dialect import STATUS
+from skanfis.export.c.dialect import STATUS, Dialect
+from skanfis.export.c.source import Source
 from skanfis.learning import VariableProjection
 from skanfis.membership import MEMBERSHIPS, Gaussian
 from skanfis.options import LinearExtrapolation
@@ -137,6 +139,29 @@ def test_tangents_of_far_inputs_are_found_at_their_medians(tmp_path):
     ((found, _),) = evaluate_all([code], Z, tmp_path, "c99", [1], flags=[])
     wanted = model.predict(Z.astype(float))
     assert np.abs(found - wanted).max() < 1e-5 * full_scale(wanted)
+
+
+@pytest.mark.theory
+@needs_compiler
+@pytest.mark.parametrize("dtype", TOLERANCE)
+def test_digits_stay_at_a_foot_and_far_from_a_steep_cut(dtype, tmp_path):
+    plain = {"offset": np.zeros(3), "scale": np.ones(3), "out_of_bounds": "linear"}
+    # At the edge, 1.5, the second of two triangles alone is active, and all but zero.
+    theta = np.array([[-1.0, 0.5], [0.0, 0.0], [0.0, np.log(1.0 + 1e-4)]])
+    triangles = random_grid(np.random.default_rng(0), [MEMBERSHIPS["triangular"]], [2], [0])
+    # The exponential of 2,000 widths is no number.
+    steep = TreeAntecedent.build([], np.empty((2, 0)), [[]]).split(0, 0, 0.6, np.log(1e-3))
+    models = [build(one, **plain) for one in (triangles.with_parameters(theta.ravel()), steep)]
+    Z = np.random.default_rng(1).uniform(-1.5, 1.5, (300, 3)).astype(NUMPY[dtype])
+    Z[:100, 0] += 3.0
+    Z[100:200, 0] -= 0.5
+    codes = [export_c(model, name=f"m{i}", dtype=dtype) for i, model in enumerate(models)]
+    answers = evaluate_all(codes, Z, tmp_path, "c99", [1, 1], flags=[])
+    for model, (found, _) in zip(models, answers, strict=True):
+        wanted = model.predict(Z.astype(float))
+        # Of a cut, rows are near by its width in one of a hundred: a float's last bit counts there.
+        far = np.abs(Z[:, 0] - 0.6) > 0.02
+        assert np.abs(found - wanted)[far].max() < TOLERANCE[dtype] * full_scale(wanted)
 
 
 def test_the_short_form_leaves_the_files_out():
@@ -333,6 +358,13 @@ def test_self_test_passes_where_a_range_is_as_narrow_as_rounding(tmp_path):
     rows = np.array([[low[0], 4.0, low[2]], [low[0], np.nextafter(high[1], 5.0), low[2]]])
     ((_, status),) = evaluate_all([code], rows, tmp_path, "c99", [1])
     assert (status & STATUS["OUT_OF_RANGE"]).tolist() == [0, STATUS["OUT_OF_RANGE"]]
+
+
+def test_positions_of_many_rules_need_more_than_an_int_of_16_bits():
+    for n_rules, kind in ((32767, "int"), (32768, "long")):
+        model = build(RuleTableAntecedent((), np.empty((n_rules, 0), dtype=int)), order=0)
+        source = Source(model, Dialect("m", "double", "c99"), min_coverage=None)
+        assert f"    {kind} i, r, o;\n" in source.body()
 
 
 HOSTILE = [

@@ -58,6 +58,8 @@ def test_means_what_was_written_by_hand():
         ([2, 0, 2], [(1, 0, 1), (1, 0, 2), (2, 0, 1), (2, 0, 2)], GridAntecedent),
         ([2, 2], [(1, 1), (2, 2)], RuleTableAntecedent),
         ([2, 2], [(1, 1), (1, 2), (2, 1)], RuleTableAntecedent),
+        ([2, 2], [(0, 1), (0, 2), (1, 1), (2, 2)], RuleTableAntecedent),  # some leave one out
+        ([1, 2], [(1, 1), (1, 2)], RuleTableAntecedent),
     ],
 )
 def test_rule_base_is_of_the_kind_that_suits_and_means_the_same(n_terms, rules, kind, rng):
@@ -77,6 +79,7 @@ REFUSED = [
     ("DefuzzMethod=", "DefuzzMethod='wtsum'", "only the weighted average"),
     ("AndMethod=", "AndMethod='min'", "only the product"),
     ("NumInputs=", "NumInputs=two", "a whole number, found 'two'"),
+    ("NumInputs=", "NumInputs=0", "0 is below 1"),
     ("NumInputs=", "NumInputs=\N{ARABIC-INDIC DIGIT TWO}", "a whole number"),
     ("Version=", "Verzion=2.0", r"\[System\] has the unknown key 'Verzion'"),
     ("Version=", "Type='sugeno'", "'Type' for the second time"),
@@ -119,6 +122,11 @@ REFUSED_ELSEWHERE = [
 def test_refuses(old, new, message):
     with pytest.raises(ValueError, match=message):
         parse_fis(with_line(old, new)[0])
+
+
+def test_refuses_a_file_of_nothing_but_comments():
+    with pytest.raises(ValueError, match=r"line 1: the file has no \[System\]"):
+        parse_fis("% nothing\n\n")
 
 
 def test_reads_utf_8_with_and_without_mark_and_no_other_encoding(tmp_path):

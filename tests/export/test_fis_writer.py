@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
+from skanfis.antecedent import RuleTableAntecedent
 from skanfis.export import export_fis
 from skanfis.export.fis.reader import parse_fis
 from skanfis.membership import MEMBERSHIPS
@@ -85,6 +86,18 @@ def test_what_is_written_can_be_read_or_is_refused(family, scale, rng):
     rows = rows_of(moved, 1.0)
     found = parse_fis(text).predict(rows)
     assert_allclose(found, moved.predict(rows), rtol=1e-9, atol=1e-9 * np.abs(found).max())
+
+
+def test_a_rule_that_asks_nothing_is_given_a_condition_that_always_holds():
+    table = MODELS["rule table, order 1, 1 outputs"].antecedent
+    asked = table.rule_terms.copy()
+    asked[1] = -1
+    model = build(RuleTableAntecedent(table.groups, asked))
+    text = export_fis(model)
+    # Other programs take no rule without a condition.
+    assert "\n0 0 0, " not in text
+    rows = rows_of(model, 1.0, 200)
+    assert_allclose(parse_fis(text).predict(rows), model.predict(rows), atol=1e-9)
 
 
 def test_says_that_constraints_hold_in_the_range_alone():

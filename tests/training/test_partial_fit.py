@@ -174,6 +174,16 @@ def test_first_call_is_a_fit_and_premises_stay(order):
     assert not hasattr(model, "n_samples_seen_")
 
 
+def test_the_penalty_that_the_first_fit_found_stays():
+    """Its pulls too: rows of hardly any weight leave the model as it was."""
+    X, y = surface(200)
+    model = ANFISRegressor(n_mfs=[3, 2], solver="lse").partial_fit(X, y)
+    assert len(model.pulls_) > 1
+    before = model.predict(X)
+    model.partial_fit(X[:5], y[:5], sample_weight=np.full(5, 1e-8))
+    assert np.abs(model.predict(X) - before).max() < 1e-6 * np.ptp(y)
+
+
 def test_after_fit_premises_stay_and_rows_are_new(premises):
     model = deepcopy(premises)
     with pytest.warns(ForgottenRowsWarning, match="no sums over its 300 rows"):
