@@ -15,7 +15,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
-from ..digits import counted
+from ..digits import counted, percent
 from ..exceptions import OutOfBoundsWarning
 from ._checks import LARGEST_AT_REST, find_glitches
 from ._columns import RATE_UNITS, SIGNALS, ask
@@ -36,6 +36,7 @@ _ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 12
 # The model's name in a verdict, and the gain that a compensation must exceed to be worth having.
 _MODEL, _LEAST_GAIN = "this model", 1.02
 _CONFIDENCE = 0.95
+_MUCH_DELAYED = 0.1  # of the squared error that is left
 # Errors below this part of the uncompensated one are rounding: they count as equal.
 _ROUNDING = 1e-9
 
@@ -152,7 +153,36 @@ class Calibration:
                     f"the compensation makes held-out rows {where} worse, from {was:.4g} to "
                     f"{became:.4g} {unit} RMS."
                 )
+        left = np.where(self.inside, self.after - self.rate, np.nan)
+        rows, part = delay(self.log, left)
+        if part > _MUCH_DELAYED:
+            when = "late" if rows > 0.0 else "early"
+            found.append(
+                f"{percent(part)} of the squared error that is left follows the change of the rate "
+                f"from row to row, as if the output came some {abs(rows):.2g} rows {when}: align "
+                "the two columns, or drop the rows while the rate changes."
+            )
         return found + self.glitches
+
+
+def delay(log, left):
+    """How many rows late the output seems to be, and the part of the squares ``left`` it explains.
+
+    A delay of d rows leaves -d times the slope of the rate from row to row. Noise of the rate
+    itself leaves its curvature, which is taken off before.
+    """
+    rate = log["rate"]
+    groups = rate.groupby(log["run"], observed=True) if "run" in log else rate
+    earlier, later = groups.shift(1), groups.shift(-1)
+    parts = [left, 0.5 * (later - earlier), earlier + later - 2.0 * rate]
+    known = np.isfinite(parts).all(axis=0)
+    left, slope, curvature = (np.asarray(part)[known] for part in parts)
+    size = curvature @ curvature or 1.0
+    left, slope = (each - curvature * (curvature @ each / size) for each in (left, slope))
+    both, own = left @ slope, slope @ slope
+    if own == 0.0:
+        return 0.0, 0.0
+    return -both / own, both**2 / (own * (left @ left))
 
 
 def calibrate(log, split, recipe, tell, name_row="row {}".format):

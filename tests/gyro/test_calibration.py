@@ -3,10 +3,11 @@
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from skanfis.gyro import _calibration
-from skanfis.gyro._calibration import Recipe, fit_model
+from skanfis.gyro._calibration import Recipe, delay, fit_model
 from skanfis.gyro._headline import errors_and_verdict, formula_of, headline
 from skanfis.gyro.compose import rules_of
 from skanfis.gyro.metrics import rms
@@ -170,3 +171,44 @@ def test_rules_are_for_what_the_law_leaves():
     # An amplitude that is curved in temperature.
     curved = X.assign(output=X["output"] * (1 - 2e-5 * (X["temperature"] - 25.0) ** 2))
     assert rules_of(fit_model(curved, rate, groups, recipe))[-1].n_rules_ == 1
+
+
+def in_steps(n_runs=4, n_levels=15, n_rows=8):
+    """Rates of runs that step from level to level."""
+    rate = np.random.default_rng(0).uniform(-50.0, 50.0, n_runs * n_levels).repeat(n_rows)
+    return pd.DataFrame({"run": np.arange(n_runs).repeat(n_levels * n_rows), "rate": rate})
+
+
+def delayed(log, rows):
+    """The rates ``rows`` rows before, those at the ends of a run held."""
+    place = np.arange(len(log) // log["run"].nunique())
+    parts = (np.interp(place - rows, place, own) for _, own in log.groupby("run")["rate"])
+    return np.concatenate(list(parts))
+
+
+@pytest.mark.parametrize("rows", [1.0, -1.0, 0.25])
+def test_a_delay_is_told_from_noise_of_the_rate(rng, rows):
+    log = in_steps()
+    noise = 0.01 * rng.normal(size=(2, len(log)))
+    found, part = delay(log, delayed(log, rows) - log["rate"].to_numpy() + noise[0])
+    assert found == pytest.approx(rows, abs=1e-3)
+    assert part > 0.99
+    known = log.assign(rate=log["rate"] + 0.1 * noise[1])
+    assert delay(known, -0.1 * noise[1])[1] < 0.05
+    assert delay(log.assign(rate=3.0), noise[0]) == (0.0, 0.0)
+
+
+def test_a_delay_is_a_caution(rng):
+    log = in_steps().assign(temperature=lambda log: rng.uniform(0.0, 50.0, len(log)))
+    told = [
+        calibrated(log.assign(output=delayed(log, rows) + NOISE * rng.normal(size=len(log))))
+        for rows in (0.0, 0.02)
+    ]
+    sound, late = (calibration.cautions() for calibration in told)
+    assert sound == []
+    (sentence,) = (sentence for sentence in late if "from row to row" in sentence)
+    assert sentence.endswith(
+        "% of the squared error that is left follows the change of the rate from row to row, as if "
+        "the output came some 0.02 rows late: align the two columns, or drop the rows while the "
+        "rate changes."
+    ), sentence
