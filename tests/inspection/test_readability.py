@@ -28,7 +28,7 @@ def found_of(model, **changes):
     found = readability(model, X, y)
     ones, rows = np.ones(model.n_outputs), changes.pop("rule_rows", np.full(model.n_rules, 50.0))
     passing = {"alone": 0.5 * ones, "errors": ones, "printed_errors": ones}
-    passing["rule_spreads"] = found.measures.rule_errors / 1.05
+    passing["rule_spreads"] = found.measures.rule_errors / 1.0499
     measures = replace(found.measures, **(passing | changes))
     return replace(found, model=replace(model, rule_rows=rows), measures=measures)
 
