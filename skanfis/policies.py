@@ -1,4 +1,8 @@
-"""Predictions outside the range of the training data: the policies, and limits of outputs."""
+"""Policies outside the range of the training data: names, words and checks; limits of outputs.
+
+``TSKModel`` answers by them. Exports, bounds and tables follow it by the policy's name. A name that
+they have no line for they take for "clip", so a new policy takes a line in each of them.
+"""
 
 import math
 from dataclasses import dataclass
@@ -94,7 +98,7 @@ def policy_in_words(policy: str, max_extrapolation: float) -> str:
     )
 
 
-def check_policy(policy, max_extrapolation):
+def check_policy(policy, max_extrapolation="auto"):
     """Raise ValueError where there is no such policy, or no such limit."""
     if policy not in OUT_OF_BOUNDS:
         raise ValueError(f"out_of_bounds={policy!r} must be one of {', '.join(OUT_OF_BOUNDS)}.")
