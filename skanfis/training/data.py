@@ -64,7 +64,10 @@ class ValidatedData:
 
 
 def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
-    """The data, checked, without rows of weight zero; ``is_chunk`` if other chunks may precede."""
+    """The data, checked, without rows of weight zero; ``is_chunk`` if other chunks may precede.
+
+    The estimator is told of the columns, and whether y has one dimension, unless a chunk did so.
+    """
     refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
     is_first = not (is_chunk and hasattr(estimator, "model_"))
     X, y = as_frame(X), as_frame(y)
