@@ -1,8 +1,4 @@
-"""Policies outside the range of the training data: names, words and checks; limits of outputs.
-
-``TSKModel`` answers by them. Exports, bounds and tables follow it by the policy's name. A name that
-they have no line for they take for "clip", so a new policy takes a line in each of them.
-"""
+"""Policies outside the range of the training data: names, words and checks; limits of outputs."""
 
 import math
 from dataclasses import dataclass
@@ -14,6 +10,7 @@ from .digits import told_apart
 
 # A column that varies by less than this part of its size varies by rounding errors only.
 ROUNDING = 16.0 * np.finfo(float).eps
+# ``TSKModel`` answers by these names; docs/layers.rst says what else does, and needs a new one.
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # The policies that give no value.
 SILENT = ("nan", "raise")

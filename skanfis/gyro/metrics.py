@@ -71,11 +71,7 @@ class _Figure(NamedTuple):
 
 
 def figures_of_merit(full_scale=1.0):
-    """All figures but those of Allan, in the order of the report.
-
-    By their names, ``LARGEST_VALUES`` and ``SIZES_WITH_NOISE`` say how an interval is found,
-    ``_options`` of which more is better, and ``html_report`` what the standards call them.
-    """
+    """All figures but those of Allan, in the order of the report."""
     rates, residual = ("rate", "output"), ("residual",)
     heat, ramp = "temperature", "temperature_rate"
     largest, root = (partial(_nonlinearity, full_scale=full_scale, size=s) for s in (_peak, rms))

@@ -64,10 +64,7 @@ class ValidatedData:
 
 
 def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
-    """The data, checked, without rows of weight zero; ``is_chunk`` if other chunks may precede.
-
-    The estimator is told of the columns, and whether y has one dimension, unless a chunk did so.
-    """
+    """The data, checked, without rows of weight zero; ``is_chunk`` if other chunks may precede."""
     refuse_lazy(X=X, y=y, sample_weight=sample_weight, groups=groups)
     is_first = not (is_chunk and hasattr(estimator, "model_"))
     X, y = as_frame(X), as_frame(y)
@@ -85,6 +82,7 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
         )
     check_consistent_length(X, y)
     if is_first:
+        # Kept on the estimator, as ``validate_data`` keeps the number and the names of columns.
         estimator._single_output = y.ndim == 1
     targets = y.reshape(-1, 1) if y.ndim == 1 else y
     output_names = target_names(given, targets.shape[1])
