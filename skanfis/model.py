@@ -1,4 +1,4 @@
-r"""The trained model, frozen and in the user's units: all solvers return it, all else reads it.
+r"""The trained model, frozen and in the user's units: every fit ends in it, all else reads it.
 
 A first-order Takagi-Sugeno-Kang model (Jang 1993),
 

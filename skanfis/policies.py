@@ -1,4 +1,4 @@
-"""Predictions outside the range of the training data: the policies, and limits of outputs."""
+"""Policies outside the range of the training data: names, words and checks; limits of outputs."""
 
 import math
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ from .digits import told_apart
 
 # A column that varies by less than this part of its size varies by rounding errors only.
 ROUNDING = 16.0 * np.finfo(float).eps
+# ``TSKModel`` answers by these names; docs/layers.rst says what else does, and needs a new one.
 OUT_OF_BOUNDS = ("clip", "linear", "nan", "raise")
 # The policies that give no value.
 SILENT = ("nan", "raise")
@@ -94,7 +95,7 @@ def policy_in_words(policy: str, max_extrapolation: float) -> str:
     )
 
 
-def check_policy(policy, max_extrapolation):
+def check_policy(policy, max_extrapolation="auto"):
     """Raise ValueError where there is no such policy, or no such limit."""
     if policy not in OUT_OF_BOUNDS:
         raise ValueError(f"out_of_bounds={policy!r} must be one of {', '.join(OUT_OF_BOUNDS)}.")

@@ -35,6 +35,7 @@ from .model import TSKModel
 from .naming import given_term_names
 from .options import EarlyStopping, Huber, LinearExtrapolation, policy_of
 from .policies import OUT_OF_BOUNDS
+from .search.candidates import KINDS
 from .training import Callbacks, chunk_checks, fit_rules, model_without_rules, validated
 from .training.chunks import RowSums, fitted_weights, inputs_with_slopes, solve
 from .training.data import NUMERIC, Fitted
@@ -206,7 +207,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
     _parameter_constraints: ClassVar[dict] = {
         "n_mfs": [StrOptions({"auto"}), Integral, "array-like"],
         "partition": [
-            StrOptions({"auto", "grid", "scattered", "tree"}),
+            StrOptions({"auto", *KINDS}),
             HasMethods(["fit", "fit_predict"]),
             HasMethods(["predict", "strengths"]),
         ],

@@ -11,6 +11,7 @@ import pytest
 
 from skanfis import ANFISRegressor
 from skanfis.export.fis.functions import function_of
+from skanfis.gyro.metrics import ALLAN_FIGURES, figures_of_merit
 from skanfis.inspection.readability import GREATEST_ALONE, GREATEST_ERROR
 from skanfis.membership import FAMILIES, MEMBERSHIPS
 
@@ -114,6 +115,15 @@ def test_every_family_is_on_the_page():
     for family in MEMBERSHIPS.values():
         assert f'``"{family.name}"``' in page
         assert all(parameter.name in page for parameter in family.parameters)
+
+
+def test_every_figure_of_merit_is_on_the_page():
+    """By its name, or by the ending alone, as in "residual_rms, _peak"."""
+    page = (DOCS / "gyro_metrics.rst").read_text(encoding="utf-8")
+    told = re.findall(r"\w+", "\n".join(line[:37] for line in page.splitlines()))
+    endings = tuple(word for word in told if word.startswith("_"))
+    for name in [*(figure.name for figure in figures_of_merit()), *ALLAN_FIGURES]:
+        assert name in told or name.endswith(endings), name
 
 
 def run(block, capsys):

@@ -29,7 +29,7 @@ _COSTLY, _WORTH_A_WARNING = 1.02**2, 1.1**2
 _OF_MARGINS = 1e-8  # squared error, in variances of the target, that margins alone may cost
 
 
-def constrained(model: TSKModel, evaluation, problem, constraints: Constraints, rows):
+def proven_consequents(model: TSKModel, evaluation, problem, constraints: Constraints, rows):
     """The consequents nearest to those of an evaluation that provably keep all constraints.
 
     Returns these, in the user's units like ``model``; the evaluation of the free consequents at the

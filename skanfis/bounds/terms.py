@@ -37,6 +37,7 @@ EPS = float(np.finfo(float).eps)
 ROUNDINGS = 32.0
 _SIDES, _PRODUCTS = tuple(SIDES.values()), tuple(PRODUCTS.values())
 _ONE_SIDED = (SShaped, ZShaped)
+# Families that are not log-concave. All others count as such, also those that no line here names.
 _TURNING = (Triangular, Trapezoidal, PiShaped, *_ONE_SIDED, Bell)
 # The t at which the logarithm of a floored flank is steepest, to the last bit: for the straight one
 # just before the foot; for two parabolas where 2 (1 - t)^2 is about as large as the floor.

@@ -184,7 +184,7 @@ FORMULAS = {FAMILIES[name]: Formula(*pair) for name, pair in _BY_NAME.items()}
 
 
 def check_own(family):
-    """Raise ValueError for a family that is not of this package, even if it has the same name."""
+    """Raise ValueError for a family without a formula here, even if one here has the same name."""
     if family not in FORMULAS:
         raise ValueError(
             f"Memberships of the class {family.__name__!r} cannot be exported; those of skanfis' "

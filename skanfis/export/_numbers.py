@@ -63,13 +63,13 @@ class Numbers:
         self.offset = _rounded(offset, dtype, "a typical value of", names=model.output_names)
         # A slope matters by what it adds to an output over the box, not by its size.
         adds = np.abs(coefficients) * np.append(1.0, (model.maximum - model.minimum)[slopes])
-        counts = adds > np.finfo(dtype).eps * adds.max(axis=(0, 2), keepdims=True)
-        self.consequents = _rounded(coefficients, dtype, "a consequent", counts)
+        matters = adds > np.finfo(dtype).eps * adds.max(axis=(0, 2), keepdims=True)
+        self.consequents = _rounded(coefficients, dtype, "a consequent", matters)
         # How far the tangent is followed in each input; limited so that the sum stays finite.
         end = float(np.finfo(dtype).max)
         with np.errstate(over="ignore"):
             reach = min(model.max_extrapolation, 0.25 * end / model.n_inputs) * model.spread
-        self.reach = _rounded(np.minimum(reach, end), dtype, "a reach", counts=False)
+        self.reach = _rounded(np.minimum(reach, end), dtype, "a reach", matters=False)
         # The tangent of group g is found with inputs of groups 0 and g at the row, all others at
         # ``tangent_at``, relative to the reference. None if no input is held at ``tangent_at``.
         self.tangent_group = None
@@ -107,16 +107,16 @@ def _check_apart(low, high, model):
         )
 
 
-def _rounded(values, dtype, what, counts=None, names=()):
+def _rounded(values, dtype, what, matters=None, names=()):
     """Values in a type; numbers that would be subnormal, with fewer digits, become zero.
 
-    ValueError if this happens to a value that ``counts`` (default: the largest), or if a value is
+    ValueError if this happens to a value that ``matters`` (default: the largest), or if one is
     too large for the type. ``names`` are those of the columns that the values are of, if any.
     """
     values, sizes = np.asarray(values, dtype=float), np.abs(values)
     least, most = float(np.finfo(dtype).tiny), float(np.finfo(dtype).max)
-    counts = sizes == sizes.max(initial=0.0) if counts is None else counts
-    lost = (sizes > most) | (counts & (sizes > 0.0) & (sizes < least))
+    matters = sizes == sizes.max(initial=0.0) if matters is None else matters
+    lost = (sizes > most) | (matters & (sizes > 0.0) & (sizes < least))
     if lost.any():
         name, way_out = "Double precision", "Scale the data."
         if dtype == np.float32:

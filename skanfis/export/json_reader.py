@@ -1,7 +1,8 @@
 """Read a model from JSON, and check every entry.
 
 What an object must hold is a table: under each key the function that checks its value, given the
-value and its place in the file.
+value and its place in the file. A new member has a line there and in ``export_json``; ``VERSION``
+then rises by one, and a function such as ``_of_version_1`` gives older documents its value.
 """
 
 import json
@@ -27,9 +28,9 @@ from ..support import RuleSupport
 from .limits import LARGEST_NUMBER, SMALLEST_NUMBER, check_size, number, numbers, shown
 
 FORMAT = "skanfis-model"
-# Version 1 had no trees.
+# Version 1 had no trees, and other members: see ``_of_version_1``.
 VERSION = 2
-KINDS: dict[type[Antecedent], str] = {
+RULE_BASES: dict[type[Antecedent], str] = {
     GridAntecedent: "grid",
     RuleTableAntecedent: "table",
     TreeAntecedent: "tree",
@@ -74,7 +75,7 @@ _FILE = dict.fromkeys(["inputs", "outputs", "rules"], _list) | {
     **dict.fromkeys(["format", "version", "posterior"], lambda value, where: value),
     "out_of_bounds": partial(_one_of, OUT_OF_BOUNDS),
     "max_extrapolation": _or_null(_not_negative, inf),
-    "rule_base": partial(_one_of, tuple(KINDS.values())),
+    "rule_base": partial(_one_of, tuple(RULE_BASES.values())),
     "terms": _list_or_empty,
     "support": _or_null(_list),
 }
@@ -178,7 +179,7 @@ def _check_all(holds, message):
 
 
 def _of_version_1(document):
-    """The document in the present form: with ``tangent_at``, and a triangle as one list."""
+    """The document in the present form: with ``tangent_at``, ``pinned``, a triangle as one list."""
     found = dict(document)
     if isinstance(found.get("inputs"), list):
         no_tangent = {"tangent_at": None}

@@ -14,7 +14,7 @@ import numpy as np
 from ..model import TSKModel
 from ._families import check_own
 from .folding import fold
-from .json_reader import FORMAT, INPUT, KINDS, OUTPUT, VERSION, key_of, model_of, parse_json
+from .json_reader import FORMAT, INPUT, OUTPUT, RULE_BASES, VERSION, key_of, model_of, parse_json
 from .limits import MOST_BYTES, read_bytes
 
 
@@ -67,7 +67,7 @@ def export_json(
         "outputs": _items(name=model.output_names, **of_outputs),
         "out_of_bounds": model.out_of_bounds,
         "max_extrapolation": _or_null(model.max_extrapolation),
-        "rule_base": KINDS[type(model.antecedent)],
+        "rule_base": RULE_BASES[type(model.antecedent)],
         "terms": list(_terms(model)),
         "rules": _items(
             terms=model.antecedent.rule_terms,

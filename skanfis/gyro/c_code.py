@@ -22,7 +22,6 @@ from ..export.c.dialect import (
     Dialect,
     check_arguments,
     kept_lines,
-    remark,
     status_word,
     table_bytes,
     write_files,
@@ -298,7 +297,6 @@ def _header(whole, dialect, price, units, notes):
             beyond = f"Outside this range {LAW_GOES_ON}."
     what += rules if model.coefficients.any() else ""
     lines = [
-        *map(remark, [notes] if isinstance(notes, str) else notes),
         f"{what}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(price, "" if whole.is_cubic else "an arcsine, "),
         "",
@@ -314,7 +312,7 @@ def _header(whole, dialect, price, units, notes):
         lines.append(f"A row is flagged as uncovered below a coverage of {part.min_coverage:g}.")
     title = "A cubic" if whole.is_cubic else "An arcsine law"
     title += " and Takagi-Sugeno-Kang fuzzy rules" if model.n_rules > 1 else ""
-    return header_of(title, lines, dialect, len(whole.names), 1)
+    return header_of(title, notes, lines, dialect, len(whole.names), 1)
 
 
 def _cost(whole):

@@ -17,7 +17,7 @@ from sklearn.exceptions import ConvergenceWarning
 from sklearn.utils.validation import check_is_fitted, check_scalar, validate_data
 
 from ..exceptions import ConstantInputWarning, OutOfBoundsWarning
-from ..policies import OUT_OF_BOUNDS, SILENT
+from ..policies import SILENT, check_policy
 from ._columns import column_position
 
 HIGHEST_DEGREE = 5
@@ -256,10 +256,7 @@ def check_parameters(law):
         check_scalar(getattr(law, name), name, (int, np.integer), min_val=0, max_val=HIGHEST_DEGREE)
     real, ends = (float, int, np.floating), {"min_val": 0.0, "max_val": np.pi / 2.0}
     check_scalar(law.max_phase, "max_phase", real, **ends, include_boundaries="neither")
-    if law.out_of_bounds not in OUT_OF_BOUNDS:
-        raise ValueError(
-            f"out_of_bounds={law.out_of_bounds!r} must be one of {', '.join(OUT_OF_BOUNDS)}."
-        )
+    check_policy(law.out_of_bounds)
 
 
 def phase_of(law, X):

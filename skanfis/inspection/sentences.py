@@ -1,4 +1,4 @@
-r"""The sentences of the rules: all of their numbers, in the digits that matter.
+r"""The numbers in the rules' sentences, in the digits that matter; ``text`` has the words.
 
 Every rule r has a centre c_r, the mean of the training rows weighted by its strength, and says
 

@@ -101,6 +101,7 @@ class SeparableProblem:
     ``antecedent`` is the rule base at the start; the consequents' local basis is fixed by it.
     ``map_ordered`` is ``map``, or a function that spreads chunks over workers and keeps results in
     order. ``consequent_inputs`` are the inputs that the consequents are linear in, all by default.
+    ``n_rows`` counts rows by weight; ``rows.n_rows`` is how many there are.
     """
 
     def __init__(

@@ -15,7 +15,7 @@ the farthest row for which it stands (see ``SeparableProblem``). ``departures`` 
 into components delta_c. alpha_c is alpha times one of ``pulls``, whose geometric mean is one.
 
 *The slopes b_j of that line* have a plain ridge: rho_j is rho times one of ``slope_pulls``. The
-line's height has no penalty.
+line's height has no penalty. ``evidence`` finds the weights, when ``search.tuning`` asks it.
 """
 
 from dataclasses import dataclass, field

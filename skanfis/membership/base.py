@@ -42,7 +42,7 @@ class Parameter(NamedTuple):
 class Membership(ABC):
     """A family of membership functions; see the module's conventions.
 
-    To add one, write a subclass with the members below and list it in ``MEMBERSHIPS``.
+    docs/add_a_membership.rst says how to add one, and which places beyond its class know of it.
     """
 
     name: ClassVar[str]

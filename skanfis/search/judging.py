@@ -1,4 +1,4 @@
-r"""The error expected on new rows: that on rows which neither growth nor training have seen.
+r"""The rows that judge a candidate: those that neither its growth nor its training has seen.
 
 A sequence of candidates is grown again without some of the rows, and judged on these, size by size.
 With few rows this is done in five folds. With many, half of the rows grow the candidates and half

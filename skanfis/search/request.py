@@ -1,4 +1,4 @@
-"""Where training starts: the partition that was asked for, in standardised units."""
+"""What the user asked for, and the start that it leads to: by a search, or from given rules."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -31,7 +31,7 @@ _MOST_NAMED = 10
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class StructureRequest(Plan):
-    """What the user asked for."""
+    """What the user asked for; as a ``Plan``, the part of it that trainings of candidates need."""
 
     n_mfs: Any
     partition: Any  # as given; for an estimator, the model that it holds

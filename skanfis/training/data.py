@@ -82,6 +82,7 @@ def validated(estimator, X, y, sample_weight, groups, *, is_chunk=False):
         )
     check_consistent_length(X, y)
     if is_first:
+        # Kept on the estimator, as ``validate_data`` keeps the number and the names of columns.
         estimator._single_output = y.ndim == 1
     targets = y.reshape(-1, 1) if y.ndim == 1 else y
     output_names = target_names(given, targets.shape[1])

@@ -19,7 +19,7 @@ from sklearn.exceptions import ConvergenceWarning
 
 from .._threads import map_in_threads
 from .._validation import warn_user
-from ..bounds.fitting import constrained, held_in_search
+from ..bounds.fitting import held_in_search, proven_consequents
 from ..inspection.anova import input_marginals
 from ..learning import LeastSquares, VariableProjection
 from ..learning.covariance import posterior_of
@@ -242,7 +242,7 @@ class _Fit:
         is_here = isinstance(self.data, ValidatedData)
         rows = self.data.numbered(self.trained_on) if is_here else None
         given = fitted.model, evaluation, run.problem, constraints, rows
-        coefficients, free, held, points, report = constrained(*given)
+        coefficients, free, held, points, report = proven_consequents(*given)
         run = replace(run, result=replace(run.result, evaluation=free))
         if free is not evaluation:
             fitted = self.frozen(run, weights)  # its premises are others

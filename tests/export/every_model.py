@@ -82,7 +82,9 @@ def odd_ones():
 
 
 FEWEST += tuple(odd_ones())
-assert {case.model.out_of_bounds for case in FEWEST} == set(OUT_OF_BOUNDS)
+assert {case.model.out_of_bounds for case in FEWEST} == set(OUT_OF_BOUNDS), (
+    "a policy has no turn in generate()"
+)
 
 
 def rows(dtype, n_rows=3000):

@@ -6,7 +6,11 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
+from skanfis.gyro import _options, html_report
 from skanfis.gyro.metrics import (
+    ALLAN_FIGURES,
+    LARGEST_VALUES,
+    SIZES_WITH_NOISE,
     allan_deviation,
     allan_figures,
     figures_of_merit,
@@ -35,6 +39,12 @@ def table(rng):
     rate, temperature = np.meshgrid(np.linspace(-100.0, 100.0, 21), np.linspace(-10.0, 50.0, 5))
     order = rng.permutation(rate.size)
     return rate.ravel()[order], temperature.ravel()[order]
+
+
+def test_what_is_said_of_a_figure_by_its_name_is_said_of_one_that_there_is():
+    said = {*LARGEST_VALUES, *SIZES_WITH_NOISE, *_options._AT_LEAST}
+    said |= {*html_report._FIRST, *html_report._TERMS}
+    assert said <= {each.name for each in figures_of_merit()} | ALLAN_FIGURES.keys()
 
 
 def test_scale_factor_of_either_sign(table):

@@ -65,7 +65,6 @@ def header(source, units, notes):
     asked = (-np.inf, np.inf) if source.limits is None else source.limits.T
     lowest, highest = np.clip(model.output_limits, *asked)
     lines = [
-        *map(remark, [notes] if isinstance(notes, str) else notes),
         f"Rules: {model.n_rules}, of order {model.order}; {dialect.std.upper()}, {dialect.real}.",
         *cost_lines(source.cost),
         "",
@@ -79,7 +78,7 @@ def header(source, units, notes):
     if source.min_coverage is not None:
         lines.append(f"A row is flagged as uncovered below a coverage of {source.min_coverage:g}.")
     title = "A Takagi-Sugeno-Kang fuzzy model"
-    return header_of(title, lines, dialect, model.n_inputs, model.n_outputs)
+    return header_of(title, notes, lines, dialect, model.n_inputs, model.n_outputs)
 
 
 def cost_lines(cost, besides=""):
@@ -128,8 +127,9 @@ def _precision_lines(numbers):
     ]
 
 
-def header_of(title, lines, dialect, n_inputs, n_outputs, include=""):
-    """A header whose first comment has these lines; ``include`` is a line of code."""
+def header_of(title, notes, lines, dialect, n_inputs, n_outputs, include=""):
+    """A header whose first comment has the user's notes, and lines; ``include`` is one of code."""
+    lines = [*map(remark, [notes] if isinstance(notes, str) else notes), *lines]
     wrapped = (textwrap.wrap(line, 95, break_on_hyphens=False) or [""] for line in lines)
     return dialect.write(
         _CODE.replace("$status_lines", status_lines()),

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ...export.c.dialect import STATUS, Dialect, kept_lines, remark
+from ...export.c.dialect import STATUS, Dialect, kept_lines
 from ...export.c.header import header_of, input_lines
 from ...export.c.self_test import ROWS, self_test
 from ...export.c.templates import FINITE_INPUT, rejection
@@ -158,7 +158,6 @@ class Table:
         ]
         n_products = 2**d - 1
         lines = [
-            *map(remark, notes),
             f"{' x '.join(map(str, self.counts))} cells; C99, {dialect.real}.",
             f"Cost of any evaluation: {n_products + (2 * d if bits else d)} multiplications, "
             f"{(n_products if bits else 0) + 2 * d} divisions. Memory: {n_bytes} bytes of tables.",
@@ -180,7 +179,7 @@ class Table:
         else:
             lines.append("A row with an input that is not finite gets no output.")
         include = "#include <stdint.h>" if bits else ""
-        header = header_of("A table of the error of a gyro", lines, dialect, d, 1, include)
+        header = header_of("A table of the error of a gyro", notes, lines, dialect, d, 1, include)
         return SimpleNamespace(name=dialect.name, header=header, source="\n".join(source))
 
     def _answers(self):
