@@ -1,8 +1,9 @@
-"""Worker threads for ``n_jobs``; BLAS gets one thread, as its sums depend on their number."""
+"""Worker threads for ``n_jobs``; what a thread sets for the whole process, and sets back."""
 
+import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from functools import lru_cache
+from contextlib import AbstractContextManager, contextmanager
+from functools import lru_cache, partial
 from numbers import Integral
 from threading import Lock
 
@@ -20,24 +21,40 @@ N_JOBS = [
 
 # The process's thread pools, kept because finding them takes as long as a small fit.
 _thread_pools = lru_cache(maxsize=1)(ThreadpoolController)
-# BLAS has one thread limit for the whole process. Fits in several threads restore it in reverse
-# order, whichever ends first: the last restores the original. OpenMP has a limit per thread.
+# BLAS has one thread limit for the whole process, and Python one list of filters of warnings.
+# Several threads restore them in reverse order, whichever ends first: the last restores the
+# original. OpenMP has a limit per thread.
 _BLAS_LIMITS: list = []
+_FILTERS: list = []
 _LOCK = Lock()
 
 
 @contextmanager
-def one_blas_thread() -> Iterator[None]:
-    """Hold numerical libraries to one thread; the last fit to end restores the number before."""
-    blas, openmp = (_thread_pools().select(user_api=api) for api in ("blas", "openmp"))
+def _restored_by_the_last(entered: list, change: Callable) -> Iterator[None]:
+    """Change what is the whole process's, by a context that ``change`` makes."""
     with _LOCK:
-        _BLAS_LIMITS.append(blas.limit(limits=1))
+        entered.append(change())
+        entered[-1].__enter__()
     try:
-        with openmp.limit(limits=1):
-            yield
+        yield
     finally:
         with _LOCK:
-            _BLAS_LIMITS.pop().restore_original_limits()
+            entered.pop().__exit__(None, None, None)
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """Hold numerical libraries to one thread, as sums of BLAS depend on their number."""
+    blas, openmp = (_thread_pools().select(user_api=api) for api in ("blas", "openmp"))
+    one = partial(blas.limit, limits=1)
+    with _restored_by_the_last(_BLAS_LIMITS, one), openmp.limit(limits=1):
+        yield
+
+
+def without(category: type[Warning]) -> AbstractContextManager[None]:
+    """Ignore warnings of a category, as ``warnings.catch_warnings``, but fit for threads."""
+    ignored = partial(warnings.catch_warnings, action="ignore", category=category)
+    return _restored_by_the_last(_FILTERS, ignored)
 
 
 def map_in_threads(n_jobs: int | None) -> Callable[[Callable, Iterable], Iterable]:

@@ -60,7 +60,8 @@ def refuse_lazy(**tables):
             raise TypeError(
                 f"{what} is a lazy frame, which has no values yet: give {what}.collect()."
             )
-        if hasattr(table, "__dask_graph__"):
+        # xarray's, whether lazy or not, all have the method.
+        if getattr(table, "__dask_graph__", lambda: None)() is not None:
             raise TypeError(
                 f"{what} is a dask collection, which has no values yet: give {what}.compute(). "
                 "Only the fit, predict and score of skanfis.dask.DaskANFISRegressor take it as it "

@@ -271,6 +271,26 @@ def test_tables_of_pyarrow():
             model.predict(table.set_column(place, "rate", pyarrow.array(entries)))
 
 
+class OfXarray(np.ndarray):
+    """An array with dask's method, as all of xarray's have it: in memory, if there is no graph."""
+
+    graph = None
+
+    def __dask_graph__(self):
+        return self.graph
+
+
+def test_array_that_could_be_lazy_and_is_not():
+    rows, target = X.view(OfXarray), Y.view(OfXarray)
+    model = ANFISRegressor(**QUICK).fit(rows, target, sample_weight=ONES.view(OfXarray))
+    assert_array_equal(model.predict(rows), line().predict(X))
+    assert_array_equal(model.model_.predict(rows), line().model_.predict(X))
+    rows.graph = {}
+    for act in (lambda lazy: fit(lazy), model.predict, model.model_.predict):
+        with refused(TypeError, "X is a dask collection", "X.compute()"):
+            act(rows)
+
+
 @pytest.mark.parametrize("groups", [TIMES, LO_HI, pd.Series(LO_HI, dtype="category")])
 def test_groups_of_any_one_kind_serve(groups):
     # To one rule they make no difference.

@@ -1,13 +1,17 @@
-"""Workers give their results in order; BLAS has one thread while a fit runs, and then as before."""
+"""Workers give their results in order; what a fit sets for the process is then as before."""
 
 import time
+import warnings
+from threading import Event, Thread
 
 import numpy as np
 import pytest
+from sklearn.linear_model import LinearRegression
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from skanfis import ANFISRegressor
-from skanfis._threads import map_in_threads, one_blas_thread
+from skanfis._threads import map_in_threads, one_blas_thread, without
+from skanfis.intervals import ConformalRegressor
 
 
 @pytest.mark.parametrize("n_jobs", [None, 1, 2, 3])
@@ -42,3 +46,49 @@ def test_as_many_as_before_after_the_last_of_fits_side_by_side():
         assert set(blas_threads()) == {1}
         second.__exit__(None, None, None)
         assert blas_threads() == before
+
+
+def test_warnings_are_heard_again_after_the_last_of_those_who_ignored_them():
+    """Threads leave in any order; contexts of Python's own would leave them ignored for good."""
+    before = list(warnings.filters)
+    first, second = without(FutureWarning), without(FutureWarning)
+    first.__enter__()
+    second.__enter__()
+    warnings.warn("ignored", FutureWarning, stacklevel=1)
+    first.__exit__(None, None, None)
+    warnings.warn("still ignored", FutureWarning, stacklevel=1)
+    second.__exit__(None, None, None)
+    assert warnings.filters == before
+    with pytest.warns(FutureWarning, match="heard"):
+        warnings.warn("heard", FutureWarning, stacklevel=1)
+
+
+def test_fits_that_overlap_leave_the_filters_of_warnings_as_they_were():
+    """The first measures its held-out rows until the second does, which outlasts it."""
+    first_is_in, second_is_in, first_is_done = Event(), Event(), Event()
+
+    class First(LinearRegression):
+        def predict(self, X):
+            first_is_in.set()
+            assert second_is_in.wait(30)
+            return super().predict(X)
+
+    class Second(LinearRegression):
+        def predict(self, X):
+            second_is_in.set()
+            assert first_is_done.wait(30)
+            return super().predict(X)
+
+    def fit(regressor):
+        X = np.arange(40.0).reshape(-1, 1)
+        ConformalRegressor(regressor, method="split", scaled=False).fit(X, X[:, 0])
+
+    before = list(warnings.filters)
+    first, second = Thread(target=fit, args=[First()]), Thread(target=fit, args=[Second()])
+    first.start()
+    assert first_is_in.wait(30)
+    second.start()
+    first.join()
+    first_is_done.set()
+    second.join()
+    assert warnings.filters == before

@@ -6,7 +6,6 @@ cover with probability c if the rows with this score or less have the mass c.
 """
 
 import inspect
-import warnings
 from bisect import bisect_left
 from dataclasses import dataclass
 from numbers import Integral
@@ -21,6 +20,7 @@ from sklearn.utils.metadata_routing import process_routing
 from sklearn.utils.validation import has_fit_parameter
 
 from .._sklearn import safe_indexing
+from .._threads import without
 from .._validation import (
     as_numbers,
     check_finite,
@@ -183,7 +183,7 @@ def held_out_scores(estimator, data, rows, least):
             "'clip' or 'linear', or a fitted FrozenEstimator(model) with method='split'."
         )
     # Errors on held-out rows out of range are to be measured, not warned of.
-    with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
+    with without(OutOfBoundsWarning):
         centers, deviations = predicted(estimator, safe_indexing(data.X, rows), least)
     return np.abs(data.targets[rows].reshape(centers.shape) - centers) / deviations
 

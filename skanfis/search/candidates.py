@@ -7,7 +7,6 @@ half: the new ones stand at k-means clusters of the rows with large residuals, w
 inputs that the search has found so far (``conditions`` removes those that are not needed).
 """
 
-import warnings
 from dataclasses import dataclass, replace
 from math import prod
 from typing import Any
@@ -16,6 +15,7 @@ import numpy as np
 from sklearn.cluster import KMeans
 from sklearn.exceptions import ConvergenceWarning
 
+from .._threads import without
 from ..antecedent import TreeAntecedent
 from ..blocks import BLOCK_BYTES, row_blocks
 from .clusters import clustered_antecedent, grown_antecedent
@@ -117,7 +117,7 @@ def rule_base(candidate, rows, families, spacing, seed, smaller: Tuned | None = 
         table = np.round(table, DIGITS)
         order = np.lexsort(np.sort(table, axis=1).T)
         # k-means warns of fewer clusters than asked for; ``Trials.larger`` checks their number.
-        with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
+        with without(ConvergenceWarning):
             labels = clusterer.fit(table[order], sample_weight=weight[order]).labels_
         return labels[np.argsort(order)]
 

@@ -6,12 +6,11 @@ whose error in the folds is within one standard error of the least (Hastie, Tibs
 2009, 7.10). Such a penalty shrinks slopes too much, but they are fitted again without it.
 """
 
-import warnings
-
 import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Lasso, LassoCV
 
+from .._threads import without
 from ..learning.data import StandardisedData, fingerprint
 from .judging import FOLDS, folds
 from .sample import DIGITS
@@ -29,7 +28,7 @@ def lasso_inputs(rows: StandardisedData, inputs):
     parts = folds(rows)
     for target in rows.y.T:
         # With hardly any noise, the lasso does not converge at the least penalties.
-        with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
+        with without(ConvergenceWarning):
             path = LassoCV(cv=parts).fit(X, target, weight)
             errors = path.mse_path_.mean(axis=1)
             least = int(np.argmin(errors))

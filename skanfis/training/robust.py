@@ -15,7 +15,6 @@ weights. Otherwise, a grid of many rules would spend a rule on each outlier befo
 one.
 """
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +22,7 @@ from scipy.special import ndtri
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import HuberRegressor
 
+from .._threads import without
 from ..learning.data import column_statistics
 from ..learning.sampling import SAMPLE_ROWS, with_sample
 from ..search import weighted_quantile
@@ -90,7 +90,7 @@ def _robust_lines(rows):
             return None
         linear = HuberRegressor(max_iter=_MOST_STEPS, tol=_TIGHT)
         # A rough line suffices: it need not converge.
-        with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
+        with without(ConvergenceWarning):
             try:
                 linear.fit(Z.T, (values - center) / spread, sample_weight=rows.sample_weight)
             except ValueError:
