@@ -55,7 +55,7 @@ ALSO = {"export": [PUBLIC]}
 # The application takes public names only, but for these.
 ONLY = {
     "gyro": [
-        *(PUBLIC, "exceptions", "blocks", "digits", "policies", "options", "naming"),
+        *(PUBLIC, "_threads", "exceptions", "blocks", "digits", "policies", "options", "naming"),
         *("search", "export", "bounds", "inspection", "datasets"),
     ]
 }
@@ -66,7 +66,7 @@ DOOR_TO_PRIVATE_SKLEARN = "_sklearn"
 SHARED = {
     "_sklearn": "what scikit-learn may move is taken in one place, and handed on to nobody",
     "_validation": "checks and warnings in one voice, by parameters and columns that it knows",
-    "_threads": "holds BLAS to one thread, which works only if all fits do",
+    "_threads": "what is set for the whole process, which works only if all set it alike",
 }
 
 

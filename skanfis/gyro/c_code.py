@@ -5,7 +5,6 @@ file; the law is written here. The requirements on exported functions hold: cons
 heap, no state, the status word.
 """
 
-import warnings
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
+from .._threads import without
 from ..exceptions import OutOfBoundsWarning
 from ..export.c import CCode
 from ..export.c.dialect import (
@@ -357,7 +357,7 @@ def _known_answers(whole):
     chosen = np.flatnonzero(sure)[:ROWS]
     X, coverage, beyond = X[chosen], coverage[chosen], ~(phase <= limit)[chosen]
     # The status replaces the warning, row by row.
-    with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
+    with without(OutOfBoundsWarning):
         of_law = law.predict(X)
     model, z = rules.model.with_out_of_bounds(_said(rules.model)), X[:, rules.positions]
     of_rules = model.predict(z)

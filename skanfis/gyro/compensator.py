@@ -1,7 +1,6 @@
 """GyroCompensator: a fitted estimator with all that is needed to apply it to a log; its file."""
 
 import json
-import warnings
 from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any, Self
 import numpy as np
 import pandas as pd
 
+from .._threads import without
 from ..exceptions import OutOfBoundsWarning
 from ..export import export_json
 from ..export.c.dialect import status_word
@@ -123,7 +123,7 @@ class GyroCompensator:
         X = features(log, self.inputs, self.time_constant)
         indicated = log["output"].to_numpy() / self.scale_factor
         # The status replaces the warning, row by row.
-        with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
+        with without(OutOfBoundsWarning):
             predicted = self.estimator.predict(X)
         compensated = indicated - predicted if self.predicts == "error" else predicted.copy()
         inside, coverage = (ask(self.estimator, name, X) for name in ("in_bounds", "coverage"))

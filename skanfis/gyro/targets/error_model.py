@@ -5,13 +5,13 @@ value theorem. The error is a sum of rules, with ranges from ``skanfis.bounds``,
 and the arcsine law, by interval arithmetic. An interval is a pair of arrays over the boxes.
 """
 
-import warnings
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 import pandas as pd
 
+from ..._threads import without
 from ...bounds.enclosure import Enclosure
 from ...bounds.terms import EPS, ROUNDINGS, product, size, square
 from ...exceptions import OutOfBoundsWarning
@@ -42,7 +42,7 @@ class ErrorModel:
     def __call__(self, points):
         """The error at points (n_points, n_inputs); outside the range, its value at the edge."""
         X = np.clip(points, *self.ends.T)
-        with warnings.catch_warnings(action="ignore", category=OutOfBoundsWarning):
+        with without(OutOfBoundsWarning):
             predicted = self._estimator.predict(pd.DataFrame(X, columns=self.names))
         return self._own * X[:, self._output] - predicted if self._is_rate else predicted
 
