@@ -1,5 +1,7 @@
 """ANFISRegressor, the scikit-learn estimator: parameters, fit, predict, learning from chunks."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace

@@ -1,5 +1,7 @@
 """The public functions: bounds of predictions, and of their slopes, over a box."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from numbers import Real

@@ -3,6 +3,8 @@
 A fit uses the sorted distinct rows, so that neither order nor repetition changes the last bit.
 """
 
+from __future__ import annotations
+
 from typing import Any, Self
 
 import numpy as np

@@ -4,6 +4,8 @@ Each step finds the best memberships for fixed centres, then the best centres fo
 1981). Distances are relative to that of the nearest centre: as m → 1, their powers would overflow.
 """
 
+from __future__ import annotations
+
 from numbers import Integral, Real
 from typing import Any, ClassVar
 

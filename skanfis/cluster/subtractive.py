@@ -1,5 +1,7 @@
 """Subtractive clustering: the data points with the most others nearby, one after the other."""
 
+from __future__ import annotations
+
 from numbers import Integral, Real
 from typing import ClassVar
 

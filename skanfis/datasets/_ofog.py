@@ -1,5 +1,7 @@
 """Simulated data: thermal runs of open-loop fiber-optic gyros on a rate table, from a seed."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from numbers import Integral, Real
 from types import SimpleNamespace

@@ -4,6 +4,8 @@ Groups are integers, one per row, as scikit-learn's splitters take them. docs/gy
 why levels must be held out.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 
 import numpy as np

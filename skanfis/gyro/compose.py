@@ -1,5 +1,7 @@
 """A law plus rules: a base regressor, and a second one that learns the residual of the first."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Self

@@ -1,5 +1,7 @@
 """Plots of a compensation, in the style of scikit-learn's Displays: they store tables and draw."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
 

@@ -4,6 +4,8 @@ The squared error of the *output* is minimised, because its noise is white and o
 the law gives an output for every rate. docs/gyro_physics.rst has the formulas.
 """
 
+from __future__ import annotations
+
 import warnings
 from types import SimpleNamespace
 from typing import Self

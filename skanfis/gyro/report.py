@@ -1,5 +1,7 @@
 """The table of all figures of merit, before and after compensation, with bootstrap intervals."""
 
+from __future__ import annotations
+
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike

@@ -3,6 +3,8 @@
 docs/gyro_data.rst says what it is for, and has the recursion in C.
 """
 
+from __future__ import annotations
+
 from typing import Any, Self
 
 import numpy as np

@@ -1,5 +1,7 @@
 """Pictures of a model: its terms, and its prediction over two inputs."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress

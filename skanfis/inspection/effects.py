@@ -1,5 +1,7 @@
 """The effects of every input, and every pair of inputs: their shares of the output's variance."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, compress

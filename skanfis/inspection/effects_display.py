@@ -1,5 +1,7 @@
 """A picture of the effects of every input, and of the strongest pairs, on the output."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from typing import Any, Self
 

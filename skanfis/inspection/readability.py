@@ -1,5 +1,7 @@
 """Whether the rules of a model can be read one by one: figures, tables and sentences."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
 from typing import Any
 

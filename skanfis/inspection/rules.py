@@ -1,5 +1,7 @@
 """The rules in words and in tables: conditions, values, and which of them fired on a row."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from typing import Any
 

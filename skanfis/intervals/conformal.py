@@ -1,5 +1,7 @@
 """ConformalRegressor: prediction intervals with a given coverage, around any regressor."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any, ClassVar, Self

@@ -6,6 +6,8 @@ one, with O_rs the mean of w_r w_s, and the data determine only one consequent f
 is divided. Of two rules that repeat one another, the stronger one stays.
 """
 
+from __future__ import annotations
+
 from dataclasses import replace
 
 import numpy as np
