@@ -88,3 +88,5 @@ def test_largest_exponent_parts_the_two(rng, factor, coincide):
     else:
         model.fit(X)
     assert (np.ptp(model.cluster_centers_, axis=0).max() < 1e-3) == coincide
+    assert largest < 3.0
+    assert FuzzyCMeans(2, m="auto", n_init=1).fit(X).m_ == pytest.approx((1.0 + largest) / 2.0)
