@@ -65,6 +65,7 @@ class TestImported:
     def test_with_least_squares_the_consequents_alone_are_learnt(self, data, known):
         X, y = data
         model = ANFISRegressor(partition=known, solver="lse").fit(X, 3.0 * y - 1.0)
+        assert model.stiffness_ == 0.0  # what does not move is not held
         assert model.model_.term_names == known.model_.term_names
         found, expected = (one.model_.antecedent.parameters for one in (model, known))
         assert_allclose(found, expected, rtol=1e-9)
@@ -264,6 +265,18 @@ def test_any_clusterer_gives_a_rule_per_cluster(clusterer):
     model = ANFISRegressor(partition=clusterer).fit(X[9:], y[9:])
     assert model.n_rules_ == 3
     assert_allclose(model.predict(X[9:]), y[9:], atol=0.05)
+
+
+@pytest.mark.parametrize("clusterer", [KMeans(2, random_state=0), AgglomerativeClustering(2)])
+def test_any_clusterer_sees_weights_or_repeated_rows(clusterer):
+    """Of three clumps, two weigh much: the light one joins its neighbour, far as it is."""
+    X = np.add.outer([0.0, 1.0, 3.0], [-0.02, -0.01, 0.0, 0.01, 0.02]).reshape(-1, 1)
+    weight = np.repeat([30, 30, 1], 5)
+    if isinstance(clusterer, AgglomerativeClustering):
+        X, weight = np.repeat(X, weight, axis=0), None
+    model = ANFISRegressor(partition=clusterer, solver="lse").fit(X, X, sample_weight=weight)
+    centers = sorted(term["center"] for term in model.initial_memberships_)
+    assert_allclose(centers, [0.0, 33.0 / 31.0], atol=1e-9)
 
 
 @pytest.mark.parametrize(
