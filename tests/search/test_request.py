@@ -58,6 +58,12 @@ class TestImported:
             assert model.memberships_ == model.initial_memberships_ == known.memberships_
             loss = np.mean((model.predict(X) - y - 5.0) ** 2) / np.var(y)
             assert_allclose(model.loss_curve_, loss, rtol=1e-9)
+            weighted = ANFISRegressor(partition=given, max_iter=0).fit(
+                X, y + 5.0, np.repeat([1, 9], 25)
+            )
+            rows = np.append(np.arange(25), np.repeat(np.arange(25, 50), 9))
+            loss = np.mean((model.predict(X) - y - 5.0)[rows] ** 2) / np.var(y[rows])
+            assert_allclose(weighted.loss_curve_, loss, rtol=1e-9)
             assert "as they were given" in model.status_
         # Columns without names contradict none.
         ANFISRegressor(partition=known, max_iter=0).fit(X.to_numpy(), y)

@@ -135,6 +135,7 @@ def test_weights_zeros_and_several_outputs(premises):
     repeated = np.repeat(np.arange(len(X)), weight.astype(int))
     again = chunk(premises).partial_fit(X[repeated], y[repeated])
     assert difference(model, again, X) < EXACT
+    assert model.model_.rule_rows == pytest.approx(again.model_.rule_rows, rel=1e-9)
     assert model.n_samples_seen_ == np.count_nonzero(weight)
 
 
