@@ -21,6 +21,7 @@ from skanfis.export import export_json
 from skanfis.export.json_reader import parse_json
 from skanfis.learning import LeastSquares, VariableProjection
 from skanfis.learning.covariance import _mean_squares, posterior_of
+from skanfis.learning.data import StandardisedData
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.penalty import Penalty
 from skanfis.learning.premise import Premise
@@ -164,6 +165,25 @@ def test_noise_of_hubers_loss_is_his_second_proposal(monkeypatch, block_bytes):
     of_normal = 2.0 * integrate.quad(lambda t: min(t, c) ** 2 * stats.norm.pdf(t), 0.0, np.inf)[0]
     expected = np.average(psi**2, axis=0, weights=given.sample_weight) / of_normal
     assert_allclose(_mean_squares(problem, evaluation, (left, c)), expected, rtol=1e-7)
+
+
+@pytest.mark.theory
+def test_outputs_share_the_parameters_of_the_premises(rng):
+    """The same output twice, at twice the stiffness: each has half of them."""
+    rows = oracles.bumpy_rows(rng, 200, 2, 1, weighted=False)
+    antecedent = oracles.random_scattered(rng, Gaussian, 3, [0, 1])
+    premise, n = Premise.of(antecedent, *rows.inputs.box), rows.n_rows
+
+    def n_parameters(n_outputs, learnt):
+        given = StandardisedData.of(rows.X, np.repeat(rows.y, n_outputs, axis=1))
+        penalty = replace(PENALTY, stiffness=n_outputs * PENALTY.stiffness)
+        problem = SeparableProblem(given, antecedent, penalty)
+        evaluation = problem.evaluate(antecedent.parameters)
+        noise = posterior_of(problem, learnt, evaluation, n).noise / given.targets.scale
+        return n * (1.0 - evaluation.mean_squares / noise**2)
+
+    of_consequents, of_both = n_parameters(1, None), n_parameters(1, premise)
+    assert_allclose(n_parameters(2, premise), 0.5 * (of_consequents + of_both).repeat(2), rtol=1e-9)
 
 
 def test_what_has_no_posterior_says_why(monkeypatch):

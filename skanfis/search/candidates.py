@@ -42,10 +42,10 @@ class Candidate:
 
     @property
     def kind(self):
-        """One of the kinds, or "one rule"."""
+        """One of the kinds."""
         if not self.is_grid:
             return "scattered" if self.n_clusters else "tree"
-        return "one rule" if self.n_rules == 1 else "grid"
+        return "grid"
 
     @property
     def is_grid(self):

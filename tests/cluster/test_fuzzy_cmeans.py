@@ -88,3 +88,10 @@ def test_largest_exponent_parts_the_two(rng, factor, coincide):
     else:
         model.fit(X)
     assert (np.ptp(model.cluster_centers_, axis=0).max() < 1e-3) == coincide
+    assert largest < 3.0
+    # About the mean by weight.
+    more = np.append(X, X[:100], axis=0)
+    weight = np.append(np.full(100, 2.0), np.ones(300))
+    largest = largest_exponent(more - more.mean(axis=0), np.ones(500))
+    model = FuzzyCMeans(2, m="auto", n_init=1).fit(X, sample_weight=weight)
+    assert model.m_ == pytest.approx((1.0 + largest) / 2.0)

@@ -16,12 +16,13 @@ N_ROWS, N_WANTED = 9000, 400
 def rows():
     g = np.random.default_rng(0)
     X = g.normal(size=(N_ROWS, 2)) * [1.0, 30.0] + [0.0, 1e4]
-    return StandardisedData.of(X, X[:, :1] * X[:, 1:] + g.normal(size=(N_ROWS, 1)))
+    y, groups = X[:, :1] * X[:, 1:] + g.normal(size=(N_ROWS, 1)), g.integers(0, 7, N_ROWS)
+    return StandardisedData.of(X, y, groups=groups)
 
 
 def table(rows):
-    """Rows with their weights, in lexical order."""
-    whole = np.column_stack([rows.X, rows.y, rows.weights])
+    """Rows with their weights and groups, in lexical order."""
+    whole = np.column_stack([rows.X, rows.y, rows.weights, rows.groups])
     return whole[np.lexsort(whole.T)]
 
 
@@ -34,10 +35,12 @@ def test_sample_is_the_rows_of_the_smallest_numbers(rows):
 def test_order_and_units_of_rows_and_columns_do_not_matter(rows):
     found = table(with_sample(rows, N_WANTED).sample)
     mixed = np.random.default_rng(1).permutation(N_ROWS)
-    other = StandardisedData.of(rows.X[mixed, ::-1] * [1e3, 1e-6], rows.y[mixed])
+    other = StandardisedData.of(
+        rows.X[mixed, ::-1] * [1e3, 1e-6], rows.y[mixed], groups=rows.groups[mixed]
+    )
     sample = with_sample(other, N_WANTED).sample
     back = replace(sample, X=(sample.X / [1e3, 1e-6])[:, ::-1])
-    assert_allclose(table(back)[:, :3], found[:, :3], rtol=1e-12)
+    assert_allclose(table(back), found, rtol=1e-12)
 
 
 @pytest.mark.parametrize("n_distinct", [300, 2000])

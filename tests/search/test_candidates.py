@@ -11,8 +11,9 @@ from skanfis.learning.data import StandardisedData
 from skanfis.learning.evidence import FREE
 from skanfis.learning.objective import SeparableProblem
 from skanfis.learning.premise import Premise
+from skanfis.membership import Gaussian
 from skanfis.search import tuning
-from skanfis.search.candidates import TermScores
+from skanfis.search.candidates import Candidate, TermScores, rule_base
 from skanfis.search.grid import Spacing
 from skanfis.search.sample import search_sample
 
@@ -80,3 +81,16 @@ def test_scores_of_terms_are_the_formula_term_by_term(rng, count, n_outputs, tol
     for one in told:
         scores.project_out(*one)
     assert_allclose(scores.of(pairs), expected, rtol=1e-5)
+
+
+def test_clusters_of_the_first_scattered_rules_are_by_weight():
+    """Of three spots, two weigh much: the light one joins its neighbour, far as it is."""
+    X, weight = np.array([[0.0], [1.0], [3.0]]), np.array([100.0, 100.0, 1.0])
+    rows = sample_of(X, X, weight)
+    one_rule = solved(rows, GridAntecedent((), counts=()))
+    candidate = Candidate((1,), n_clusters=2, inputs=(0,))
+    found = rule_base(candidate, rows, [Gaussian], Spacing(rows), 0, one_rule)
+    mean = np.average(X[:, 0], weights=weight)
+    deviation = np.sqrt(np.average((X[:, 0] - mean) ** 2, weights=weight))
+    centers = np.sort(found.term_places) * deviation + mean
+    assert_allclose(centers, [0.0, 103.0 / 101.0], atol=1e-9)

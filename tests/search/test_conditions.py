@@ -74,3 +74,20 @@ def test_every_rule_keeps_a_condition_and_the_evidence_rises(rng):
     assert_array_equal((found.evaluation.antecedent.table >= 0).sum(axis=1), 1)
     moved = Premise.of(found.problem.antecedent, *rows.inputs.box).parameters(found.displacement)
     assert_allclose(moved, found.evaluation.antecedent.parameters)
+
+
+def test_half_of_them_go_at_a_time_and_all_come_back_where_the_evidence_falls(rng, monkeypatch):
+    """Were none worth anything, four of nine could go: every one of five rules keeps one."""
+    tuned, n_terms = tuned_rules(rng), []
+    measured = conditions.term_losses
+
+    def losses(found):
+        n_terms.append(found.evaluation.antecedent.n_terms)
+        return measured(found)
+
+    monkeypatch.setattr(conditions, "term_losses", losses)
+    monkeypatch.setattr(conditions, "WORTH", np.inf)
+    # Rules that do not learn again are the worse for it.
+    monkeypatch.setattr(conditions, "turned", lambda found: found)
+    assert conditions.with_fewer_conditions(tuned) is tuned
+    assert n_terms == [9, 7, 6, 5]

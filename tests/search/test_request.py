@@ -58,6 +58,12 @@ class TestImported:
             assert model.memberships_ == model.initial_memberships_ == known.memberships_
             loss = np.mean((model.predict(X) - y - 5.0) ** 2) / np.var(y)
             assert_allclose(model.loss_curve_, loss, rtol=1e-9)
+            weighted = ANFISRegressor(partition=given, max_iter=0).fit(
+                X, y + 5.0, np.repeat([1, 9], 25)
+            )
+            rows = np.append(np.arange(25), np.repeat(np.arange(25, 50), 9))
+            loss = np.mean((model.predict(X) - y - 5.0)[rows] ** 2) / np.var(y[rows])
+            assert_allclose(weighted.loss_curve_, loss, rtol=1e-9)
             assert "as they were given" in model.status_
         # Columns without names contradict none.
         ANFISRegressor(partition=known, max_iter=0).fit(X.to_numpy(), y)
@@ -65,6 +71,7 @@ class TestImported:
     def test_with_least_squares_the_consequents_alone_are_learnt(self, data, known):
         X, y = data
         model = ANFISRegressor(partition=known, solver="lse").fit(X, 3.0 * y - 1.0)
+        assert model.stiffness_ == 0.0  # what does not move is not held
         assert model.model_.term_names == known.model_.term_names
         found, expected = (one.model_.antecedent.parameters for one in (model, known))
         assert_allclose(found, expected, rtol=1e-9)
@@ -264,6 +271,18 @@ def test_any_clusterer_gives_a_rule_per_cluster(clusterer):
     model = ANFISRegressor(partition=clusterer).fit(X[9:], y[9:])
     assert model.n_rules_ == 3
     assert_allclose(model.predict(X[9:]), y[9:], atol=0.05)
+
+
+@pytest.mark.parametrize("clusterer", [KMeans(2, random_state=0), AgglomerativeClustering(2)])
+def test_any_clusterer_sees_weights_or_repeated_rows(clusterer):
+    """Of three clumps, two weigh much: the light one joins its neighbour, far as it is."""
+    X = np.add.outer([0.0, 1.0, 3.0], [-0.02, -0.01, 0.0, 0.01, 0.02]).reshape(-1, 1)
+    weight = np.repeat([30, 30, 1], 5)
+    if isinstance(clusterer, AgglomerativeClustering):
+        X, weight = np.repeat(X, weight, axis=0), None
+    model = ANFISRegressor(partition=clusterer, solver="lse").fit(X, X, sample_weight=weight)
+    centers = sorted(term["center"] for term in model.initial_memberships_)
+    assert_allclose(centers, [0.0, 33.0 / 31.0], atol=1e-9)
 
 
 @pytest.mark.parametrize(

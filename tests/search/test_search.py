@@ -181,6 +181,19 @@ def test_every_row_is_searched_where_one_group_alone_is_judged(rng):
     assert search.trials.rows.n_rows == 110
 
 
+def test_the_mean_that_rules_must_beat_is_by_weight(rng):
+    X, weight = inputs(rng, 60, 2), rng.uniform(1.0, 9.0, 60)
+    rows = StandardisedData.of(X, X[:, :1] + np.log(weight)[:, None], weight)
+    search = StructureSearch(rows, structure_request(ANFISRegressor(), ["a", "b"]), 0.05)
+    rows, squares, judges = dealt_rows(rows), [], []
+    for grow, rest in judging_folds(rows)[0]:
+        mean = np.average(rows.y[grow, 0], weights=rows.weights[grow])
+        squares.append((rows.y[rest, 0] - mean) ** 2)
+        judges.append(rows.weights[rest])
+    expected = np.average(np.concatenate(squares), weights=np.concatenate(judges))
+    assert_allclose(search._variance(), expected, rtol=1e-12)
+
+
 # ----------------------------------------------------------------------------- what is said of it
 
 

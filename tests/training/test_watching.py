@@ -216,6 +216,11 @@ def test_whole_groups_are_held_out(rng):
     model = ANFISRegressor(n_mfs=10, **LOOSE)
     alone, grouped = (clone(model).fit(X, level, groups=given) for given in (None, groups))
     assert grouped.validation_loss_curve_.min() > 1.5 * alone.validation_loss_curve_.min()
+    # A row without weight is none, and neither is its group.
+    weight = (groups > 0).astype(float)
+    weighted = clone(model).fit(X, level, weight, groups)
+    without = clone(model).fit(X[20:], level[20:], groups=groups[20:])
+    assert_array_equal(weighted.predict(X), without.predict(X))
 
 
 def test_a_single_group_counts_as_none(rng):
