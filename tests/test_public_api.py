@@ -108,6 +108,8 @@ def functions_of(named):
 def test_what_is_public_says_what_it_takes_and_returns():
     functions = [function for named in PUBLIC for function in functions_of(named)]
     assert len(functions) > 100
+    # help() and notebooks show them.
+    assert [f.__qualname__ for f in functions if "_typing" in str(inspect.signature(f))] == []
     assert [f.__qualname__ for f in functions if "return" not in f.__annotations__] == []
     # The method solve() of a solver takes what training gives it, and is none of the user's.
     untyped = [
