@@ -24,13 +24,13 @@ def posterior_of(
     problem: SeparableProblem,
     premise: Premise | None,
     evaluation: Evaluation,
-    n_rows,
+    effective_weight,
     robust=None,
     held=None,
 ) -> Posterior | None:
     """The posterior in the user's units; None for models of more than ``MOST_PARAMETERS``.
 
-    ``premise`` is None if the premises were not learnt; ``n_rows`` counts rows by weight;
+    ``premise`` is None if the premises were not learnt; ``effective_weight`` counts rows by weight;
     ``robust`` holds the weights that Huber's loss has left the rows, and its epsilon; ``held`` are
     the consequents of the model, if constraints hold them away from those of the evaluation.
     """
@@ -55,18 +55,18 @@ def posterior_of(
         there = evaluation if held is None else replace(evaluation, coefficients=held)
         premises, cross, n_determined = _premises(problem, premise, there)
     # At least one degree of freedom, even if there are no more rows than parameters.
-    freedom = max(n_rows - n_effective - n_determined / problem.n_varying, 1.0)
-    noise *= np.sqrt(n_rows / freedom)
+    freedom = max(effective_weight - n_effective - n_determined / problem.n_varying, 1.0)
+    noise *= np.sqrt(effective_weight / freedom)
     shared = np.sqrt(np.sum(noise**2) / problem.n_varying)
     # L^-1 T' is the factor for consequents on [1, z], T the local basis.
     half = np.ascontiguousarray(problem.local.to_global(half.T).T)
     blocks = half.reshape(len(half), -1, problem.n_basis)
     blocks[:, :, 1:] /= rows.inputs.scale[problem.consequent_inputs]
-    half /= np.sqrt(n_rows)
+    half /= np.sqrt(effective_weight)
     if len(half) < n_columns:
         half, cross = _squared(half, cross)
     units, scale = parameter_units(antecedent, rows.inputs.scale), rows.targets.scale
-    premises = premises * (shared / np.sqrt(n_rows)) * units
+    premises = premises * (shared / np.sqrt(effective_weight)) * units
     cross = cross * (shared * scale)[:, None, None]
     return Posterior(noise * scale, problem.consequent_inputs, half, premises, cross)
 

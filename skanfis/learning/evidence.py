@@ -63,7 +63,7 @@ class Laplace:
     """The posterior at a point: everything that the evidence and its derivatives are made of."""
 
     penalty: Penalty
-    n_rows: float  # by weight
+    effective_weight: float
     twice_cost: float  # 2F
     n_outputs: int  # outputs that vary
     determinants: float  # log |M| - log |P|+ + log R
@@ -104,17 +104,22 @@ class Laplace:
     @property
     def freedom(self):
         """Degrees of freedom: rows by weight, less one for a constant, times outputs."""
-        return max(self.n_rows - 1.0, 0.5) * self.n_outputs
+        return max(self.effective_weight - 1.0, 0.5) * self.n_outputs
 
     @property
     def noise_variance(self):
         """sigma^2 of the standardised target, averaged over outputs."""
-        return self.n_rows * self.twice_cost / self.freedom
+        return self.effective_weight * self.twice_cost / self.freedom
+
+    @property
+    def scale(self):
+        """The factor n / sigma^2 from costs, which are means over rows, to -2 log p."""
+        return self.effective_weight / self.noise_variance
 
     @property
     def prior_precision(self):
         """Prior precision n kappa / sigma^2 of the displacements, in units of the expected one."""
-        return self.n_rows / self.noise_variance * self.penalty.stiffness * PRIOR_DISPLACEMENT**2
+        return self.scale * self.penalty.stiffness * PRIOR_DISPLACEMENT**2
 
     @property
     def minus_twice_log(self):
@@ -160,7 +165,7 @@ def laplace(problem: SeparableProblem, evaluation: Evaluation, displacement=(), 
     paid[_OTHERS] *= line.squares(solved)
     return Laplace(
         penalty,
-        problem.n_rows,
+        problem.effective_weight,
         max(2.0 * evaluation.cost + float(paid[_STIFFNESS]), _LEAST_ERROR),
         problem.n_varying,
         factor.log_determinant() - prior.log_determinant() + np.log(size) + np.log(line.n_rules),
@@ -182,7 +187,7 @@ def least_weights(posterior: Laplace):
     """
     if posterior.line.n_rules == 1:
         return SMALLEST
-    far = posterior.noise_variance / posterior.n_rows / _FAR**2
+    far = posterior.noise_variance / posterior.effective_weight / _FAR**2
     return replace(SMALLEST, agreement=posterior.n_columns * far, alpha=far)
 
 
@@ -194,7 +199,7 @@ def reestimated(posterior: Laplace, free, least=SMALLEST):
     outputs[_STIFFNESS] = 1
     determined = outputs * np.maximum(before - posterior.trace_after, 0.0)
     # Rounding may make a tiny penalty negative.
-    cost = posterior.n_rows / posterior.noise_variance * np.maximum(posterior.paid, 0.0)
+    cost = posterior.scale * np.maximum(posterior.paid, 0.0)
     if posterior.curvature.size:
         determined[_STIFFNESS] += _PRIOR_NUMBER
         cost[_STIFFNESS] += _PRIOR_NUMBER * posterior.prior_precision

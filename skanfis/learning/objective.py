@@ -101,7 +101,7 @@ class SeparableProblem:
     ``antecedent`` is the rule base at the start; the consequents' local basis is fixed by it.
     ``map_ordered`` is ``map``, or a function that spreads chunks over workers and keeps results in
     order. ``consequent_inputs`` are the inputs that the consequents are linear in, all by default.
-    ``n_rows`` counts rows by weight; ``rows.n_rows`` is how many there are.
+    ``effective_weight`` counts the rows by weight.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class SeparableProblem:
             + 6 * antecedent.parameters.size
             + 4 * (antecedent.n_terms + antecedent.n_rules)
         )
-        self._weight, self.n_rows = rows.total_weight, rows.effective_weight
+        self._weight, self.effective_weight = rows.total_weight, rows.effective_weight
         # glibc returns freed memory to the system beyond limits that grow with the largest piece
         # freed so far. Without a piece of this size, every block gets its arrays page by page
         # again, and a pass takes up to twice as long. The array itself is not used.
@@ -174,7 +174,7 @@ class SeparableProblem:
         """
         other = copy.copy(self)
         other.rows, other._weight, other.on_sample = rows, rows.total_weight, self
-        other.n_rows = rows.effective_weight
+        other.effective_weight = rows.effective_weight
         other._sums_at_start = None
         return other
 
@@ -303,7 +303,7 @@ class SeparableProblem:
         It is the mean of (r_i / (1 - h_i))^2, with the leverage
         h_i = phi_i' (Phi' S Phi + W P)^-1 phi_i. Of a row that stands for several, one is left out.
         """
-        total, unit = 0.0, self._weight / self.n_rows
+        total, unit = 0.0, self._weight / self.effective_weight
         # L^-1 T', so that the basis of this small matrix changes, and not that of the design.
         root = self.local.to_global(evaluation.normal.factor.root.T).T
         for _, strengths, basis_rows, residual, weight in self._fired(evaluation):

@@ -25,7 +25,7 @@ def sparse_slopes(posterior: Laplace, coefficients, worth):
     They become ``Penalty.common`` and ``Penalty.absent``. ``coefficients`` are the local ones,
     (n_columns, n_outputs). A slope is kept if it is worth at least ``worth``.
     """
-    line, unit = posterior.line, posterior.noise_variance / posterior.n_rows
+    line, unit = posterior.line, posterior.noise_variance / posterior.effective_weight
     identity, n_outputs = np.eye(line.n_rules), coefficients.shape[1]
     before, after = (unit * one.root.T @ one.root for one in (posterior.prior, posterior.factor))
     state, every, common, absent = [coefficients, after, before], np.arange(line.n_rules), [], []

@@ -25,9 +25,9 @@ def with_fewer_conditions(tuned: Tuned) -> Tuned:
     """
     rows, inputs, found = tuned.problem.rows, tuned.problem.consequent_inputs, tuned
     # Always that of the model with all conditions.
-    precision = tuned.posterior.n_rows / tuned.posterior.noise_variance
+    scale = tuned.posterior.scale
     while True:
-        loss = precision * term_losses(found)
+        loss = scale * term_losses(found)
         for own in (row[row >= 0] for row in found.evaluation.antecedent.rule_terms):
             loss[own[np.argmax(loss[own])]] = np.inf
         n_needless = np.count_nonzero(loss < WORTH * tuned.problem.n_outputs)

@@ -56,14 +56,14 @@ def started(tuned: Tuned, rows: StandardisedData, plan: Plan, room: float, candi
     rise. Only its root is used up: agreement costs more on new rows than the training rows show.
     """
     tuned = tuned_on(tuned, rows)
-    problem, n_rows = tuned.problem, tuned.posterior.n_rows
+    problem, weight = tuned.problem, tuned.posterior.effective_weight
     # Premises make room for agreement by following it. Fixed ones cannot, so none is added.
     room = np.sqrt(room) if plan.premises_move else 1.0
     agreeing = with_most_agreement(tuned, room)
     is_raised = agreeing is not tuned
     return Start(
         problem.antecedent,
-        scaled(agreeing.penalty, plan.free, n_rows / plan.n_all, is_raised),
+        scaled(agreeing.penalty, plan.free, weight / plan.n_all, is_raised),
         problem.consequent_inputs,
         # Training goes on from there; rounding errors are cut off.
         np.round(agreeing.displacement, _DIGITS),

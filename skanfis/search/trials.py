@@ -220,8 +220,9 @@ class Trials:
 
         k effective parameters add k / n of the noise variance, which falls as the rows n rise.
         """
-        n_effective = tuned.posterior.n_effective
-        return (1.0 + n_effective / self.plan.n_all) / (1.0 + n_effective / tuned.posterior.n_rows)
+        posterior, n_all = tuned.posterior, self.plan.n_all
+        k = posterior.n_effective
+        return (1.0 + k / n_all) / (1.0 + k / posterior.effective_weight)
 
     def _problem(self, candidate, smaller=None):
         """The problem that a candidate begins with, from the rules and weights of a smaller one."""

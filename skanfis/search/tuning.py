@@ -112,7 +112,7 @@ class Tuned:
         where k reaches the number of rows n.
         """
         n_held = held_displacements(self.curvature, self.penalty.stiffness)
-        share = (self.curvature.size - n_held) / self.problem.n_rows
+        share = (self.curvature.size - n_held) / self.problem.effective_weight
         if share >= 1.0:
             return np.inf
         left_out = self.problem.leave_one_out_error(self.solved)
@@ -138,7 +138,8 @@ def tune(
     if premise.size == 0 or turns == 0:
         return start
     if "stiffness" in free:
-        stiffness = start.posterior.noise_variance / (problem.n_rows * PRIOR_DISPLACEMENT**2)
+        expected = problem.effective_weight * PRIOR_DISPLACEMENT**2
+        stiffness = start.posterior.noise_variance / expected
         start = start.with_penalty(replace(start.penalty, stiffness=stiffness))
     return _risen(turned(start, steps), turns - 1, steps)
 
@@ -148,7 +149,7 @@ def tuned_on(tuned: Tuned, rows: StandardisedData) -> Tuned:
     seen = tuned.problem
     if seen.rows.n_rows == rows.n_rows:
         return tuned
-    penalty = scaled(tuned.penalty, tuned.free, seen.n_rows / rows.effective_weight)
+    penalty = scaled(tuned.penalty, tuned.free, seen.effective_weight / rows.effective_weight)
     inputs, is_unbounded = seen.consequent_inputs, tuned.premise.is_unbounded
     problem = SeparableProblem(rows, seen.antecedent, penalty, consequent_inputs=inputs)
     premise = Premise.of(seen.antecedent, *rows.inputs.box, is_unbounded=is_unbounded)

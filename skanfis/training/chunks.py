@@ -173,7 +173,7 @@ class _ProblemOfSums(SeparableProblem):
         self.rows = StandardisedData(none, none, None, sums.inputs, sums.targets)
         self.consequent_inputs, self.n_basis = sums.consequent_inputs, sums.n_basis
         self.n_columns, self.n_outputs = sums.slope.shape
-        self.on_sample, self.n_rows = None, sums.effective_weight
+        self.on_sample, self.effective_weight = None, sums.effective_weight
         means = (sums.gram / sums.weight, sums.slope / sums.weight, sums.square / sums.weight)
         self._sums_at_start = means
         self.local = LocalBasis.from_gram(means[0], self.antecedent.n_rules)
@@ -193,7 +193,7 @@ def inputs_with_slopes(model: TSKModel, inputs):
 
 def fitted_weights(estimator, sums: RowSums):
     """The weights of the penalty that a fit found, times the rows by weight, in plain types."""
-    place, n_rows = list(sums.base.input_names).index, sums.effective_weight
+    place, weight = list(sums.base.input_names).index, sums.effective_weight
     model = estimator.model_
     is_absent = (model.coefficients[:, 1:] == 0.0).all(axis=2)
     is_constant = never_changes(model.minimum, model.maximum)
@@ -204,9 +204,9 @@ def fitted_weights(estimator, sums: RowSums):
         return [[j, rules] for j, rules in found if rules]
 
     return {
-        "agreement": n_rows * estimator.agreement_,
-        "alpha": n_rows * estimator.alpha_,
-        "slope": n_rows * estimator.slope_alpha_,
+        "agreement": weight * estimator.agreement_,
+        "alpha": weight * estimator.alpha_,
+        "slope": weight * estimator.slope_alpha_,
         "pulls": [
             ([place(name) for name in one["inputs"]], one["pull"]) for one in estimator.pulls_
         ],

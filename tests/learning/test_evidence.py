@@ -41,7 +41,7 @@ def rules(rng, n_rules):
 def laplace_at(problem, evaluation, penalty, **premises):
     """The posterior of the problem's rows, at an evaluation of it."""
     other = problem.with_penalty(penalty)
-    other.n_rows = problem.rows.total_weight
+    other.effective_weight = problem.rows.total_weight
     return laplace(other, other.solved_again(evaluation), **premises)
 
 
@@ -76,7 +76,7 @@ def prior_of_pulls(penalty):
 
 def in_full(found):
     """-2 log p but for (n - 1) log 2 pi per output, with what depends on n alone put back."""
-    n, freedom = found.n_rows, found.freedom
+    n, freedom = found.effective_weight, found.freedom
     left_out = freedom * (1.0 + np.log(n / freedom)) + found.n_outputs * np.log(n)
     return found.minus_twice_log + left_out
 
@@ -294,7 +294,7 @@ class OneWidth:
 class TestPremises:
     def prior_of_weight(self, found):
         """As a hundred displacements seen before would do."""
-        expected = found.n_rows * found.penalty.stiffness / found.noise_variance
+        expected = found.effective_weight * found.penalty.stiffness / found.noise_variance
         expected *= PRIOR_DISPLACEMENT**2
         return 100.0 * (expected - np.log(expected) - 1.0)
 

@@ -236,7 +236,7 @@ def test_leave_one_out_error_is_that_of_leaving_each_row_out(weighted, n_outputs
     phi, total = dense.design(antecedent.parameters), 0.0
     held = dense.residual_matrix(antecedent.parameters)[40:]
     # The weights may be those of other numbers of rows than there are of them.
-    n_rows = problem.n_rows = 0.8 * rows.total_weight
+    n_rows = problem.effective_weight = 0.8 * rows.total_weight
     for i in range(40):
         weight = dense.weight.copy()
         weight[i] -= 1.0 / n_rows  # as much as one row has
