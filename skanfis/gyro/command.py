@@ -97,14 +97,15 @@ def _calibrate(options, tell):
     _say(summary)
     _say([f"check          {split.sentence}", f"written to     {folder}: {names}"])
     _say(f"note           {note}" for note in reading.notes)
-    _say(f"WARNING        {sentence}" for sentence in calibration.cautions())
+    cautions = calibration.cautions()
+    _say(f"WARNING        {sentence}" for sentence in cautions)
     if checks:
         _say([f"specification  {specification(checks)}"])
     _say(
         f"{'target' if is_written else 'REFUSED':14} {name}: {told}"
         for name, told, is_written in targets
     )
-    tell("done, but see the warnings" if calibration.cautions() else "done")
+    tell("done, but see the warnings" if cautions else "done")
     if not all(done for *_, done in targets):
         return INCOMPLETE
     return DONE if all(check.result == "pass" for check in checks) else NOT_KEPT

@@ -211,12 +211,12 @@ class _Fit:
         """That of a run; ``held`` are the consequents of the model, if constraints hold them."""
         robust = None if weights is None else (weights, self.huber.epsilon)
         learnt = run.premise if self.solver.moves_premises else None
-        n_rows = self.rows.effective_weight
+        effective_weight = self.rows.effective_weight
         if weights is not None:
             # Kish's effective number of rows, from the part of its weight that each row keeps.
             share, square = (np.average(weights**k, weights=self.rows.weights) for k in (1, 2))
-            n_rows *= share**2 / square
-        return posterior_of(run.problem, learnt, run.evaluation, n_rows, robust, held)
+            effective_weight *= share**2 / square
+        return posterior_of(run.problem, learnt, run.evaluation, effective_weight, robust, held)
 
     def frozen(self, run: SolverRun, weights: np.ndarray | None) -> Fitted:
         """The results of a run, with the posterior; ``weights`` are those of Huber's loss."""

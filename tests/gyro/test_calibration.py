@@ -195,7 +195,12 @@ def test_a_delay_is_told_from_noise_of_the_rate(rng, rows):
     assert part > 0.99
     known = log.assign(rate=log["rate"] + 0.1 * noise[1])
     assert delay(known, -0.1 * noise[1])[1] < 0.05
-    assert delay(log.assign(rate=3.0), noise[0]) == (0.0, 0.0)
+    # Nor is it what has no slope, no noise, few rows, or an offset of each run.
+    assert delay(log.assign(rate=3.0), noise[0]) == delay(log, 0.0 * noise[0]) == (0.0, 0.0)
+    few = [delay(in_steps(2, 2, 6), rng.normal(size=24))[1] for _ in range(100)]
+    assert np.mean(few) < 0.02
+    ramp = log.assign(rate=np.arange(len(log), dtype=float))
+    assert delay(ramp, 1.0 + log["run"].to_numpy() + noise[0])[1] < 0.05
 
 
 def test_a_delay_is_a_caution(rng):
