@@ -15,10 +15,11 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from .. import ANFISRegressor
-from ..digits import counted, percent
+from ..digits import counted
 from ..exceptions import OutOfBoundsWarning
-from ._checks import LARGEST_AT_REST, find_glitches
+from ._checks import LARGEST_AT_REST
 from ._columns import RATE_UNITS, SIGNALS, ask
+from ._oddities import oddities
 from ._simpler import NAMES, ROUNDS, Compensation, make_law, simpler_compensations
 from ._split import Split
 from .compensator import GyroCompensator, as_written, features
@@ -36,7 +37,6 @@ _ROWS_FOR_SEARCH, _MOST_RULES = 1_500, 12
 # The model's name in a verdict, and the gain that a compensation must exceed to be worth having.
 _MODEL, _LEAST_GAIN = "this model", 1.02
 _CONFIDENCE = 0.95
-_MUCH_DELAYED = 0.1  # of the squared error that is left
 # Errors below this part of the uncompensated one are rounding: they count as equal.
 _ROUNDING = 1e-9
 
@@ -101,7 +101,7 @@ class Calibration:
     ``after`` the rate compensated by a model that had not seen the row, and ``inside`` whether the
     row was in the bounds of such a model of law and rules: then ``after`` is finite. ``simpler``
     are compensations without rules; ``verdict`` judges them and the model on the rows ``inside``.
-    ``warnings`` are those of the fit, ``glitches`` sentences on rows that no other row supports.
+    ``warnings`` are those of the fit, ``oddities`` sentences on what is odd about the log.
     """
 
     recipe: Recipe
@@ -118,7 +118,7 @@ class Calibration:
     verdict: Verdict
     n_fit_rows: int
     warnings: list
-    glitches: list
+    oddities: list
     fold_models: list  # of the written compensation: per fold, the one fitted without its test rows
 
     @property
@@ -153,38 +153,7 @@ class Calibration:
                     f"the compensation makes held-out rows {where} worse, from {was:.4g} to "
                     f"{became:.4g} {unit} RMS."
                 )
-        left = np.where(self.inside, self.after - self.rate, np.nan)
-        rows, part = delay(self.log, left)
-        if part > _MUCH_DELAYED:
-            when = "late" if rows > 0.0 else "early"
-            found.append(
-                f"{percent(part)} of the squared error that is left follows the change of the rate "
-                f"from row to row, as if the output came some {abs(rows):.2g} rows {when}: align "
-                "the two columns, or drop the rows while the rate changes."
-            )
-        return found + self.glitches
-
-
-def delay(log, left):
-    """How many rows late the output seems to be; what part of the squares ``left`` this explains.
-
-    A delay of d rows leaves -d times the slope of the rate from row to row. Noise of the rate
-    itself leaves its curvature, which is taken off before, as are offsets of whole runs.
-    """
-    rate = log["rate"]
-    run = log["run"] if "run" in log else pd.Series(0, log.index)
-    groups = rate.groupby(run, observed=True)
-    earlier, later = groups.shift(1), groups.shift(-1)
-    parts = {"left": left, "slope": 0.5 * (later - earlier)}
-    known = pd.DataFrame(parts | {"curvature": earlier + later - 2.0 * rate}, log.index).dropna()
-    known -= known.groupby(run, observed=True).transform("mean")
-    left, slope, curvature = known.to_numpy().T
-    size = curvature @ curvature or 1.0
-    left, slope = (each - curvature * (curvature @ each / size) for each in (left, slope))
-    both, own, total = left @ slope, slope @ slope, left @ left
-    part = both**2 / (own * total) if own * total > 0.0 else 0.0
-    # Any slope explains 1 / n of the noise of n rows, and nine times as much once in 300 logs.
-    return (-both / own, part) if part * len(known) > 9.0 else (0.0, 0.0)
+        return found + self.oddities
 
 
 def calibrate(log, split, recipe, tell, name_row="row {}".format):
@@ -197,13 +166,6 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
         factor = scale_factor(log["rate"], log["output"])
     X = features(log, recipe.inputs, _TIME_CONSTANT)
     rate, before = log["rate"].to_numpy(), log["output"].to_numpy() / factor
-    glitches = [
-        f"{name_row(row)}: {reason} is supported by no other row; if it is a glitch, drop such "
-        "rows and calibrate again."
-        for row, reason in find_glitches(log, before - rate)
-    ]
-    for sentence in glitches:
-        tell(f"warning: {sentence}")
     target = rate if recipe.physics else before - rate
     groups, rng = split.labels.astype(str), np.random.default_rng(0)
     predicted, inside, folds, fold_models = _held_out(X, target, groups, split, recipe, tell, rng)
@@ -220,6 +182,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
     verdict = judge(errors, split.labels[judged], split.most)
     written = _to_write(recipe, verdict, simpler)
     chosen = next(each for each in every if each.name == written)
+    left = np.where(judged, chosen.after - rate, np.nan)
     whole = GyroCompensator(
         chosen.estimator,
         recipe.inputs,
@@ -245,7 +208,7 @@ def calibrate(log, split, recipe, tell, name_row="row {}".format):
         verdict=verdict,
         n_fit_rows=rows.size,
         warnings=messages,
-        glitches=glitches,
+        oddities=list(oddities(log, before - rate, left, name_row)),
         fold_models=chosen.fold_models,
     )
 

@@ -1,16 +1,15 @@
-"""Checks that refuse a log unfit for calibration, and name rows that look like glitches."""
+"""Checks that refuse a log unfit for calibration."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from scipy.spatial import cKDTree
 
 from ..digits import counted
 from ._columns import CANONICAL, SECONDS, SIGNALS, convert, convert_back, declared_units, units_of
+from ._oddities import FEWEST_ROWS, LEAST_CORRELATION, find_glitches, stretches_of, whole_delay
 from .errors import LogError
-from .metrics import rate_columns
 
 QUANTITIES = ("time", "temperature", "output", "rate")
 LABELS = ("run", "device")
@@ -26,15 +25,11 @@ _LONGEST_RUN = 31 * 86_400.0  # s
 _FASTEST_CHANGE = 100.0 / 60.0  # degC/s over a whole run: no chamber does that
 _LEAST_SPAN = 10.0  # degC, the least to learn from
 _NOISE = 5.0  # degC by which a few rows may differ
-# Fewer rows determine neither a line in every input nor its residual errors. An output that keeps
-# one value in this many rows, while the rate changes, is stuck.
-_FEWEST_ROWS = 20
 _FEWEST_ROWS_PER_RUN = 3
 LARGEST_AT_REST = 0.1  # deg/s, the earth's rate and the noise of a rate table's encoder included
 _WIDEST_AT_REST = 10.0  # deg/s, a coarse gyro's bias from cold to hot
 # Steps of 20 times the usual one are not noise; if they are not rare, they are not glitches.
 _JUMP, _FEWEST_JUMPS, _RARE = 20.0, 5, 2e-3
-_LEAST_CORRELATION = 0.9  # of output and rate
 # An output is saturated if at least this many rows have its largest or smallest value, at rates
 # that differ by more than this part of their range.
 _FEWEST_SATURATED, _SATURATED = 3, 0.02
@@ -43,17 +38,6 @@ _FEWEST_SATURATED, _SATURATED = 3, 0.02
 _FEWEST_AT_REST, _NOISY = 50, 0.2
 # Placeholder in messages: if a file was read, ``LogFile.located`` puts in the column's name.
 RATE_COLUMN = "column of the rate"
-
-_MOST_GLITCHES = 3  # of a kind, that are named
-# A row is alone if it deviates this many times as much as the next one. Gaussian noise never comes
-# near; Student's t with three degrees of freedom did not in a thousand logs.
-_ALONE = 5.0
-# A row is compared with the median of this many others, which one more glitch does not upset.
-_N_NEIGHBOURS = 8
-_MOST_CANDIDATES = 2_000  # rows with the largest errors
-# A temperature moves slowly: a step of this part of its range, from row to row, is a glitch.
-_SMOOTH = 0.2
-_SOUND = 0.9  # smallest share of the rows that are no glitches
 
 
 def check_log(
@@ -98,8 +82,8 @@ def check_log(
     skanfis.gyro.errors.LogError: column 'temperature', row 0: ... degC is not plausible ...
     """
     units = CANONICAL | declared_units(units)
-    if len(log) < _FEWEST_ROWS:
-        raise LogError(f"the log has {counted(len(log), 'row')}; it takes {_FEWEST_ROWS}.")
+    if len(log) < FEWEST_ROWS:
+        raise LogError(f"the log has {counted(len(log), 'row')}; it takes {FEWEST_ROWS}.")
     for part in columns_of(inputs):
         if part not in log:
             raise LogError(f"the log has no {part}.")
@@ -161,8 +145,9 @@ def _check_time(log, unit, runs):
     bad = np.flatnonzero(time <= before)
     if bad.size:
         row = int(bad[0])
+        name = f"run {str(log['run'].iloc[row])!r}" if "run" in log else "a run"
         raise LogError(
-            f"time does not increase within a run: {time[row]:.13g} s after {before[row]:.13g} s "
+            f"time does not increase within {name}: {time[row]:.13g} s after {before[row]:.13g} s "
             f"({counted(bad.size, 'such row')}). Rows must be in the order of time, each with a "
             "time of its own. Runs that follow each other, also if a counter begins again between "
             "them, need different labels in a column. If none was found, add one, or say which "
@@ -282,12 +267,15 @@ def _check_output_follows_rate(log, units):
         raise LogError(f"equals the {RATE_COLUMN}: one of them is not that.", "output")
     _check_stuck(output, rate)
     correlation = np.corrcoef(output, rate)[0, 1]
-    if abs(correlation) < _LEAST_CORRELATION:
+    if abs(correlation) < LEAST_CORRELATION:
         glitches = dict(find_glitches(log, output)) if "temperature" in log else {}
-        alone = f" No other row supports {', '.join(glitches.values())}." if glitches else ""
+        more = f" No other row supports {', '.join(glitches.values())}." if glitches else ""
+        if late := whole_delay(output, rate):
+            rows = f"{counted(abs(late), 'row')} {'before' if late > 0 else 'after'}"
+            more = f" It follows that of {rows}: align the columns."
         raise LogError(
             f"does not follow the rate (correlation {correlation:.3f}); is it, or the "
-            f"{RATE_COLUMN}, the wrong one?{alone}",
+            f"{RATE_COLUMN}, the wrong one?{more}",
             "output",
             next(iter(glitches), None),
         )
@@ -320,28 +308,22 @@ def _check_stuck(output, rate):
 
     Its largest and smallest value do not count: there it is saturated, or not the gyro's column.
     """
-    starts, lengths = _stretches(output)
+    starts, lengths = stretches_of(output)
     is_between = (output.min() < output[starts]) & (output[starts] < output.max())
-    long = (lengths >= _FEWEST_ROWS) & is_between
+    long = (lengths >= FEWEST_ROWS) & is_between
     stretches = map(np.arange, starts[long], (starts + lengths)[long])
     _check_standing(output, rate, stretches, "rows on end", "stuck")
 
 
 def _check_stuck_at_rest(output):
     """Raise LogError if the output keeps one value, row after row, and its noise is far larger."""
-    steps, (starts, lengths) = np.diff(output), _stretches(output)
+    steps, (starts, lengths) = np.diff(output), stretches_of(output)
     smallest = np.abs(steps[steps != 0.0]).min(initial=np.inf)
     is_noise = (steps[1:] * steps[:-1] < 0.0) & (np.abs(steps[1:]) > 1.5 * smallest)
     row, n_rows = int(starts[lengths.argmax()]), lengths.max()
     if n_rows >= _FEWEST_AT_REST and is_noise.mean() > _NOISY:
         told = f"stands at {output[row]:.6g} in {n_rows} rows on end, and has noise in "
         raise LogError(f"{told}the others: it is stuck. Leave these rows out.", "output", row)
-
-
-def _stretches(values):
-    """First rows and lengths of stretches of equal values."""
-    starts = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    return starts, np.diff(starts, append=values.size)
 
 
 def _check_standing(output, rate, places, rows, what):
@@ -353,58 +335,3 @@ def _check_standing(output, rate, places, rows, what):
             told = f"stands at {output[at[0]]:.6g} in {at.size} {rows}, at rates from {low:.4g}"
             reason = f"{told} to {high:.4g} deg/s: it is {what}. Leave these rows out."
             raise LogError(reason, "output", int(at[0]))
-
-
-def find_glitches(log, error):
-    """Rows that no other row supports, and what is odd about each; ``error`` has one per row.
-
-    The error of a row, less what follows the rate, is compared with those of the rows nearest in
-    temperature, rate and order; its temperature should lie between those of the rows before and
-    after in the run. Least squares bends the whole model towards one such row. If there are many,
-    three of a kind are named, and the others counted.
-    """
-    temperature, rate = (log[part].to_numpy() for part in ("temperature", "rate"))
-    runs = log["run"].to_numpy() if "run" in log else np.zeros(len(log), dtype=int)
-    by_run = pd.Series(temperature).groupby(runs)
-    # At an end of a run the rows on the one side count twice. Two rows alone tell nothing.
-    shifted = [by_run.shift(step).fillna(by_run.shift(-step)) for step in (-2, -1, 1, 2)]
-    _, low, high, _ = np.sort(np.column_stack(shifted), axis=1).T
-    beyond = np.nan_to_num(np.maximum(low - temperature, temperature - high))
-    least = max(_SMOOTH * _spread(temperature), _ALONE * np.quantile(beyond, _SOUND))
-    jumps = np.flatnonzero(beyond > least)
-    # Of a gyro that is far from linear, the curve would hide a glitch; clipped, none bends the fit.
-    columns = np.column_stack([np.ones_like(rate), rate_columns(rate, temperature)])
-    low, high = np.quantile(error, [0.05, 0.95])
-    clipped = np.clip(error, 2.0 * low - high, 2.0 * high - low)
-    error = error - columns @ np.linalg.lstsq(columns, clipped, rcond=None)[0]
-    # A row farther from its neighbours than the spread of all errors is far from the median too.
-    far = np.argsort(-np.abs(error - np.median(error)), kind="stable")[:_MOST_CANDIDATES]
-    places = np.column_stack([temperature, rate, np.arange(len(log))])
-    scale = _spread(places)
-    places /= np.where(scale > 0.0, scale, 1.0)
-    # Many rows share rate and temperature: a tree that halves space, not rows, is faster then.
-    tree = cKDTree(places, balanced_tree=False)
-    # The row itself is among its neighbours, which does not upset the median.
-    nearest = tree.query(places[far], min(_N_NEIGHBOURS + 1, tree.n))[1]
-    sizes = np.abs(error[far] - np.median(error[nearest], axis=1))
-    order = np.argsort(-sizes, kind="stable")
-    first, next_one = sizes[order[:-1]], sizes[order[1:]]
-    alone = np.flatnonzero(first > np.maximum(_ALONE * next_one, _spread(error)))
-    output, alone = log["output"].to_numpy(), far[order[: alone.max(initial=-1) + 1]]
-    found = _named(alone, "the output of {:.4g} at a rate of {:.4g} deg/s", output, rate)
-    found |= _named(jumps, "the temperature of {:.4g} degC", temperature)
-    return sorted(found.items())
-
-
-def _named(rows, told, *columns):
-    """What is odd about the first of these rows, in words, and how many more there are."""
-    named, more = rows[:_MOST_GLITCHES].tolist(), len(rows) - _MOST_GLITCHES
-    found = {row: told.format(*(values[row] for values in columns)) for row in named}
-    if more > 0:
-        found[named[-1]] += f" (and that of {counted(f'{more:,}', 'row')} more)"
-    return found
-
-
-def _spread(values):
-    low, high = np.quantile(values, [0.05, 0.95], axis=0)
-    return high - low

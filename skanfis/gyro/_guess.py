@@ -36,6 +36,7 @@ _WORDS = {
     "temperature": {
         5.0: _HEAT,
         3.0: "t",
+        0.0: "gyro gyr gyroscope fog sensor imu dut uut kreisel",
         -3.5: "start set setpoint target chamber oven ambient amb room min max board",
     },
     "output": {5.0: _OUTPUT, 2.0: _RATE, -99.0: f"{_TRUTH} {_WISH} {_HEAT}"},

@@ -6,9 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from skanfis.digits import counted
 from skanfis.gyro import _calibration
-from skanfis.gyro._calibration import Recipe, delay, fit_model
+from skanfis.gyro._calibration import Recipe, fit_model
 from skanfis.gyro._headline import errors_and_verdict, formula_of, headline
+from skanfis.gyro._oddities import delay, oddities
 from skanfis.gyro.compose import rules_of
 from skanfis.gyro.metrics import rms
 
@@ -186,7 +188,7 @@ def delayed(log, rows):
     return np.concatenate(list(parts))
 
 
-@pytest.mark.parametrize("rows", [1.0, -1.0, 0.25])
+@pytest.mark.parametrize("rows", [1.0, -1.0, 0.25, 4.0, -2.5])
 def test_a_delay_is_told_from_noise_of_the_rate(rng, rows):
     log = in_steps()
     noise = 0.01 * rng.normal(size=(2, len(log)))
@@ -201,6 +203,18 @@ def test_a_delay_is_told_from_noise_of_the_rate(rng, rows):
     assert np.mean(few) < 0.02
     ramp = log.assign(rate=np.arange(len(log), dtype=float))
     assert delay(ramp, 1.0 + log["run"].to_numpy() + noise[0])[1] < 0.05
+
+
+def test_of_a_delay_one_thing_is_told_and_a_glitch_beside_it(rng):
+    log = in_steps(n_rows=20).assign(temperature=lambda log: np.linspace(0.0, 50.0, len(log)))
+    for rows in (1.0, 0.5, -3.0):
+        error = delayed(log, rows) - log["rate"].to_numpy() + NOISE * rng.normal(size=len(log))
+        error[230] += 300.0
+        found = oddities(log.assign(output=log["rate"] + error), error, error, "row {}".format)
+        late, *told = found
+        when = f"{counted(f'{abs(rows):g}', 'row')} {'late' if rows > 0 else 'early'}"
+        assert f"as if the output came some {when}: align" in late
+        assert [text.partition(":")[0] for text in told] == ["row 230"]
 
 
 def test_a_delay_is_a_caution(rng):

@@ -6,7 +6,8 @@ import pytest
 
 from skanfis.datasets import make_ofog
 from skanfis.gyro import LogError, check_log, read_log
-from skanfis.gyro._checks import check_at_rest, find_glitches
+from skanfis.gyro._checks import check_at_rest
+from skanfis.gyro._oddities import find_glitches, find_standing_thermometer
 
 CALLED_T = {"columns": {"temperature": "T"}}
 MEASURED = ["time", "temperature", "output", "rate", "run"]
@@ -293,6 +294,26 @@ def test_sound_logs_have_no_glitches(options):
     # Digits lost, and noise of heavy tails.
     assert glitches(log.round({"temperature": 0, "output": 2})) == []
     assert glitches(log.assign(output=log["output"] + 0.05 * g.standard_t(3, len(log)))) == []
+
+
+def test_a_thermometer_that_is_stuck_in_a_run_is_named():
+    log = simulated(sampling_interval=10.0)
+    assert find_standing_thermometer(log) == []
+    stuck = log["temperature"].where(log["run"] != 2, 25.0)
+    assert find_standing_thermometer(log.assign(temperature=stuck)) == [2]
+    # Half of all runs at a soak, with a coarse thermometer: none stands out.
+    coarse = log["temperature"].where(log["run"] > 1, 25.0).round(-1)
+    assert find_standing_thermometer(log.assign(temperature=coarse)) == []
+    assert find_standing_thermometer(log.drop(columns="run").assign(temperature=stuck)) == []
+
+
+def test_an_output_too_late_to_follow_the_rate_is_told_by_how_much(rng):
+    log = simulated(sampling_interval=10.0).assign(run=0)
+    log["rate"] = rng.uniform(-100.0, 100.0, len(log))
+    for rows, told in ((3, "3 rows before"), (-1, "1 row after")):
+        late = log["rate"].shift(rows, fill_value=0.0) + 0.1
+        with pytest.raises(LogError, match=rf"wrong one\? It follows that of {told}: align the"):
+            check_log(log.assign(time=np.arange(len(log)), output=late))
 
 
 def test_an_output_that_is_stuck_is_refused_wherever_it_stands(log):

@@ -175,6 +175,11 @@ def test_runs_are_told_by_the_time(tmp_path, times, runs):
     table.loc[60, "time"] = table.loc[58, "time"]
     with pytest.raises(LogError, match="line 62, column 'time': time does not increase"):
         found_in(tmp_path, table)
+    # That of a run turned round is named.
+    table = table.assign(run=np.arange(len(table)) // 20, time=np.arange(len(table)))
+    table.loc[20:39, "time"] = table.loc[39:20:-1, "time"].to_numpy()
+    with pytest.raises(LogError, match=r"line 23, column 'time': time does not .* within run '1':"):
+        found_in(tmp_path, table)
 
 
 @pytest.mark.parametrize(
@@ -444,6 +449,12 @@ def test_a_column_that_is_no_time_is_named_unless_it_is_used(tmp_path, truth):
     assert "is not used" not in "; ".join(found_in(tmp_path, table).notes)
     notes = found_in(tmp_path, table.assign(t=truth["output"])).notes
     assert "'t' is not used: no time goes up and down" in notes
+
+
+def test_the_thermometer_of_the_gyro_goes_before_another(tmp_path, truth):
+    table = truth[PARTS].rename(columns={"temperature": "temp_gyro"})
+    table.insert(0, "temp_case", truth["temperature"] - 5.0)
+    same(found_in(tmp_path, table), truth)
 
 
 def test_of_axes_that_all_feel_the_table_that_along_it_is_taken(tmp_path, truth):
