@@ -7,6 +7,7 @@ chamber heats; and that the output of a gyro, if it is a rate, changes as the tr
 
 import numpy as np
 
+from ..digits import range_in_digits
 from ._columns import CANONICAL, SIGNALS, convert, convert_back, units_of
 from .errors import UsageError
 
@@ -74,7 +75,7 @@ def assumed_text(values, part, layout):
 
 
 def _range(values):
-    return f"{np.nanmin(values):.4g} to {np.nanmax(values):.4g}" if values.size else "no values"
+    return range_in_digits(np.nanmin(values), np.nanmax(values), 4) if values.size else "no values"
 
 
 def _question(values, readings):

@@ -5,6 +5,7 @@ import pandas as pd
 import pytest
 
 from skanfis.datasets import make_ofog
+from skanfis.digits import range_in_digits
 from skanfis.gyro import check_log
 from skanfis.gyro._guess import Request
 from skanfis.gyro.errors import LogError, UsageError
@@ -61,7 +62,9 @@ def test_one_plausible_reading_is_taken_and_said(tmp_path, truth, scales, offset
         signal = "a raw signal" if unit == "counts" else unit
         assert f"{name!r} has no unit, taken as {signal} (" in found.assumed[part]
     np.testing.assert_allclose(found.log["rate"], truth["rate"], rtol=1e-9)
-    assert f"({truth['rate'].min() * scales[3]:.4g} to" in found.assumed["rate"]
+    for part, scale, offset in zip(parts, scales, offsets, strict=True):
+        ends = sorted(truth[part].agg(["min", "max"]) * scale + offset)
+        assert f"({range_in_digits(*ends, 4)}" in found.assumed[part]
 
 
 def test_rad_per_s_without_a_word_is_asked_for_with_the_line_to_copy(tmp_path, truth):
