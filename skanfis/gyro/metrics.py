@@ -237,7 +237,7 @@ def allan_deviation(error, time, run=None):
 def allan_figures(tau, deviation):
     """The value of each figure, or NaN if the curve [s, deg/h] has none, and why it has none.
 
-    Three neighbouring points have a slope if their line has it within 0.15; the lowest such line
+    Three neighbouring points have a slope if their line has it within 0.15; the nearest one
     counts. N is sought before the minimum and any rise, K after it. No end is a minimum.
     """
     if tau.size < _POINTS_PER_SLOPE:
@@ -365,13 +365,17 @@ def _pooled_deviation(squares):
 
 
 def _level(tau, deviation, slope):
-    """Level of the lowest line with this slope along the curve, and ""; or NaN and the reason."""
+    """Level of the line along the curve whose slope is nearest this, and ""; or NaN and why not.
+
+    Of pure noise that is a line at short times, which many rows make exact.
+    """
     x, y = np.log(tau), np.log(deviation)
-    levels = []
+    lines = []
     for start in range(x.size - _POINTS_PER_SLOPE + 1):
         window = slice(start, start + _POINTS_PER_SLOPE)
-        if abs(np.polyfit(x[window], y[window], 1)[0] - slope) <= _SLOPE_TOLERANCE:
-            levels.append(np.mean(y[window] - slope * x[window]))
-    if not levels:
+        off = abs(np.polyfit(x[window], y[window], 1)[0] - slope)
+        lines.append((off, np.mean(y[window] - slope * x[window])))
+    off, level = min(lines, default=(np.inf, np.nan))
+    if off > _SLOPE_TOLERANCE:
         return np.nan, f"no slope of {'+' if slope > 0 else '-'}1/2"
-    return np.exp(min(levels)), ""
+    return np.exp(level), ""

@@ -158,6 +158,15 @@ def test_planted_curve_is_read_back():
     assert notes == {}
 
 
+def test_the_random_walk_of_white_noise_is_right_on_average(rng):
+    walks = []
+    for noise in 0.01 * rng.normal(size=(20, 3600)):  # deg/s, every second
+        curve = allan_deviation(noise, np.arange(3600.0))
+        tau, deviation = (curve[name].to_numpy() for name in ("averaging_time", "deviation"))
+        walks.append(allan_figures(tau, HOUR * deviation)["angle_random_walk"][0])
+    assert np.mean(walks) == pytest.approx(0.6, rel=0.01)
+
+
 def test_what_falls_behind_a_hump_is_no_white_noise():
     """White noise beside steps, which lift the curve at the time of a dwell and fall behind it."""
     white, steps = 180.0 / TAU, np.zeros(TAU.size)
