@@ -8,7 +8,14 @@ import pandas as pd
 
 from ..digits import counted
 from ._columns import CANONICAL, SECONDS, SIGNALS, convert, convert_back, declared_units, units_of
-from ._oddities import FEWEST_ROWS, LEAST_CORRELATION, find_glitches, stretches_of, whole_delay
+from ._oddities import (
+    ALONE,
+    FEWEST_ROWS,
+    LEAST_CORRELATION,
+    find_glitches,
+    stretches_of,
+    whole_delay,
+)
 from .errors import LogError
 
 QUANTITIES = ("time", "temperature", "output", "rate")
@@ -298,9 +305,24 @@ def _check_output_follows_rate(log, units):
 
 
 def _check_saturation(output, rate):
-    """Raise LogError if the output stays at its largest or smallest while the rate changes."""
+    """Raise LogError if the output stays at its largest or smallest while the rate changes.
+
+    At one rate of a table it is saturated if it has no noise there, and noise at all others.
+    """
     ends = [np.flatnonzero(output == value) for value in (output.min(), output.max())]
     _check_standing(output, rate, ends, "rows", "saturated")
+    order = np.argsort(rate, kind="stable")
+    starts, lengths = stretches_of(output[order])
+    is_end = np.isin(output[order[starts]], (output.min(), output.max()))
+    usual = lengths[~is_end].max(initial=0)
+    for place in np.flatnonzero(is_end & (lengths >= FEWEST_ROWS) & (lengths > ALONE * usual)):
+        if usual:
+            row, n_rows = int(order[starts[place]]), lengths[place]
+            told = (
+                f"stands at {output[row]:.6g} in {n_rows} rows at {rate[row]:.4g} deg/s, and has "
+            )
+            reason = f"{told}noise at other rates: it is saturated. Leave these rows out."
+            raise LogError(reason, "output", row)
 
 
 def _check_stuck(output, rate):

@@ -16,7 +16,7 @@ _MUCH_DELAYED = 0.1  # of the squared error that is left
 _MOST_GLITCHES = 3  # of a kind, that are named
 # A row is alone if it deviates this many times as much as the next one. Gaussian noise never comes
 # near; Student's t with three degrees of freedom did not in a thousand logs.
-_ALONE = 5.0
+ALONE = 5.0
 # A row is compared with the median of this many others, which one more glitch does not upset.
 _N_NEIGHBOURS = 8
 _MOST_CANDIDATES = 2_000  # rows with the largest errors
@@ -105,7 +105,7 @@ def find_glitches(log, error, late=0.0):
     shifted = [by_run.shift(step).fillna(by_run.shift(-step)) for step in (-2, -1, 1, 2)]
     _, low, high, _ = np.sort(np.column_stack(shifted), axis=1).T
     beyond = np.nan_to_num(np.maximum(low - temperature, temperature - high))
-    least = max(_SMOOTH * _spread(temperature), _ALONE * np.quantile(beyond, _SOUND))
+    least = max(_SMOOTH * _spread(temperature), ALONE * np.quantile(beyond, _SOUND))
     jumps = np.flatnonzero(beyond > least)
     # Of a gyro that is far from linear, the curve would hide a glitch; clipped, none bends the fit.
     columns = np.column_stack([np.ones_like(rate), rate_columns(rate, temperature)])
@@ -126,7 +126,7 @@ def find_glitches(log, error, late=0.0):
     sizes = np.abs(error[far] - np.median(error[nearest], axis=1))
     order = np.argsort(-sizes, kind="stable")
     first, next_one = sizes[order[:-1]], sizes[order[1:]]
-    alone = np.flatnonzero(first > np.maximum(_ALONE * next_one, _spread(error)))
+    alone = np.flatnonzero(first > np.maximum(ALONE * next_one, _spread(error)))
     output, alone = log["output"].to_numpy(), far[order[: alone.max(initial=-1) + 1]]
     found = _named(alone, "the output of {:.4g} at a rate of {:.4g} deg/s", output, rate)
     found |= _named(jumps, "the temperature of {:.4g} degC", temperature)
@@ -153,7 +153,7 @@ def find_standing_thermometer(log):
         return []
     by_run = log.groupby("run", observed=True)["temperature"]
     longest = by_run.agg(lambda values: stretches_of(values.to_numpy())[1].max())
-    usual = _ALONE * longest.quantile(0.5, interpolation="lower")
+    usual = ALONE * longest.quantile(0.5, interpolation="lower")
     stands = (by_run.nunique() == 1) & (longest > usual) & (longest >= FEWEST_ROWS)
     return longest.index[stands].tolist()
 
