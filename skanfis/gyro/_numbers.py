@@ -61,6 +61,7 @@ def going_on(time, form, counter):
         return time, known[:0]
     usual = np.median(steps[steps > 0.0]) if (steps > 0.0).any() else 0.0
     is_over = back & (np.abs(steps + counter - usual) <= 3.0 * usual)
+    is_over &= known.size > 0 and np.ptp(time[known]) < counter  # no counter exceeds its range
     rounds = np.cumsum(is_over)
     rounds -= np.maximum.accumulate(np.where(back & ~is_over, rounds, 0))
     time[known] += counter * rounds

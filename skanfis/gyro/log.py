@@ -255,13 +255,13 @@ class LogFile:
         except LogError as error:
             raise self.located(error, table.index) from error
         if "time" in parts:
-            counter = convert(2.0**32, self.layout.units["time"])
-            parts["time"], back = going_on(parts["time"], self._form, counter)
-            for first in map(self.source.place_of, back[:1]):
-                self.notes.append(
-                    f"{self.path}: the clock goes back by the range of its 32 bits in "
-                    f"{counted(back.size, 'place')}, first at {first}; the time goes on"
-                )
+            for bits in (16, 24, 32):
+                counter = convert(2.0**bits, self.layout.units["time"])
+                parts["time"], back = going_on(parts["time"], self._form, counter)
+                for first in map(self.source.place_of, back[:1]):
+                    told = f"in {counted(back.size, 'place')}, first at {first}; the time goes on"
+                    what = f"the clock goes back by the range of its {bits} bits"
+                    self.notes.append(f"{self.path}: {what} {told}")
         return pd.DataFrame(parts, copy=False)
 
     def _in_order(self, log):

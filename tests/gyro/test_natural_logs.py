@@ -361,16 +361,21 @@ def test_a_gap_in_one_column_is_no_power_on(tmp_path, truth):
 
 
 @pytest.mark.parametrize(
-    ("name", "unit", "steps", "places"),
-    [("t_us", 1e-6, 2e7, "2 places"), ("t_ms", 1e-3, 6e5, "1 place")],
+    ("name", "unit", "steps", "bits", "places"),
+    [
+        ("t_us", 1e-6, 2e7, 32, "2 places"),
+        ("t_ms", 1e-3, 6e5, 32, "1 place"),
+        ("t_ms", 1e-3, 78_125.0, 24, "2 places"),
+        ("t_ms", 1e-3, 305.0, 16, "2 places"),
+    ],
 )
-def test_a_counter_of_32_bits_that_begins_again_goes_on(tmp_path, truth, name, unit, steps, places):
+def test_a_counter_that_begins_again_goes_on(tmp_path, truth, name, unit, steps, bits, places):
     """One of microseconds does every 72 minutes: no run begins there."""
-    clock = (steps * np.arange(-15.5, 284.0)) % 2**32
+    clock = (steps * np.arange(-15.5, 284.0)) % 2**bits
     reading = found_in(tmp_path, truth[PARTS[1:]].assign(**{name: clock}))
     np.testing.assert_allclose(np.diff(reading.log["time"]), steps * unit)
     assert "run" not in reading.log
-    told = f"back by the range of its 32 bits in {places}, first at line 18; the time goes"
+    told = f"back by the range of its {bits} bits in {places}, first at line 18; the time goes"
     assert told in "; ".join(reading.notes)
 
 
