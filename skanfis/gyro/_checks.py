@@ -313,15 +313,13 @@ def _check_saturation(output, rate):
     _check_standing(output, rate, ends, "rows", "saturated")
     order = np.argsort(rate, kind="stable")
     starts, lengths = stretches_of(output[order])
-    is_end = np.isin(output[order[starts]], (output.min(), output.max()))
-    usual = lengths[~is_end].max(initial=0)
-    for place in np.flatnonzero(is_end & (lengths >= FEWEST_ROWS) & (lengths > ALONE * usual)):
-        if usual:
-            row, n_rows = int(order[starts[place]]), lengths[place]
-            told = (
-                f"stands at {output[row]:.6g} in {n_rows} rows at {rate[row]:.4g} deg/s, and has "
-            )
-            reason = f"{told}noise at other rates: it is saturated. Leave these rows out."
+    if not _is_noisy(output[order[lengths[0] : -lengths[-1]]]):
+        return
+    for place, is_away in ((0, rate.min() < 0.0), (-1, rate.max() > 0.0)):
+        if is_away and lengths[place] > max(FEWEST_ROWS, ALONE * lengths[1:-1].max()):
+            row = int(order[starts[place]])
+            told = f"stands at {output[row]:.6g} in {lengths[place]} rows at {rate[row]:.4g} deg/s,"
+            reason = f"{told} and has noise at other rates: it is saturated. Leave these rows out."
             raise LogError(reason, "output", row)
 
 
@@ -339,13 +337,19 @@ def _check_stuck(output, rate):
 
 def _check_stuck_at_rest(output):
     """Raise LogError if the output keeps one value, row after row, and its noise is far larger."""
-    steps, (starts, lengths) = np.diff(output), stretches_of(output)
-    smallest = np.abs(steps[steps != 0.0]).min(initial=np.inf)
-    is_noise = (steps[1:] * steps[:-1] < 0.0) & (np.abs(steps[1:]) > 1.5 * smallest)
+    starts, lengths = stretches_of(output)
     row, n_rows = int(starts[lengths.argmax()]), lengths.max()
-    if n_rows >= _FEWEST_AT_REST and is_noise.mean() > _NOISY:
+    if n_rows >= _FEWEST_AT_REST and _is_noisy(output):
         told = f"stands at {output[row]:.6g} in {n_rows} rows on end, and has noise in "
         raise LogError(f"{told}the others: it is stuck. Leave these rows out.", "output", row)
+
+
+def _is_noisy(output):
+    """Whether noise turns back by two steps of the output's resolution in many rows."""
+    steps = np.diff(output)
+    smallest = np.abs(steps[steps != 0.0]).min(initial=np.inf)
+    is_noise = (steps[1:] * steps[:-1] < 0.0) & (np.abs(steps[1:]) > 1.5 * smallest)
+    return is_noise.sum() > _NOISY * is_noise.size
 
 
 def _check_standing(output, rate, places, rows, what):

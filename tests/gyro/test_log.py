@@ -296,16 +296,17 @@ def test_sound_logs_have_no_glitches(options):
     assert glitches(log.assign(output=log["output"] + 0.05 * g.standard_t(3, len(log)))) == []
 
 
-def test_an_output_saturated_at_one_rate_of_a_table_is_refused():
-    rates = [-100.0, -50.0, 0.0, 50.0, 100.0]
-    log = simulated(rates=rates, sampling_interval=10.0)
-    counts = (1e3 * log["output"]).round()
+def test_an_output_saturated_at_one_rate_of_a_table_is_refused(rng):
+    log = simulated(rates=[-100.0, -50.0, 0.0, 50.0, 100.0], sampling_interval=10.0)
+    counts = (1e3 * log["output"] + 5.0 * rng.normal(size=len(log))).round()
     check_log(log.assign(output=counts), units={"output": "counts"})
     clipped = log.assign(output=counts.clip(lower=0.9 * counts.min()))
     with pytest.raises(LogError, match=r"in 72 rows at -100 deg/s, and has noise at other rates"):
         check_log(clipped, units={"output": "counts"})
-    # A resolution as coarse as the steps of the table hides all noise.
+    # A coarse output has no noise anywhere, and at rest no gyro is saturated.
     check_log(log.assign(output=(0.1 * log["output"]).round()), units={"output": "counts"})
+    rest = log.assign(output=counts.where(log["rate"] > 0.0, 0.0))[log["rate"] >= 0.0]
+    check_log(rest.reset_index(drop=True), units={"output": "counts"})
 
 
 def test_a_thermometer_that_is_stuck_in_a_run_is_named():
