@@ -193,6 +193,8 @@ def choose_split(log, kind="auto", *, uses_output=True):
     if kind == "piece":
         reason += "; so few cycles cannot show whether they repeat"
     parts = kind.split("+")
+    if "device" in parts:
+        reason += "; a log of each device alone may leave less"
     for part in parts:
         _check(part, counts)
     numbers = np.column_stack([fold_numbers(part, groups[part], len(parts)) for part in parts])

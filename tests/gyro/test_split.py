@@ -97,6 +97,7 @@ def test_choice(options, kind):
     log = log_of(**options)
     split = choose_split(log)
     assert split.kind == kind
+    assert ("a log of each device alone may leave less" in split.sentence) == ("device" in kind)
     every_row_once(split, len(log))
 
 
