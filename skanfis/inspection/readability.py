@@ -151,9 +151,9 @@ class Readability:
     def _on_few_rows(self):
         numbers, rows = self._said.n_numbers, self.model.rule_rows
         few = np.flatnonzero(self._is_on_few)
-        named = _named([f"{r} (rows: {rows[r]:.3g}, numbers: {numbers[r]})" for r in few])
-        what = "Strongest on fewer rows than its sentence has numbers: rule"
-        return [f"{what} {named}."] if named else []
+        named = _named([f"rule {r} (rows: {rows[r]:.3g}, numbers: {numbers[r]})" for r in few])
+        what = "Strongest on fewer rows than its sentence has numbers"
+        return [f"{what}: {named}."] if named else []
 
     def _on_constants(self):
         """Rules that err more on the rows on which they are the strongest than a constant would."""
@@ -164,12 +164,12 @@ class Readability:
         if self.is_of_chunk:
             is_poor &= (found.rule_rows >= self._said.n_numbers)[:, None]
         for r, k in np.argwhere(is_poor):
-            rule = f"{r} of {outputs[k]}" if len(outputs) > 1 else r
+            rule = f"rule {r} of {outputs[k]}" if len(outputs) > 1 else f"rule {r}"
             both = found.rule_errors[r, k], found.rule_spreads[r, k]
             errs, spread = (in_digits(found.deviation[k] * one, 3) for one in both)
             named.append(f"{rule} (errs by {errs}, a constant by {spread})")
-        what = "Errs more on its own rows than a constant would: rule"
-        return [f"{what} {_named(named)}."] if named else []
+        what = "Errs more on its own rows than a constant would"
+        return [f"{what}: {_named(named)}."] if named else []
 
     @property
     def line(self) -> str:

@@ -123,10 +123,7 @@ def export_text(
     model, chosen = said.model, shown_rules(said.model, max_shown)
     counts = f"{counted(model.n_rules, 'rule')}, {_inputs_and_rows(model)}."
     parts = ["\n".join([counts, *map(wrapped, _deviations(model, found, precision))])]
-    common = _common_lines(said)
-    parts += [wrapped(f"Common to the rules, {line}.") for line in common]
-    if common:
-        parts[-1] += f"\n{_IN_PLACE}"
+    parts += [f"{wrapped(line)}\n{_IN_PLACE}" for line in _common_lines(said)]
     premises = premise_texts(model)
     for r in chosen:
         heading = ", ".join([f"Rule {r}", *_on_rows(model, found, r)])
@@ -135,8 +132,7 @@ def export_text(
             lines.append(f"{' AND' if k else 'THEN'} {name} is {_conclusion(said, r, k)}")
         said_of = [wrapped(one, "  ", 7 * " ") for one in lines]
         parts.append("\n".join([wrapped(f"{heading}:"), *said_of]))
-    if len(chosen) < model.n_rules:
-        parts.append(f"Left out: {_left_out(model, chosen)}.")
+    parts += _left_out(model, chosen)
     if show_terms:
         parts.append(_legend(said, found, precision))
     parts.append("\n".join(wrapped(one) for one in _last_lines(said, found, precision)))
@@ -187,9 +183,7 @@ def rules_html(estimator: Any, *, max_shown: int = 10) -> str:
         table = pd.DataFrame(cells, index=chosen).map(in_one_line).rename(columns=in_one_line)
         table = table.rename_axis(columns=["", "rule"]).to_html(border=0, justify="left")
     counts = f"<b>{counted(model.n_rules, 'rule')}</b>, {_inputs_and_rows(model)}"
-    below = [f"Common to the rules, {line}. {_IN_PLACE}" for line in _common_lines(said)]
-    if len(chosen) < model.n_rules:
-        below.append(f"and {_left_out(model, chosen)}")
+    below = [f"{line} {_IN_PLACE}" for line in _common_lines(said)] + _left_out(model, chosen)
     numbers, *findings = _last_lines(said, found)
     parts = [f"<div>{counts}</div>", _divs(_deviations(model, found)), table]
     parts.append(_divs([*below, numbers]))
@@ -236,10 +230,10 @@ def _deviations(model, found, precision=PRECISION):
 
 
 def _common_lines(said):
-    """The common line of every output that has one: "y: -0.12 per rate from 20, ..."."""
+    """The common line of every output that has one: "Common to the rules, y: -0.12 per ..."."""
     slopes = [_slopes(said, own, said.common_place, own != 0.0) for own in said.common.T]
     pairs = zip(said.model.output_names, slopes, strict=True)
-    return [f"{name}: {', '.join(own)}" for name, own in pairs if own]
+    return [f"Common to the rules, {name}: {', '.join(own)}." for name, own in pairs if own]
 
 
 def _conclusion(said, r, k):
@@ -379,9 +373,12 @@ def _term_text(term, locations):
 
 
 def _left_out(model, chosen):
-    text = counted(model.n_rules - len(chosen), "rule")
-    rest = percent(max(1.0 - parts_led(model)[chosen].sum(), 0.0))
-    return f"{text}, strongest on {rest} of the rows" if has_training_data(model) else text
+    """Say "Left out: 2 rules, strongest on 4 % of the rows.", if any are."""
+    text = f"Left out: {counted(model.n_rules - len(chosen), 'rule')}"
+    if has_training_data(model):
+        rest = percent(max(1.0 - parts_led(model)[chosen].sum(), 0.0))
+        text += f", strongest on {rest} of the rows"
+    return [f"{text}."] if len(chosen) < model.n_rules else []
 
 
 def wrapped(text, first="", later=""):

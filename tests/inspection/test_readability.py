@@ -74,6 +74,8 @@ def test_what_is_beyond_a_limit_is_said():
     assert sentence == (
         "Strongest on fewer rows than its sentence has numbers: rule 11 (rows: 6, numbers: 7)."
     )
+    (sentence,) = found_of(A_GRID, rule_rows=np.array([*[50.0] * 10, 6.0, 5.0])).findings
+    assert sentence.endswith(": rule 10 (rows: 6, numbers: 7), rule 11 (rows: 5, numbers: 7).")
 
 
 def test_a_rule_that_errs_more_than_the_mean_of_its_rows_is_named():

@@ -547,8 +547,17 @@ def test_there_is_a_line_per_rule(model):
     for t in np.unique(terms[terms >= 0]):
         assert Sentences.of(model).model.term_names[t] in page.text
     assert f"{model.n_rules} rule" in page.text
-    left = f"and {model.n_rules - 1} rule"
+    left = f"Left out: {model.n_rules - 1} rule"
     assert (left in Outline(rules_html(model, max_shown=1)).text) == (model.n_rules > 1)
+
+
+def test_below_the_table_stand_sentences_of_the_text():
+    model = with_common_slopes(MODELS["grid, order 1, 2 outputs"])
+    text, page = export_text(model, max_shown=3), Outline(rules_html(model, max_shown=3))
+    told = [one for one in text.split("\n\n") if one.startswith(("Common", "Left out"))]
+    # "This line" is that of the output named just before.
+    assert ["this line" in one for one in told] == [True, True, False]
+    assert " ".join(" ".join(told).split()) in page.text
 
 
 def test_names_of_many_letters_keep_to_the_lines():
