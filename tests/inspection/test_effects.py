@@ -178,6 +178,14 @@ def test_what_is_held_is_told():
     assert effects(free, X).held == 0.0
 
 
+def test_an_output_that_never_changes_is_not_held(rng):
+    X = rng.uniform(size=(60, 2))
+    Y = np.column_stack([np.sin(6 * X[:, 0]) + X[:, 1], np.full(60, 7.1)])
+    found = effects(ANFISRegressor(n_mfs=2).fit(X, Y), X, output=1)
+    assert (found.held, found.notes) == (0.0, [])
+    assert not found.table.to_numpy().any()
+
+
 def test_inputs_without_terms_do_nothing_together():
     X = rows_of(MODELS["grid, order 1, 1 outputs"], 1.0, 9)
     found = effects(MODELS["grid on two inputs, order 0, 1 outputs"], X).table
