@@ -279,7 +279,7 @@ class ResponseSurfaceDisplay:
 
 def axes_or_new(ax, figsize=(5.6, 4.2)):
     """The given axes, or those of a new figure."""
-    return pyplot().subplots(figsize=figsize, layout="constrained")[1] if ax is None else ax
+    return spaced(pyplot().subplots(figsize=figsize, layout="constrained")[1]) if ax is None else ax
 
 
 def panels_or_new(ax, count, note):
@@ -293,7 +293,13 @@ def panels_or_new(ax, count, note):
     rows = -(-count // columns)
     figure = pyplot().figure(figsize=(3.2 * columns, 2.6 * rows), layout="constrained")
     figure.supxlabel(fill(note, _LEGEND_WIDTH * columns), fontsize="small", color="0.4")
-    return np.array([figure.add_subplot(rows, columns, i + 1) for i in range(count)])
+    return np.array([spaced(figure.add_subplot(rows, columns, i + 1)) for i in range(count)])
+
+
+def spaced(axes):
+    """The axes with few numbers along x: more, of six letters each, run into one another."""
+    axes.locator_params("x", nbins=4)
+    return axes
 
 
 def pyplot():

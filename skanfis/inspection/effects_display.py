@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from .._validation import check_count
 from ..digits import counted
 from .anova import N_SHARED, draw
-from .displays import BINS, BRIGHTEST, panels_or_new, pyplot
+from .displays import BINS, BRIGHTEST, panels_or_new, pyplot, spaced
 from .effects import Study
 from .labels import on_axis
 
@@ -198,6 +198,7 @@ def _draw_pair(axes, pair):
     shown = axes.pcolormesh(*pair["points"], pair["effect"], vmin=-largest, vmax=largest)
     label = f"together {round(100.0 * pair['share'])} % of variance"
     bar = axes.figure.colorbar(shown, ax=axes, location="top")
+    spaced(bar.ax)
     bar.set_label(label, fontsize="small", loc="left")
     sides = zip(pair["inputs"], pair["points"], pair["levels"], strict=True)
     for side, of_side in zip((axes.xaxis, axes.yaxis), sides, strict=True):

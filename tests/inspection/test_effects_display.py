@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from skanfis.inspection import EffectsDisplay, effects
+from skanfis.inspection import EffectsDisplay, ResponseSurfaceDisplay, effects
 
 from ..export.rule_bases import MODELS, build, rows_of
 from ..quick import quick
@@ -127,6 +127,21 @@ def test_labels_of_many_levels_stand_apart(levels, rng):
     assert len(sides) == 2  # under a panel of its own, and beside that of the pair or under it
     for labels in sides:
         boxes = [one.get_window_extent() for one in labels]
+        assert not any(one.overlaps(next_one) for one, next_one in pairwise(boxes))
+
+
+def test_numbers_of_many_letters_stand_apart(rng):
+    low, high = [1977.0, 2e5, 0.0], [1999.0, 3e5, 2.0]
+    X = pd.DataFrame(rng.uniform(low, high, (90, 3)), columns=["year", "people", "load"])
+    model = quick(n_mfs=2).fit(X, 2e5 * (X["year"] - 1988) / 11 * (X["load"] - 1))
+    displays = [one.from_estimator(model, X) for one in (EffectsDisplay, ResponseSurfaceDisplay)]
+    for axes in [one for display in displays for one in drawn(display).figure_.axes]:
+        low, high = axes.get_xlim()
+        boxes = [
+            label.get_window_extent()
+            for label, at in zip(axes.get_xticklabels(), axes.get_xticks(), strict=True)
+            if low <= at <= high
+        ]
         assert not any(one.overlaps(next_one) for one, next_one in pairwise(boxes))
 
 
