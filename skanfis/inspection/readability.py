@@ -13,6 +13,7 @@ from sklearn.utils import check_array, check_consistent_length, column_or_1d
 from .._validation import as_numbers, check_finite, positive_weights
 from ..digits import counted, in_digits
 from ..export import fold_with_rows
+from ..export.columns import categories
 from ..export.folding import last_step
 from ..model import TSKModel
 from .labels import MOST_NAMED, in_one_line
@@ -273,13 +274,19 @@ def _on_signs(said):
     model = said.model
     if model.posterior is None or not model.order:
         return []
-    found = []
-    deviations = model.posterior.of_coefficients(model.n_rules)[:, 1:]
+    found, every, deviations = [], said.slopes.copy(), np.zeros(said.slopes.shape)
+    deviations[:, model.posterior.inputs] = model.posterior.of_coefficients(model.n_rules)[:, 1:]
+    # Sentences may count from a level of their own: here all rules count from the same.
+    for own in (one.inputs for one in categories(model).values() if not one.others):
+        base = [own[np.abs(every[:, own]).sum(axis=(0, 2)).argmin()]]
+        moved = every[:, base]
+        every[:, own] -= moved
+        deviations[:, own] = np.hypot(deviations[:, own], deviations[:, base] * (moved != 0.0))
     heavy = model.rule_weights >= _LEAST_WEIGHT
     for k, output in enumerate(model.output_names):
-        for place, j in enumerate(model.posterior.inputs):
-            slopes = said.slopes[:, j, k]
-            is_clear = heavy & (np.abs(slopes) > _DEVIATIONS * deviations[:, place, k])
+        for j in model.posterior.inputs:
+            slopes = every[:, j, k]
+            is_clear = heavy & (np.abs(slopes) > _DEVIATIONS * deviations[:, j, k])
             up, down = (np.flatnonzero(is_clear & (sign * slopes > 0.0)) for sign in (1.0, -1.0))
             if up.size and down.size:
                 name, of_output = model.input_names[j], f" (of {output})" * (model.n_outputs > 1)

@@ -16,6 +16,7 @@ from skanfis.inspection import explain, export_text, readability
 
 from ..export.rule_bases import MODELS, rows_of
 from ..quick import quick
+from .encoded import encoded
 
 A_GRID = MODELS["grid, order 1, 1 outputs"]
 WELL = "Nothing measured here speaks against reading the rules one by one."
@@ -130,6 +131,21 @@ def test_rules_that_go_different_ways_beyond_chance(rng):
     for sign in (1.0, -1.0):
         line = ANFISRegressor(n_mfs=1).fit(X, sign * X["time"] + 0.1 * rng.standard_normal(500))
         assert not line.readability_.findings
+
+
+def test_levels_go_different_ways_whatever_level_a_rule_counts_from(rng):
+    # In each of two rules another level is the commonest, and the better one.
+    best = np.where(np.arange(600) % 2, "A", "B")
+    kind = np.where(rng.uniform(size=600) < 0.7, best, rng.choice(["A", "B"], 600))
+    X = pd.DataFrame({"kind": kind, "on": np.arange(600) % 2})
+    y = 3.0 * (kind == best) + 0.1 * rng.standard_normal(600)
+    model = ANFISRegressor(partition="tree", max_rules=2, premise_features=[2])
+    pipe = encoded(["kind"], model).fit(X, y)
+    text = export_text(pipe)
+    assert "if kind is A" in text
+    assert "if kind is B" in text
+    (sentence,) = readability(pipe, X, y).findings
+    assert re.search("chance: if kind is [AB], up in rule [01] and down in rule [01].$", sentence)
 
 
 def test_errors_name_the_row_and_the_column():
