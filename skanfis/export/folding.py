@@ -293,9 +293,10 @@ def _model_of(label, estimator):
     model = getattr(estimator, "model_", None)
     if not isinstance(model, TSKModel):
         check_is_fitted(estimator)
+        why = ": search with refit=True" if getattr(estimator, "refit", True) is False else ""
         raise TypeError(
             f"estimator must be or end in an ANFIS estimator; {_described(label, estimator)} has "
-            "no rules."
+            f"no rules{why}."
         )
     return model.with_out_of_bounds(*policy_of(estimator.out_of_bounds))
 

@@ -248,6 +248,8 @@ def test_an_imputer_that_drops_a_column_is_refused():
 def test_what_has_no_rules_is_refused():
     with pytest.raises(TypeError, match=r"LinearRegression.* has no rules"):
         fold(make_pipeline(StandardScaler(), LinearRegression()).fit(X, Y))
+    with pytest.raises(TypeError, match=r"GridSearchCV has no rules: search with refit=True"):
+        fold(GridSearchCV(ANFISRegressor(n_mfs=2), {"order": [0]}, cv=2, refit=False).fit(X, Y))
     with pytest.raises(TypeError, match="got 3"):
         fold(3)
     with pytest.raises(TypeError, match="fitted ANFIS estimator"):
