@@ -13,8 +13,9 @@ def readability(model, X, y):
     """Figures of a model with Gaussian terms on its training rows.
 
     "strongest": the strongest rule alone, RMS to the model in deviations of the target. "false" and
-    "alike": terms that are nowhere on the rows truer than 0.5, and pairs of neighbours that cross
-    above 0.9. "cost": numerals in the rules' sentences. "text": RMSE of the text over the model's.
+    "alike": terms that are nowhere on the rows truer than 0.5, and pairs of a grid's neighbours
+    that cross above 0.9; scattered rules have terms of their own, and those may be alike. "cost":
+    numerals in the rules' sentences. "text": RMSE of the text over the model's.
     """
     strengths, consequents = model.strengths(X), model.consequents_
     rows = np.arange(X.shape[0])
@@ -22,10 +23,11 @@ def readability(model, X, y):
     alone = outputs[rows, strengths.argmax(axis=1)]
     distance = rms(alone - model.predict(X)) / y.std()
     n_false, n_alike = _terms(model.memberships_, X)
+    is_grid = model.model_.antecedent.grid_counts is not None
     return {
         "strongest": distance,
         "false": n_false,
-        "alike": n_alike,
+        "alike": n_alike if is_grid else 0,
         "rules": int(model.n_rules_),
         "cost": model.readability_.reading_cost,
         "text": float(model.readability_.summary["text_over_model"]),
