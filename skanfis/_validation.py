@@ -344,28 +344,23 @@ def row_weights(given, n_rows):
     return weights
 
 
-def check_not_negative(sample_weight):
-    """Raise ValueError that names the first row of negative weight, if there is one."""
+def positive_weights(sample_weight, n_rows, least=2):
+    """Mask of the rows with positive weight, or None if all rows have it.
+
+    ValueError if a weight is negative, or if fewer than ``least`` rows are left.
+    """
     if np.any(sample_weight < 0):
         row = int(np.argmax(sample_weight < 0))
         raise ValueError(
             f"Negative values in sample_weight: {sample_weight[row]:g} at row {row}; weights must "
             "be zero or positive."
         )
-
-
-def positive_weights(sample_weight, n_rows, least=2):
-    """Mask of the rows with positive weight, or None if all rows have it.
-
-    ValueError if a weight is negative, or if fewer than ``least`` rows are left.
-    """
-    check_not_negative(sample_weight)
     keep = sample_weight > 0
     n_kept = int(np.count_nonzero(keep))
     if n_kept < least:
         raise ValueError(
-            f"sample_weight leaves {n_kept} of {n_rows} rows with a positive weight; at least "
-            f"{least} are needed, and a row of weight zero is none."
+            f"sample_weight leaves {n_kept} of {n_rows} rows with a positive weight, but a "
+            f"row of weight zero is none: give at least {least} a positive weight."
         )
     return None if n_kept == n_rows else keep
 

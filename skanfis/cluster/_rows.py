@@ -14,7 +14,13 @@ from sklearn.base import BaseEstimator, ClusterMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from .._sklearn import fit_context
-from .._validation import check_finite, check_not_negative, named_refusals, row_weights
+from .._validation import (
+    check_finite,
+    named_refusals,
+    positive_weights,
+    row_weights,
+    unchanged_by_failure,
+)
 from ..blocks import row_blocks
 
 # Number of distances in a block: a few arrays of this size stay in the cache.
@@ -33,10 +39,8 @@ def check_rows(estimator, X, reset=False) -> np.ndarray:
 def distinct_rows(X, sample_weight):
     """Distinct rows of positive weight, in lexicographic order, and the weight of each."""
     weight = row_weights(1.0 if sample_weight is None else sample_weight, len(X))
-    check_not_negative(weight)
+    positive_weights(weight, len(X), least=1)
     keep = weight > 0
-    if not keep.any():
-        raise ValueError("Every sample_weight is zero: no row is left to cluster.")
     rows, group = np.unique(X[keep], axis=0, return_inverse=True)
     return rows, np.bincount(group.ravel(), weights=weight[keep])
 
@@ -70,9 +74,10 @@ class Clusterer(ClusterMixin, BaseEstimator):
         sample_weight : array-like of shape (n_samples,), default=None
             Zero or positive; a whole number counts as that many copies of the row.
         """
-        X = check_rows(self, X, reset=True)
-        self._find_centers(*distinct_rows(X, sample_weight))
-        self.labels_ = self._labels(X)
+        with unchanged_by_failure(self):
+            X = check_rows(self, X, reset=True)
+            self._find_centers(*distinct_rows(X, sample_weight))
+            self.labels_ = self._labels(X)
         return self
 
     def predict(self, X: ArrayLike) -> Any:

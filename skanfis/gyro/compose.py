@@ -95,8 +95,6 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
             If ``n_rounds`` is less than 1, or the base has no finite prediction for a training row.
         """
         check_scalar(self.n_rounds, "n_rounds", (int, np.integer), min_val=1)
-        # Each part checks X itself, here and in predict; this only records the columns.
-        validate_data(self, X, skip_check_array=True)
         target: np.ndarray = column_or_1d(y, dtype=float, warn=True)
         base = OpenLoopArcsineRegressor() if self.base is None else self.base
         residual = ANFISRegressor() if self.residual is None else self.residual
@@ -115,7 +113,8 @@ class ResidualRegressor(RegressorMixin, BaseEstimator):
                 )
             fitted_residual = clone(residual).fit(X, left, **given)
             learnt = fitted_residual.predict(X)
-        # Set both at once, so that an interrupted fit does not mix parts of two fits.
+        # All at once: a fit that fails leaves what was there. The parts have checked X themselves.
+        validate_data(self, X, skip_check_array=True)
         self.base_, self.residual_ = fitted_base, fitted_residual
         return self
 

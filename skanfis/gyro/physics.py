@@ -7,6 +7,7 @@ the law gives an output for every rate. docs/gyro_physics.rst has the formulas.
 from __future__ import annotations
 
 import warnings
+from copy import copy
 from types import SimpleNamespace
 from typing import Self
 
@@ -136,11 +137,12 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
             coefficients, or if output or rate never change.
         """
         check_parameters(self)
-        inputs, rate = validate_data(self, X, y, dtype=float, y_numeric=True)
-        columns = self._find_columns()
+        trial = copy(self)  # so that a fit that fails leaves what was there
+        inputs, rate = validate_data(trial, X, y, dtype=float, y_numeric=True)
+        columns = trial._find_columns()
         used = inputs[:, columns]
         log = _standardised(used, rate.astype(float))
-        log.degrees = self._degrees(used)
+        log.degrees = trial._degrees(used)
         n_coefficients = sum(log.degrees) + 3 + log.has_lag
         if rate.size < n_coefficients:
             raise ValueError(
@@ -150,13 +152,14 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         for name, values in (("the output", used[:, 0]), ("the rate (y)", rate)):
             if np.ptp(values) == 0:
                 raise ValueError(f"No scale factor can be found: {name} never changes.")
-        parameters, self.n_iter_, has_settled = _fit_law(log)
+        parameters, trial.n_iter_, has_settled = _fit_law(log)
         if not has_settled:
             message = f"The law did not settle within {_MAX_EVALUATIONS} evaluations."
             warnings.warn(message, ConvergenceWarning, stacklevel=2)
-        self._keep(log, _law_of(parameters, log))
-        self.columns_ = columns
-        self.minimum_, self.maximum_ = used.min(axis=0), used.max(axis=0)
+        trial._keep(log, _law_of(parameters, log))
+        trial.columns_ = columns
+        trial.minimum_, trial.maximum_ = used.min(axis=0), used.max(axis=0)
+        self.__dict__ = trial.__dict__
         return self
 
     def predict(self, X: ArrayLike) -> np.ndarray:

@@ -5,6 +5,7 @@ docs/gyro_data.rst says what it is for, and has the recursion in C.
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any, Self
 
 import numpy as np
@@ -67,17 +68,19 @@ class ThermalRate(OneToOneFeatureMixin, TransformerMixin, BaseEstimator):
         constant = self.time_constant
         if not (isinstance(constant, int | float | np.number) and 0.0 < constant < np.inf):
             raise ValueError(f"time_constant={constant!r} must be a positive number.")
-        names, columns = self._columns_of(X, reset=True)
-        self._time, self._run = (
+        trial = copy(self)  # so that a fit that fails leaves what was there
+        names, columns = trial._columns_of(X, reset=True)
+        trial._time, trial._run = (
             None if given is None else column_position(names, role, given)
-            for role, given in (("time", self.time), ("run", self.run))
+            for role, given in (("time", trial.time), ("run", trial.run))
         )
-        if self._time is not None and self._time == self._run:
-            raise ValueError(f"time={self.time!r} and run={self.run!r} are one column.")
-        self._filtered = [i for i in range(len(names)) if i not in (self._time, self._run)]
-        if not self._filtered:
+        if trial._time is not None and trial._time == trial._run:
+            raise ValueError(f"time={trial.time!r} and run={trial.run!r} are one column.")
+        trial._filtered = [i for i in range(len(names)) if i not in (trial._time, trial._run)]
+        if not trial._filtered:
             raise ValueError(f"X has {len(names)} feature(s), time or run: nothing to filter.")
-        self._rates(names, columns)  # so that fit refuses what transform refuses
+        trial._rates(names, columns)  # so that fit refuses what transform refuses
+        self.__dict__ = trial.__dict__
         return self
 
     def transform(self, X: ArrayLike) -> np.ndarray:

@@ -45,6 +45,24 @@ def test_errors_name_the_row_and_the_column(clusterer, rng):
         clone(clusterer).fit(X, sample_weight=np.zeros(10))
 
 
+@BOTH
+def test_fit_that_fails_or_is_interrupted_leaves_the_one_before(clusterer, rng, monkeypatch):
+    def interrupt(*_):
+        raise KeyboardInterrupt
+
+    X = rng.normal(size=(50, 2))
+    fitted = clone(clusterer).fit(X)
+    before = vars(fitted).copy()
+    with pytest.raises(ValueError, match=r"weight.*zero"):
+        fitted.fit(X[:, :1], sample_weight=0.0)
+    assert vars(fitted) == before
+    for where in ("subtractive.potentials", "fuzzy_cmeans.descend", "_rows.nearest"):
+        monkeypatch.setattr(f"skanfis.cluster.{where}", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        fitted.fit(100.0 * X)
+    assert vars(fitted) == before
+
+
 @pytest.mark.parametrize(
     ("clusterer", "message"),
     [

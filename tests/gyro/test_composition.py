@@ -84,5 +84,6 @@ def test_a_fit_that_fails_leaves_both_parts_of_the_one_before():
     before = model.predict(X)
     model.set_params(residual=LinearRegression(positive="no"))
     with pytest.raises(ValueError, match="positive"):
-        model.fit(X, 2.0 * RATE)
+        model.fit(X[["output", "temperature"]], 2.0 * RATE)
+    assert model.n_features_in_ == 3
     np.testing.assert_array_equal(model.predict(X), before)

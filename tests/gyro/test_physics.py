@@ -152,3 +152,12 @@ def test_bad_logs_are_refused(rng):
         OpenLoopArcsineRegressor().fit(X, np.full(20, 3.0))
     with pytest.raises(ValueError, match="the output never changes"):
         OpenLoopArcsineRegressor().fit(X * [0.0, 1.0], rate)
+
+
+def test_a_fit_that_fails_leaves_the_law_of_the_one_before(rng):
+    X, rate = calibration(rng, n_rows=20)
+    law = OpenLoopArcsineRegressor().fit(X, rate)
+    before = law.predict(X)
+    with pytest.raises(ValueError, match="the output never changes"):
+        law.fit(np.column_stack([X, rate]) * [0.0, 1.0, 1.0], rate)
+    np.testing.assert_array_equal(law.predict(X), before)

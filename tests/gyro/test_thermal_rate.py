@@ -142,3 +142,11 @@ def test_refuses_logs_that_cannot_be_filtered(log):
         clone(feature).transform(log)
     with pytest.raises(ValueError, match="feature names"):
         feature.fit(log).transform(log[["T", "t", "run", "other"]])
+
+
+def test_a_fit_that_fails_leaves_the_columns_of_the_one_before(log):
+    feature = clone(FEATURE).fit(log)
+    before = feature.transform(log)
+    with pytest.raises(ValueError, match="must increase"):
+        feature.fit(log[["other", "run", "T", "t"]].assign(t=1.0))
+    assert_array_equal(feature.transform(log), before)
