@@ -166,7 +166,7 @@ def _change(old: Scale, new: Scale):
 class _ProblemOfSums(SeparableProblem):
     """The least-squares problem at fixed premises, from sums; no rows are read."""
 
-    def __init__(self, sums: RowSums, penalty: Penalty):
+    def __init__(self, sums: RowSums, penalty: Penalty, extent):
         self.antecedent, self.penalty = sums.base.antecedent, penalty
         # Stands for the rows, of which only the scales are used.
         none = np.empty((0, 0))
@@ -178,7 +178,7 @@ class _ProblemOfSums(SeparableProblem):
         self._sums_at_start = means
         self.local = LocalBasis.from_gram(means[0], self.antecedent.n_rules)
         own, inputs = self.consequent_inputs, sums.inputs
-        extent = np.maximum(sums.rules.extent / inputs.scale[own], 1.0)
+        extent = np.maximum(extent / inputs.scale[own], 1.0)
         self.common_line = CommonLine(self.local, extent, self.antecedent, inputs.varying(own))
 
 
@@ -213,6 +213,7 @@ def fitted_weights(estimator, sums: RowSums):
         "slope_pulls": [[place(name), pull] for name, pull in estimator.slope_pulls_.items()],
         "common": by_input(model.common_slopes),
         "absent": by_input(is_absent),
+        "extent": sums.rules.extent.tolist(),
     }
 
 
@@ -223,19 +224,21 @@ def solve(sums: RowSums, given, first=None) -> Fitted:
     :func:`fitted_weights` returns; without ``first``, the evidence finds them.
     """
     antecedent = sums.base.antecedent
-    given = {key: given[key] for key in _FREE if key in given}
+    given, extent = {key: given[key] for key in _FREE if key in given}, sums.rules.extent
     if first is not None:
         # Weights are relative to a mean over rows, so they fall as rows rise.
         found = {key: first[key] / sums.effective_weight for key in _FREE}
         if "alpha" not in given:
             found["pulls"] = {tuple(component): pull for component, pull in first["pulls"]}
             found["slope_pulls"] = dict(first["slope_pulls"])
+            # Of a fixed strength also where later rows lie further off, or a stray one did.
+            extent = np.array(first["extent"])
             # Shared slopes stay shared, absent ones absent.
             for key in ("common", "absent"):
                 found[key] = tuple((j, tuple(rules)) for j, rules in first[key])
         given = found | given
     free = [key for key in _FREE if key not in given]
-    problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0))
+    problem = _ProblemOfSums(sums, replace(FIRST_PENALTY, **given, stiffness=0.0), extent)
     if free:
         # Rules that stay may compensate one another: least weights would keep them from it.
         premise = replace(Premise.still(antecedent), is_unbounded=True)

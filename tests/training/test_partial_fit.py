@@ -185,6 +185,17 @@ def test_the_penalty_that_the_first_fit_found_stays():
     assert np.abs(model.predict(X) - before).max() < 1e-6 * np.ptp(y)
 
 
+def test_a_stray_row_that_is_forgotten_weighs_on_no_slope():
+    """Nor do later rows make the weights that the first fit found heavier."""
+    X, y = surface(900)
+    models = [ANFISRegressor(n_mfs=[3, 2]).partial_fit(X[:100], y[:100]) for _ in range(2)]
+    stray = X[:1] + 1e3 * np.ptp(X, axis=0)
+    models[1].partial_fit(stray, y[:1], forgetting=0.9)
+    for model in models:
+        in_chunks(model, X[100:], y[100:], [400, 400], forgetting=0.9)
+    assert difference(*models, X) < EXACT
+
+
 def test_after_fit_premises_stay_and_rows_are_new(premises):
     model = deepcopy(premises)
     with pytest.warns(ForgottenRowsWarning, match="no sums over its 300 rows"):
