@@ -74,14 +74,14 @@ def measure_rows(model, rows):
 
 def _sums(rows, model, printed, target):
     """The sums over some rows; ``target`` is the scale of all, ``printed`` the model as printed."""
-    offset, scale, weight = target.offset, target.scale, rows.weights
+    offset, scale = target.offset, target.scale
     by_rule, by_printed = (_standardised(one, offset, scale) for one in (model, printed))
     mass, lead = np.zeros((2, model.n_rules))
     alone, rule_errors, first, second = np.zeros((4, model.n_rules, model.n_outputs))
     errors, printed_errors = np.zeros((2, model.n_outputs))
     n_values = 8 * model.n_rules + model.antecedent.n_terms
     for part in row_blocks(rows.n_rows, fitting_rows(n_values)):
-        Z, s = np.array(rows.X[part].T, dtype=float, order="C"), weight[part]
+        Z, s = np.array(rows.X[part].T, dtype=float, order="C"), rows.part(part).weights
         np.clip(Z, model.minimum[:, None], model.maximum[:, None], out=Z)
         strengths, basis = model.antecedent.strengths(Z), model.basis(Z)
         as_printed = printed.antecedent.strengths(Z)

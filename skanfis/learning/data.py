@@ -89,7 +89,7 @@ def column_statistics(values, sample_weight=None):
     The first sums differences from the first row, the second those from the mean, so that columns
     far from the origin lose no digits.
     """
-    weight = np.ones(len(values)) if sample_weight is None else sample_weight
+    weight = np.broadcast_to(1.0, len(values)) if sample_weight is None else sample_weight
     minimum, maximum = np.full((2, values.shape[1]), [[np.inf], [-np.inf]])
     origin = _columns(values, slice(1))
     total, first, second = 0.0, np.zeros(values.shape[1]), np.zeros(values.shape[1])
@@ -98,13 +98,13 @@ def column_statistics(values, sample_weight=None):
         np.minimum(minimum, block.min(axis=1), out=minimum)
         np.maximum(maximum, block.max(axis=1), out=maximum)
         total += float(weight[part].sum())
-        first += (block - origin) @ weight[part]
+        first += (block - origin) @ np.array(weight[part])
     mean = origin + (first / total)[:, None]
     # Relative to the range: else squares of tiny deviations would vanish unseen.
     span = np.where(never_changes(minimum, maximum), 1.0, maximum - minimum)
     for part in row_blocks(values.shape[0], BLOCK_ROWS):
         deviations = (_columns(values, part) - mean) / span[:, None]
-        second += deviations**2 @ weight[part]
+        second += deviations**2 @ np.array(weight[part])
     return Scale.of(mean[:, 0], span * np.sqrt(second / total), minimum, maximum)
 
 
@@ -179,7 +179,7 @@ class StandardisedData:
     @property
     def total_weight(self):
         """Sum of the weights."""
-        return float(np.sum(self.weights))
+        return float(self.n_rows if self.sample_weight is None else np.sum(self.sample_weight))
 
     @property
     def effective_weight(self):
@@ -189,9 +189,11 @@ class StandardisedData:
         cannot be copies. Then the size of an unweighted sample of the same precision,
         (sum s)^2 / sum s^2 (Kish 1965), is usually larger, and is taken.
         """
+        if self.sample_weight is None:
+            return float(self.n_rows)
         # Relative to the largest: squares of tiny weights would vanish.
-        largest = float(np.max(self.weights))
-        share = self.weights / largest
+        largest = float(np.max(self.sample_weight))
+        share = self.sample_weight / largest
         return max(largest * float(np.sum(share)), float(np.sum(share) ** 2 / np.sum(share**2)))
 
     def chunks(self, block_rows):

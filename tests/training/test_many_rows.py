@@ -9,6 +9,7 @@ from skanfis import ANFISRegressor
 from skanfis.learning import VariableProjection, sampling
 from skanfis.learning.data import StandardisedData
 
+from ..memory import traced
 from ..quick import quick
 
 N_ROWS, N_SAMPLE = 8000, 2000
@@ -86,3 +87,12 @@ def test_every_way_of_training_ends_on_all_rows(few_are_many, settings):
     residual = (Y - model.predict(X)) / Y.std()
     assert_allclose(np.mean(residual**2), model.loss_curve_[-1], rtol=1e-9)
     assert model.model_.rule_rows.sum() == pytest.approx(N_ROWS)
+
+
+def test_memory_does_not_grow_with_the_rows(few_are_many):
+    """A file of single precision may be mapped to memory that would not hold a double per row."""
+    many = np.tile(X.astype(np.float32), (200, 1))
+    target = many[:, 0] * many[:, 1]
+    with traced() as peak:
+        quick([2, 1], solver="lse").fit(many, target)
+    assert peak[0] < many.nbytes
