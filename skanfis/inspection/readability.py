@@ -29,6 +29,7 @@ GREATEST_ERROR = 1.05
 # Smaller errors are rounding errors, as if the target is the prediction itself.
 _ROUNDING = np.sqrt(np.finfo(float).eps)
 # A slope has a sign if it is this many deviations from zero, in a rule of at least this weight.
+# Of m slopes that are zero, the largest is sqrt(2 log m) off by chance: many need as much.
 _DEVIATIONS, _LEAST_WEIGHT = 2.0, 0.05
 
 
@@ -283,10 +284,11 @@ def _on_signs(said):
         every[:, own] -= moved
         deviations[:, own] = np.hypot(deviations[:, own], deviations[:, base] * (moved != 0.0))
     heavy = model.rule_weights >= _LEAST_WEIGHT
+    least = max(_DEVIATIONS, np.sqrt(2.0 * np.log1p(np.count_nonzero(every[heavy]))))
     for k, output in enumerate(model.output_names):
         for j in model.posterior.inputs:
             slopes = every[:, j, k]
-            is_clear = heavy & (np.abs(slopes) > _DEVIATIONS * deviations[:, j, k])
+            is_clear = heavy & (np.abs(slopes) > least * deviations[:, j, k])
             up, down = (np.flatnonzero(is_clear & (sign * slopes > 0.0)) for sign in (1.0, -1.0))
             if up.size and down.size:
                 name, of_output = model.input_names[j], f" (of {output})" * (model.n_outputs > 1)

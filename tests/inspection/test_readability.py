@@ -133,6 +133,15 @@ def test_rules_that_go_different_ways_beyond_chance(rng):
         assert not line.readability_.findings
 
 
+def test_of_many_slopes_some_are_two_deviations_off_by_chance(rng):
+    # Nothing pulls on the slopes of eight rules by ten inputs, which only noise moves.
+    model, told = ANFISRegressor([2, 2, 2, *7 * [1]], solver="lse", alpha=0.0, agreement=0.0), 0
+    for _ in range(10):
+        X = rng.normal(size=(500, 10))
+        told += "ways" in str(model.fit(X, rng.normal(size=500)).readability_)
+    assert told <= 2
+
+
 def test_levels_go_different_ways_whatever_level_a_rule_counts_from(rng):
     # In each of two rules another level is the commonest, and the better one.
     best = np.where(np.arange(600) % 2, "A", "B")
