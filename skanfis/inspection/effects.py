@@ -17,7 +17,7 @@ from ..digits import counted
 from ..export import fold_with_rows
 from ..export.columns import categories
 from ..model import TSKModel
-from .anova import N_DRAWS, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
+from .anova import N_DRAWS, N_VALUES, Block, DrawnAnova, ProductAnova, blocks_of_rows, draw
 from .labels import MOST_NAMED, in_one_line
 
 # A note tells of shares that differ by more, and of outputs held on a larger part of combinations.
@@ -168,6 +168,8 @@ def _notes(table, held, is_by_draws):
             "The strengths of these rules are no products of functions of one input: shares are "
             f"from {N_DRAWS:,} draws, that of an input or a pair good to about {DrawnAnova.error}."
         )
+        if "rows" not in table:
+            notes[-1] += f" Inputs are drawn from {N_VALUES} quantiles each; for long tails give X."
     return notes
 
 

@@ -269,3 +269,14 @@ def test_of_draws_what_no_rule_names_has_no_share_at_all(rng):
     table = effects(model, X).table
     assert_allclose(table.loc[[name for name in table.index if "x2" in name]], 0.0, atol=1e-12)
     assert table.loc["x1", "sobol"] > 0.2
+
+
+def test_draws_without_rows_say_that_they_miss_the_ends_of_tails():
+    rng = np.random.default_rng(0)
+    X = np.column_stack([rng.uniform(0.0, 3.0, 3000), rng.lognormal(sigma=1.5, size=3000)])
+    y = 3.0 * np.sin(2.0 * X[:, 0]) + 0.5 * X[:, 1]
+    model = quick(partition=KMeans(3, n_init=1, random_state=0)).fit(X, y)
+    known, given = effects(model), effects(model, X)
+    assert np.abs(known.table["sobol"] - given.table["sobol"]).max() > 0.02
+    assert "from 200 quantiles each" in known.notes[-1]
+    assert not any("quantiles" in note for note in given.notes)
