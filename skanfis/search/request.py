@@ -38,9 +38,18 @@ class StructureRequest(Plan):
     names: Sequence[str]  # of the inputs
     simplicity: float  # tolerated relative rise of the error, for a model that is easier to read
 
+    def __post_init__(self):
+        """Raise ValueError where two parameters contradict each other."""
+        if isinstance(self.n_mfs, str) or self.partition in ("auto", "grid"):
+            return
+        what = "the imported rules" if isinstance(self.partition, TSKModel) else "other rules"
+        raise ValueError(
+            f"n_mfs={self.n_mfs!r} asks for a grid, but partition={self.partition!r} asks for "
+            f"{what}: leave n_mfs at 'auto', or use partition='grid'."
+        )
+
     def start(self, rows: StandardisedData) -> Start:
         """The start that the request leads to on these rows."""
-        self._check_combination()
         check_columns_fit(len(self.names))
         if isinstance(self.n_mfs, str) and isinstance(self.partition, str):
             return StructureSearch(rows, self._plan(rows), self.simplicity).run(self._kinds())
@@ -89,16 +98,6 @@ class StructureRequest(Plan):
         ratio = sample.effective_weight / rows.effective_weight
         penalty = scaled(start.penalty, self.free, ratio, start.agreement_is_raised)
         return replace(start, penalty=penalty)
-
-    def _check_combination(self):
-        """Raise ValueError where two parameters contradict each other."""
-        if isinstance(self.n_mfs, str) or self.partition in ("auto", "grid"):
-            return
-        what = "the imported rules" if isinstance(self.partition, TSKModel) else "other rules"
-        raise ValueError(
-            f"n_mfs={self.n_mfs!r} asks for a grid, but partition={self.partition!r} asks for "
-            f"{what}: leave n_mfs at 'auto', or use partition='grid'."
-        )
 
     def _check_number(self, n_rules):
         """Raise ValueError where the given rules are more than ``max_rules``."""

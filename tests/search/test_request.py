@@ -94,6 +94,7 @@ class TestImported:
             ({}, ["time", "rate"], "the columns of X are time, rate: give X the inputs"),
             ({}, ["time", "rate", "temperature"], "the same names and in the same order"),
             ({"n_mfs": 3}, slice(None), r"n_mfs=3 .* for the imported rules"),
+            ({"n_mfs": 3, "max_iter": 0}, slice(None), r"n_mfs=3 .* for the imported rules"),
             ({"premise_features": ["rate"]}, slice(None), "premise_features=.* has no effect on"),
             ({"order": 0, "max_iter": 0}, slice(None), "order=0 has no effect with max_iter=0"),
             ({"consequent_features": [2], "max_iter": 0}, slice(None), "consequent_.*no effect"),
