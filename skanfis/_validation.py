@@ -268,10 +268,20 @@ def check_finite(values, what, names):
 
 
 def in_column_order(given, names):
-    """A pandas Series or frame labelled by all columns, in their order; all else as it is given."""
+    """A pandas Series or frame labelled by all columns, in their order; all else as it is given.
+
+    ValueError if it has a text label for each column, but other labels than these.
+    """
     is_labelled = hasattr(given, "keys") and not isinstance(given, Mapping)
     labels = list(given.keys()) if is_labelled else []
-    return given[list(names)] if len(labels) == len(names) == len({*labels, *names}) else given
+    if len(labels) != len(names) or not all(isinstance(label, str) for label in labels):
+        return given
+    if {*labels} != {*names}:
+        raise ValueError(
+            f"A {type(given).__name__} is labelled by {', '.join(map(repr, labels))}, but the "
+            f"columns of X are {', '.join(map(repr, names))}: label it by these, or give a list."
+        )
+    return given[list(names)]
 
 
 def feature_indices(given, names, parameter):
