@@ -73,12 +73,13 @@ def effects(
     -------
     effects : object with attributes
         ``table``: DataFrame with a row per input, category or group, then one per pair, strongest
-        first, and "three or more". Pairs that are zero because no rule has either input in its IF
-        part are left out. Column "sobol" has shares of the variance for independent inputs; with X,
-        "rows" has Cov(component, output) / Var(output) over its rows [1]_, which may be negative.
-        Each column sums to one. ``held``: part of the combinations of independent inputs on which
-        the output would be held within its limits, from 10,000 draws. ``notes``: sentences. When
-        printed, many rows without an effect, or with one below the error of draws, become one.
+        first, and with more than two inputs "three or more". Pairs that can have no effect, for
+        want of terms, are left out. Column "sobol" has shares of the variance for independent
+        inputs; with X, "rows" has Cov(component, output) / Var(output) over its rows [1]_, which
+        may be negative. Each column sums to one, or zero if the output is constant. ``held``: part
+        of the combinations of independent inputs on which the output would be held within its
+        limits, from 10,000 draws. ``notes``: sentences. When printed, many rows without an effect,
+        or with one below the error of draws, become one.
 
     Raises
     ------
@@ -250,10 +251,10 @@ class Study:
                 else:
                     own.add(checked_position(column, model.input_names))
             for other in [name for name, inputs in found.items() if own & set(inputs)]:
-                if not own >= set(found.pop(other)):
+                if other not in lists or not own >= set(found.pop(other)):
                     raise ValueError(
-                        f"groups[{label!r}] has some columns of {other!r}, but not all: give it "
-                        "all of them, or none."
+                        f"groups[{label!r}] shares columns with {other!r}: give it all columns of "
+                        "a category, and none of another group."
                     )
             outside = [name for j, name in enumerate(model.input_names) if j not in own]
             if label in (*found, *outside):

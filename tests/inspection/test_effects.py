@@ -153,7 +153,8 @@ def test_groups_enter_as_one(of_indicators):
     ("groups", "match"),
     [
         ({"fibre": ["a", "d"]}, "'d' is no input"),
-        ({"one": ["a", "b"], "two": ["b", "c"]}, "some columns of 'one', but not all"),
+        ({"one": ["a", "b"], "two": ["b", "c"]}, r"\['two'\] shares columns with 'one'"),
+        ({"one": ["a"], "two": ["a", "b"]}, "none of another group"),
         ({"fibre": "a"}, r"groups\['fibre'\]='a' must list one or more"),
         (["a", "b"], "must be a dict"),
     ],
