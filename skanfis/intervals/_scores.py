@@ -97,13 +97,14 @@ def fit_params(router, regressor, sample_weight, groups):
 def one_part(regressor, n_rows, weight, groups, fraction, seed):
     """Rows to train on and rows held out, or groups; ``fraction`` of 1 trains on none."""
     every = np.arange(n_rows)
-    if fraction == 1.0:
-        if not isinstance(regressor, FrozenEstimator):
-            raise ValueError(
-                "calibration_fraction=1 leaves no row to train on: give the fitted model as "
-                "sklearn.frozen.FrozenEstimator(model), or a smaller fraction."
-            )
+    if fraction == 1.0 and isinstance(regressor, FrozenEstimator):
         return every, every
+    n_units = n_rows if groups is None else np.unique(groups).size
+    if np.ceil(fraction * n_units) >= n_units:
+        raise ValueError(
+            f"calibration_fraction={fraction:g} leaves no row to train on: give a smaller one, or "
+            "the fitted model as sklearn.frozen.FrozenEstimator(model), with a fraction of 1."
+        )
     kind = ShuffleSplit if groups is None else GroupShuffleSplit
     splitter = kind(1, test_size=fraction, random_state=seed)
     training, held_out = (np.sort(part) for part in next(splitter.split(every, groups=groups)))

@@ -258,7 +258,7 @@ class ConformalRegressor(MetaEstimatorMixin, RegressorMixin, BaseEstimator):
         if asked == "confidence" and self._groups is None:
             raise ValueError(
                 "confidence is of whole groups, and fit was given none: fit with groups, or leave "
-                "confidence at None."
+                "confidence at 'auto'."
             )
         if confidence == "auto":
             confidence = None if self._groups is None else coverage

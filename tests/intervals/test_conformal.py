@@ -251,6 +251,7 @@ class NeverFitted(BayesianRidge):
             *("None of the 6 rows held out has a positive weight", {"method": "split"}),
             {"sample_weight": np.arange(24) % 12 == 0},
         ),
+        ("=0.99 leaves no row to train on", {"method": "split", "calibration_fraction": 0.99}, {}),
         ("X has the length 24, groups 23", {}, {"groups": np.zeros(23)}),
         ("leaves out rows, not groups", {"method": "loo"}, {"groups": np.arange(24)}),
         ("nothing of its noise.* another", {"method": "loo", "estimator": BayesianRidge()}, {}),
