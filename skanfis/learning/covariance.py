@@ -98,8 +98,8 @@ def _mean_squares(problem, evaluation, robust):
         total += residual**2 @ (weight * left)
         total_weight += np.sum(weight / left)
     beyond = 2.0 * ndtr(-c)
-    density = np.exp(-0.5 * c**2) / np.sqrt(2.0 * np.pi)
-    return total / total_weight / (1.0 - beyond - 2.0 * c * density + c**2 * beyond)
+    density = np.exp(-0.5 * c * c) / np.sqrt(2.0 * np.pi)
+    return total / total_weight / (1.0 - beyond - 2.0 * c * density + c * (c * beyond))
 
 
 def _premises(problem, premise, evaluation):

@@ -181,3 +181,11 @@ def test_an_input_that_varies_on_an_outlier_alone_may_have_terms(rng):
     X[0, 1], y[0] = 1.0, -1.0
     model = ANFISRegressor(n_mfs=[1, 2], loss="huber").fit(X, y)
     assert_allclose(model.predict(X)[1:], 0.0, atol=1e-5)
+
+
+@pytest.mark.filterwarnings("error")
+def test_beyond_the_largest_threshold_the_noise_is_that_of_squares(rng):
+    X = rng.uniform(-1.0, 1.0, (60, 1))
+    y = X[:, 0] ** 2 + 0.1 * rng.standard_normal(60)
+    squared, robust = (quick(n_mfs=2, loss=loss).fit(X, y) for loss in (Huber(100.0), Huber(1e200)))
+    assert_allclose(robust.noise_std_, squared.noise_std_)
