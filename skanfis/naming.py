@@ -152,7 +152,8 @@ def given_term_names(model, names):
         given = names.get(name) if isinstance(names, Mapping) else names
         if given is None:
             continue
-        if isinstance(given, str) or not all(isinstance(one, str) and one for one in given):
+        is_list = np.iterable(given) and not isinstance(given, str)
+        if not is_list or not all(isinstance(one, str) and one for one in given):
             raise TypeError(
                 f"names for input {name!r} must be a sequence of non-empty str, got {given!r}."
             )

@@ -90,6 +90,7 @@ def test_given_names_replace_the_default():
         (["a", "b", "c"], ValueError, r"names for input 'time': 3 given for 2 terms"),
         ({"time": ["a", "a"]}, ValueError, r"'time' repeats a name"),
         ({"time": "ab"}, TypeError, r"'time' must be a sequence of non-empty str"),
+        ({"time": 2}, TypeError, r"'time' must be a sequence of non-empty str, got 2"),
         ({"time": ["a", ""]}, TypeError, r"'time' must be a sequence of non-empty str"),
     ],
 )

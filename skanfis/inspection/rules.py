@@ -71,7 +71,8 @@ def rename(model, feature_names, output_names):
     ):
         if names is None:
             continue
-        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        is_list = np.iterable(names) and not isinstance(names, str)
+        if not is_list or not all(isinstance(name, str) for name in names):
             raise TypeError(f"{parameter} must be a sequence of str, got {names!r}.")
         count = len(getattr(model, kind))
         if len(names) != count or len(set(names)) != count:

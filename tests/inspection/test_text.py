@@ -454,6 +454,7 @@ def test_slopes_that_move_no_digit_are_said_to_be_too_small():
             "feature_names=.* one name for each of .*, all diff",
         ),
         ({"feature_names": "abc"}, TypeError, "feature_names must be a sequence of str"),
+        ({"feature_names": 3}, TypeError, "feature_names must be a sequence of str, got 3"),
         ({"feature_names": list("aba")}, ValueError, "one name for each of .*, all different"),
         ({"output_names": list("ab")}, ValueError, "output_names=.* one name for each of 'y'"),
     ],
