@@ -297,7 +297,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
                 of_word = SOLVERS.get(str(given), _OBJECTS[name])
                 module = {"solver": "skanfis.learning", "partition": "sklearn.cluster"}
                 raise ValueError(
-                    f"{key} is a setting of an object, but {name}={given!r} is a word: give "
+                    f"{key} is a setting of an object, but {name}={given!r} has none: give "
                     f"{name}={of_word.__name__}(), of {module.get(name, 'skanfis.options')}, in "
                     "its place."
                 )
@@ -329,9 +329,9 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
         Raises
         ------
-        ValueError
-            If the data are a single row or not finite; if weights are negative; if parameters
-            contradict each other or the data; if the grid has more rules than
+        ValueError, TypeError
+            If the data are a single row, not finite, or no numbers; if weights are negative; if
+            parameters contradict each other or the data; if the grid has more rules than
             ``sklearn.get_config()["working_memory"]`` can hold.
 
         Warns

@@ -192,7 +192,7 @@ class Hybrid(_Descent):
         positive.
     error_goal : float, default=None
         Stop at this root mean square error, in standard deviations of the target; zero or positive.
-        None: all ``max_iter`` epochs are run.
+        None: ``max_iter`` epochs are run, unless ``tol`` ends the training.
     tol : float, default=1e-3
         Stop where the projected gradient is zero as far as ``tol`` can tell. Zero or positive.
     stiffness : "auto" or float, default="auto"

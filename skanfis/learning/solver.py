@@ -22,7 +22,7 @@ MESSAGES = {
     "stopped": "Early stopping or a callback ended the training.",
     "as_given": "Nothing was learnt: the rules are as they were given.",
     "error_goal": "The root mean square error is as small as error_goal.",
-    "epochs": "All max_iter epochs were run: this solver stops earlier only at its error_goal.",
+    "epochs": "All max_iter epochs were run: this solver ends earlier only by error_goal or tol.",
     "no_premise": "There is nothing to iterate on: the consequents are found in one solve.",
 }
 
