@@ -267,20 +267,13 @@ def check_finite(values, what, names):
             )
 
 
-def in_column_order(given, names):
-    """A pandas Series or frame labelled by all columns, in their order; all else as it is given.
-
-    ValueError if it has a text label for each column, but other labels than these.
-    """
+def in_column_order(given, names, parameter):
+    """A pandas Series or frame labelled by all columns, in their order; all else as it is given."""
     is_labelled = hasattr(given, "keys") and not isinstance(given, Mapping)
     labels = list(given.keys()) if is_labelled else []
     if len(labels) != len(names) or not all(isinstance(label, str) for label in labels):
         return given
-    if {*labels} != {*names}:
-        raise ValueError(
-            f"A {type(given).__name__} is labelled by {', '.join(map(repr, labels))}, but the "
-            f"columns of X are {', '.join(map(repr, names))}: label it by these, or give a list."
-        )
+    feature_indices(labels, names, parameter)  # every label must be a column
     return given[list(names)]
 
 
@@ -291,7 +284,9 @@ def feature_indices(given, names, parameter):
     """
     if given is None:
         return np.arange(len(names))
-    entries = np.atleast_1d(np.asarray(in_column_order(given, names), dtype=object)).tolist()
+    entries = np.atleast_1d(
+        np.asarray(in_column_order(given, names, parameter), dtype=object)
+    ).tolist()
     if entries and all(isinstance(entry, bool | np.bool_) for entry in entries):
         if len(entries) != len(names):
             raise ValueError(

@@ -16,7 +16,7 @@ class OutputLimits:
     Parameters
     ----------
     lower, upper : float or array-like of shape (n_outputs,), default=None
-        In the units of y; None, or an infinite number, is no limit.
+        In the units of y. None is no limit; among several numbers, an infinite one is none.
 
     Examples
     --------
@@ -166,6 +166,7 @@ class Constraints:
 
 def _signs(given, input_names, n_outputs):
     n_inputs, told = len(input_names), f"monotonic_cst={given!r}"
+    given = {} if given is None else given
     if isinstance(given, Mapping):
         # The key 7 also stands for a column named "7".
         names = [str(name) if str(name) in input_names else name for name in given]
@@ -174,7 +175,7 @@ def _signs(given, input_names, n_outputs):
         places = [position_of(name, input_names) for name in names]
         by_place = dict(zip(places, given.values(), strict=True))
         given = [by_place.get(j, 0) for j in range(n_inputs)]
-    given = np.zeros(n_inputs) if given is None else in_column_order(given, input_names)
+    given = in_column_order(given, input_names, "monotonic_cst")
     signs = _numbers(given, told)
     if signs.shape not in ((n_inputs,), (n_outputs, n_inputs)):
         raise ValueError(
@@ -211,7 +212,7 @@ def _point(given, input_names):
                 f"X ({names}) and no other."
             )
         given = [given[name] for name in input_names]
-    point = _numbers(in_column_order(given, input_names), f"FixedPoint.x={given!r}")
+    point = _numbers(in_column_order(given, input_names, "FixedPoint.x"), f"FixedPoint.x={given!r}")
     if point.shape != (len(input_names),):
         raise ValueError(
             f"FixedPoint.x={given!r} must have a number for each of the {len(input_names)} "

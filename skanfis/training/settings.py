@@ -28,7 +28,7 @@ def given_weights(estimator):
 def structure_request(estimator, names, sample_weight=None):
     """The request that a start is found for, with all names of columns and families resolved."""
     partition = _partition(estimator, names, sample_weight)
-    families = membership_families(in_column_order(estimator.mf, names), names)
+    families = membership_families(in_column_order(estimator.mf, names, "mf"), names)
     if isinstance(partition, str) and partition == "tree" and set(families) != {Gaussian}:
         raise ValueError(
             f"mf={estimator.mf!r} has no effect with partition='tree', whose terms are the sides "
@@ -43,7 +43,7 @@ def structure_request(estimator, names, sample_weight=None):
     # random_state=None stands for one fixed seed: the same data give the same model.
     state = estimator.random_state
     return StructureRequest(
-        n_mfs=in_column_order(estimator.n_mfs, names),
+        n_mfs=in_column_order(estimator.n_mfs, names, "n_mfs"),
         partition=partition,
         families=families,
         order=estimator.order,
