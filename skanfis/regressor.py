@@ -337,7 +337,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Warns
         -----
         ConvergenceWarning
-            If ``max_iter`` was reached before convergence.
+            If ``max_iter`` was reached before convergence, or Huber's weights did not settle.
         ConstraintWarning
             If the data contradict the constraints, or rules moved to prove them err much more.
         ConstantInputWarning

@@ -54,7 +54,7 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
         Column of the rate of temperature change (:class:`ThermalRate`), if the thermometer lags
         behind the coil. The law then takes the temperature plus this rate times a fitted lag.
     amplitude_degree, sagnac_degree, bias_degree : int, default=1
-        Degrees of A(T), K(T) and b(T), 0 to 5.
+        Degrees of A(T), K(T) and b(T), 0 to 5; without a temperature they are 0.
     max_phase : float, default=1.2
         Largest phase that is inverted, in (0, pi/2) [rad]; towards pi/2 the inverse magnifies noise
         by 1 / cos(phase).

@@ -61,7 +61,7 @@ class SolverResult:
 
     @property
     def converged(self) -> bool:
-        """Whether the solver stopped of its own accord."""
+        """Whether it ended otherwise than by ``max_iter`` before it was done."""
         return self.status != "max_iter"
 
     @property

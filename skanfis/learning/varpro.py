@@ -140,10 +140,6 @@ class VariableProjection(Solver):
         of their displacements (in spacings of terms and logarithms of widths) is added to the cost.
         "auto": found by the evidence.
 
-    See Also
-    --------
-    skanfis.ANFISRegressor : Takes it as ``solver``.
-
     References
     ----------
     .. [1] G. H. Golub and V. Pereyra, "The differentiation of pseudo-inverses and nonlinear least
