@@ -139,8 +139,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         The frozen model, in the user's units.
     n_rules_ : int
         Number of rules.
-    rules_ : ndarray of shape (n_rules, n_premise_inputs)
-        The terms of each rule: positions in ``memberships_``.
+    rules_ : ndarray of shape (n_rules, n_premise_inputs), or of a tree (n_rules, longest path)
+        The terms of each rule: positions in ``memberships_``, -1 for none.
     memberships_, initial_memberships_ : list of dict
         Every term after training, and before: its "input", "name", "function" and parameters.
     consequents_ : ndarray of shape (n_rules, 1 + n_features[, n_outputs])
@@ -167,7 +167,7 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         err less than the mean), "chosen". The smallest error comes first. Empty if nothing was
         fitted.
     noise_std_ : float or ndarray of shape (n_outputs,) or None
-        Standard deviation of the noise of a row of mean weight, in the units of y.
+        Standard deviation of the noise of a row of mean weight, in y's units; None if not known.
     readability_ : skanfis.inspection.Readability
         How far the rules can be read one by one, measured on the training rows.
     redundant_rules_ : list of dict
@@ -409,10 +409,10 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
         Raises
         ------
-        ValueError
-            If X is not finite; or, with ``out_of_bounds="raise"``, lies outside the training data;
-            or, with ``return_std=True``, if the model has no posterior: it was read from a file
-            without one, lost rules, saw a single row, or has more than 2,000 parameters.
+        ValueError, TypeError
+            If X is not finite or no numbers; with ``out_of_bounds="raise"``, if it lies outside the
+            training data; with ``return_std=True``, if the model has no posterior: it was read from
+            a file without one, lost rules, saw a single row, or has more than 2,000 parameters.
 
         Warns
         -----
@@ -530,8 +530,8 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
 
         Raises
         ------
-        ValueError
-            If the data are not finite, or have other columns than before; if the first call has a
+        ValueError, TypeError
+            If the data are not finite, no numbers, or have other columns; if the first call has a
             single row but must find the structure; if a parameter of the structure has changed.
         AttributeError
             If ``loss``, ``early_stopping`` or constraints need all rows again.
