@@ -115,8 +115,9 @@ def bounds(
 
     Raises
     ------
-    ValueError
-        If ``box`` is no box, nothing bounds the model on it, or a membership is not of skanfis.
+    ValueError, TypeError
+        As :func:`skanfis.export.fold`; if a parameter is none of the above, nothing bounds the
+        model on the box, or a membership is not of skanfis.
 
     Examples
     --------

@@ -115,7 +115,8 @@ class GyroCompensator:
         Raises
         ------
         ValueError
-            If the log lacks a column of the inputs, or time does not increase within a run.
+            If the log lacks a column or a value of the inputs, or the policy raises; with the rate
+            of the temperature, if time does not increase within a run.
         """
         for part in columns_of((*self.inputs, "output")):
             if part not in log:

@@ -83,8 +83,9 @@ def effects(
 
     Raises
     ------
-    ValueError
-        If distributions are not known and X is not given; if a column is not there.
+    ValueError, TypeError
+        As :func:`skanfis.export.fold`; if distributions are not known and X is not given; if a
+        column is not there, or in two groups.
 
     References
     ----------

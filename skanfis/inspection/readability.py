@@ -221,8 +221,8 @@ def readability(
 
     Raises
     ------
-    ValueError
-        If X, y or the weights do not fit the model, or a step of a pipeline cannot be folded.
+    ValueError, TypeError
+        As :func:`skanfis.export.fold`; if X, y or the weights do not fit the model.
 
     Examples
     --------

@@ -103,8 +103,8 @@ def rules_table(estimator: Any) -> Any:
 
     Raises
     ------
-    ValueError
-        If a step of a pipeline cannot be folded.
+    ValueError, TypeError
+        As :func:`skanfis.export.fold`.
 
     Examples
     --------
@@ -153,8 +153,8 @@ def explain(estimator: Any, X: ArrayLike) -> Any:
 
     Raises
     ------
-    ValueError
-        If X does not fit the model, or lies outside the range with ``out_of_bounds="raise"``.
+    ValueError, TypeError
+        As :func:`skanfis.export.fold`; if X does not fit, or ``out_of_bounds="raise"`` refuses it.
 
     Examples
     --------

@@ -97,8 +97,8 @@ def export_c(
 
     Raises
     ------
-    ValueError
-        If a parameter is none of the above, a step cannot be folded in, or "float" is too narrow.
+    ValueError, TypeError
+        As :func:`fold`; if a parameter is none of the above, or "float" is too narrow.
 
     Examples
     --------
