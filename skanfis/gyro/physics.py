@@ -154,8 +154,8 @@ class OpenLoopArcsineRegressor(RegressorMixin, BaseEstimator):
                 raise ValueError(f"No scale factor can be found: {name} never changes.")
         parameters, trial.n_iter_, has_settled = _fit_law(log)
         if not has_settled:
-            message = f"The law did not settle within {_MAX_EVALUATIONS} evaluations."
-            warnings.warn(message, ConvergenceWarning, stacklevel=2)
+            text = f"The law did not settle in {_MAX_EVALUATIONS} evaluations: check its columns."
+            warnings.warn(text, ConvergenceWarning, stacklevel=2)
         trial._keep(log, _law_of(parameters, log))
         trial.columns_ = columns
         trial.minimum_, trial.maximum_ = used.min(axis=0), used.max(axis=0)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
+from sklearn.exceptions import ConvergenceWarning
 
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
+from skanfis.gyro import physics
 from skanfis.gyro.physics import OpenLoopArcsineRegressor, phase_of
 
 REFERENCE = 20.0
@@ -52,6 +54,12 @@ def test_planted_coefficients_come_back(rng, amplitude, lag):
     np.testing.assert_allclose(law.bias_, about(law, PLANTED["bias"]), rtol=1e-6)
     np.testing.assert_allclose(law.predict(X), rate, atol=1e-7)
     assert law.thermometer_lag_ == pytest.approx(lag, rel=1e-7)
+
+
+def test_a_law_that_does_not_settle_is_told(rng, monkeypatch):
+    monkeypatch.setattr(physics, "_MAX_EVALUATIONS", 1)
+    with pytest.warns(ConvergenceWarning, match="in 1 evaluations: check its columns"):
+        OpenLoopArcsineRegressor().fit(*calibration(rng))
 
 
 def test_noise_in_the_output_reaches_the_rate_by_the_slope(rng):
