@@ -85,8 +85,8 @@ def whole_delay(output, rate):
     known = (table - table.mean()).fillna(0.0)
     sizes = np.abs(correlate(known["output"], known["rate"], method="fft"))
     late = int(correlation_lags(len(table), len(table))[sizes.argmax()])
-    follows = abs(table["output"].corr(table["rate"].shift(late))) > LEAST_CORRELATION
-    return late if follows else 0
+    beside = table.assign(rate=table["rate"].shift(late)).corr(min_periods=FEWEST_ROWS)
+    return late if abs(beside.at["output", "rate"]) > LEAST_CORRELATION else 0
 
 
 def find_glitches(log, error, late=0.0):

@@ -10,7 +10,7 @@ from skanfis.digits import counted
 from skanfis.gyro import _calibration
 from skanfis.gyro._calibration import Recipe, fit_model
 from skanfis.gyro._headline import errors_and_verdict, formula_of, headline
-from skanfis.gyro._oddities import delay, oddities
+from skanfis.gyro._oddities import delay, oddities, whole_delay
 from skanfis.gyro.compose import rules_of
 from skanfis.gyro.metrics import rms
 
@@ -203,6 +203,14 @@ def test_a_delay_is_told_from_noise_of_the_rate(rng, rows):
     assert np.mean(few) < 0.02
     ramp = log.assign(rate=np.arange(len(log), dtype=float))
     assert delay(ramp, 1.0 + log["run"].to_numpy() + noise[0])[1] < 0.05
+
+
+def test_a_delay_by_whole_rows_needs_enough_rows_that_agree():
+    rate = pd.Series(np.repeat([0.0, 10.0, -10.0], 20))
+    assert [whole_delay(rate.shift(rows), rate) for rows in (3, 0, -2)] == [3, 0, -2]
+    # One row at the end like one at the start: all agree, but they are few.
+    first, last = np.eye(60)[[0, -1]]
+    assert whole_delay(last, first) == whole_delay(np.ones(60), rate) == 0
 
 
 def test_of_a_delay_one_thing_is_told_and_a_glitch_beside_it(rng):
