@@ -20,11 +20,10 @@ SILENT = ("nan", "raise")
 MAX_EXTRAPOLATION, FARTHEST = 0.5, 100.0
 # Rows further off, in standard deviations, count as this far, so that nothing overflows.
 FARTHEST_ROW = 1e100
-# How far a prediction may leave the range of the target. A single line: by as many standard
-# deviations as the tangent is followed for, and at least as many as if the noise were not known.
-# Several rules, which may peak between rows: by this part of the range, or by so much of it for
-# each of those deviations.
-_PART_OF_RANGE, _PER_DEVIATION = 0.25, 0.05
+# For each deviation that the tangent is followed for, and at least as many as if the noise were not
+# known, a prediction may leave the range of the target: that of a single line by a deviation of the
+# target, that of several rules, which may peak between rows, by this part of the range.
+_PER_DEVIATION = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,15 +58,10 @@ class TargetRange:
         If the tangent is followed without end, only the user's limits count.
         """
         width = self.maximum - self.minimum
-        if np.isinf(max_extrapolation):
-            margin = np.inf
-        elif is_line:
-            # No deviation is more than half of the range: that of a constant, stored as one, is
-            # zero.
-            spread = np.minimum(self.spread, 0.5 * width)
-            margin = max(max_extrapolation, MAX_EXTRAPOLATION) * spread
-        else:
-            margin = max(_PART_OF_RANGE, _PER_DEVIATION * max_extrapolation) * width
+        # No deviation is more than half of the range: that of a constant, stored as one, is zero.
+        unit = np.minimum(self.spread, 0.5 * width) if is_line else _PER_DEVIATION * width
+        is_endless = np.isinf(max_extrapolation)
+        margin = np.inf if is_endless else max(max_extrapolation, MAX_EXTRAPOLATION) * unit
         low, high = self.minimum - margin, self.maximum + margin
         return np.stack([np.maximum(low, self.lower), np.minimum(high, self.upper)])
 

@@ -212,10 +212,12 @@ def test_outputs_are_held_beside_the_range_of_the_target(policy, limit):
     free = build(scattered(), out_of_bounds=policy, max_extrapolation=limit)
     X = np.random.default_rng(4).uniform(-4.0, 4.0, (500, 3))
     said, answer = free.predict(X), replace(free, target=TARGET).predict(X)
-    low, high = -0.75, 0.75
+    # A twentieth of the range for each deviation, half of one at the least.
+    high = 0.5 + max(limit, 0.5) / 20.0
+    low = -high
     assert (said < low).any()
     assert (said > high).any()
-    assert_array_equal(answer, np.clip(said, low, high))
+    assert_allclose(answer, np.clip(said, low, high), rtol=1e-12)
 
 
 class TestAsRuleTable:

@@ -29,11 +29,10 @@ def test_limits_are_the_range_and_a_margin(max_extrapolation, is_line, offset, s
     y = np.random.default_rng(0).standard_normal((50, 2)) * [1.0, 5.0]
     own = TargetRange(y.min(axis=0), y.max(axis=0), y.std(axis=0))
     moved = offset + scale * y
-    # Of a line as far as inputs are followed, but half a deviation at the least; of rules that
-    # bend, where there is an end to it, a quarter of the range, or a twentieth per deviation.
-    margin = max(max_extrapolation, 0.5) * moved.std(axis=0)
-    if not is_line and max_extrapolation < np.inf:
-        margin = (0.4 if max_extrapolation == 8.0 else 0.25) * np.ptp(moved, axis=0)
+    # For each deviation that inputs are followed, half of one at the least, a deviation of the
+    # target, or of rules that bend a twentieth of the range.
+    unit = moved.std(axis=0) if is_line else np.ptp(moved, axis=0) / 20.0
+    margin = max(max_extrapolation, 0.5) * unit
     found = own.change_units(offset, np.full(2, scale)).limits(max_extrapolation, is_line)
     assert_allclose(found, [moved.min(axis=0) - margin, moved.max(axis=0) + margin], rtol=1e-9)
 
@@ -41,11 +40,11 @@ def test_limits_are_the_range_and_a_margin(max_extrapolation, is_line, offset, s
 @pytest.mark.parametrize("max_extrapolation", [0.5, np.inf])
 def test_limits_that_were_asked_for_come_first(max_extrapolation):
     own = TargetRange(np.array([0.0, 0.0]), np.array([4.0, 4.0]), np.array([1.0, 1.0]))
-    asked = own.within(np.array([-0.2, -9.0]), np.array([np.inf, 4.1]), np.empty((0, 2)))
-    end = np.inf if max_extrapolation == np.inf else 5.0
-    low = -9.0 if max_extrapolation == np.inf else -1.0
+    asked = own.within(np.array([-0.05, -9.0]), np.array([np.inf, 4.01]), np.empty((0, 2)))
+    end = np.inf if max_extrapolation == np.inf else 4.1
+    low = -9.0 if max_extrapolation == np.inf else -0.1
     found = asked.limits(max_extrapolation, is_line=False)
-    assert_allclose(found, [[-0.2, low], [end, 4.1]], rtol=1e-12)
+    assert_allclose(found, [[-0.05, low], [end, 4.01]], rtol=1e-12)
     moved = asked.change_units(np.array([1.0, 0.0]), np.array([2.0, 0.1]))
     expected = np.array([1.0, 0.0]) + np.array([2.0, 0.1]) * found
     assert_allclose(moved.limits(max_extrapolation, is_line=False), expected, rtol=1e-12)
@@ -55,11 +54,11 @@ def test_what_is_known_beyond_what_was_seen_counts_as_seen():
     own = TargetRange(np.array([0.0]), np.array([4.0]), np.array([1.0]))
     nothing = np.array([-np.inf]), np.array([np.inf])
     found = own.within(*nothing, np.array([[6.0], [-2.0]])).limits(0.5, is_line=False)
-    assert_allclose(found, [[-4.0], [8.0]], rtol=1e-12)
+    assert_allclose(found, [[-2.2], [6.2]], rtol=1e-12)
     found = own.within(np.array([5.0]), np.array([np.inf]), np.empty((0, 1)))
-    assert_allclose(found.limits(0.5, is_line=False), [[5.0], [6.25]], rtol=1e-12)
+    assert_allclose(found.limits(0.5, is_line=False), [[5.0], [5.125]], rtol=1e-12)
     found = own.within(np.array([-np.inf]), np.array([-3.0]), np.empty((0, 1)))
-    assert_allclose(found.limits(0.5, is_line=False), [[-4.75], [-3.0]], rtol=1e-12)
+    assert_allclose(found.limits(0.5, is_line=False), [[-3.175], [-3.0]], rtol=1e-12)
 
 
 @pytest.mark.parametrize("is_line", [False, True])

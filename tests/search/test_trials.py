@@ -71,7 +71,7 @@ def test_squared_errors_of_rules_are_those_of_the_dense_design(rng, kind, order)
         return oracles.dense_design(antecedent, antecedent.parameters, at, order) @ coefficients
 
     answers = answer(0.0) + oracles.complex_step(lambda t: answer(t[0]), np.zeros(1))[..., 0]
-    margin = max(0.25, limit / 20.0) * np.ptp(fold.y, axis=0)
+    margin = limit / 20.0 * np.ptp(fold.y, axis=0)
     answers = np.clip(answers, fold.y.min(axis=0) - margin, fold.y.max(axis=0) + margin)
     expected = ((answers - rest.y) ** 2).sum(axis=1)
     assert_allclose(trials.squared_errors(tuned, rest, None), expected, rtol=1e-4, atol=1e-6)
