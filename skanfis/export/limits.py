@@ -26,7 +26,8 @@ def check_size(n_rules, n_terms, n_inputs, n_outputs):
 
 
 def number(value, where, lowest=-LARGEST_NUMBER, highest=LARGEST_NUMBER, kind=float):
-    """A number from a file; ValueError, with its place, if it is out of range."""
+    """A number, as from a file; ValueError, with its place, if it is out of range."""
+    value = value.item() if isinstance(value, np.generic) else value
     if type(value) not in (int, kind) or not lowest <= value <= highest:
         noun = "number" if kind is float else "whole number"
         ends = f"from {lowest:g} to {highest:g}"

@@ -68,7 +68,8 @@ class GyroCompensator:
     Raises
     ------
     ValueError
-        If ``inputs`` or ``predicts`` are none of these.
+        If a parameter is none of these, or a number is zero, negative or infinite where none makes
+        sense.
 
     Examples
     --------
@@ -96,6 +97,9 @@ class GyroCompensator:
 
     def __post_init__(self):
         _check_roles(list(self.inputs), self.predicts)
+        _divisor(self.scale_factor, "scale_factor")
+        number(self.time_constant, "time_constant", SMALLEST_NUMBER)
+        number(self.min_coverage, "min_coverage", 0.0, 1.0)
 
     def apply(self, log: pd.DataFrame) -> pd.DataFrame:
         """Compensate a log, and flag the rows whose compensation cannot be trusted.
@@ -249,12 +253,6 @@ def _settings(document):
         raise ValueError(f"its keys are {', '.join(document)}")
     inputs, columns, unit = (document[key] for key in ("inputs", "columns", "output_unit"))
     _check_roles(inputs, document["predicts"])
-    checked = {
-        "inputs": tuple(inputs),
-        "scale_factor": _divisor(document["scale_factor"], "scale_factor"),
-        "time_constant": number(document["time_constant"], "time_constant", SMALLEST_NUMBER),
-        "min_coverage": number(document["min_coverage"], "min_coverage", 0.0, 1.0),
-    }
     if not (isinstance(unit, str) and unit.isprintable() and 0 < len(unit) <= _LONGEST_UNIT):
         raise ValueError(f"output_unit: {shown(unit)} is not the name of a unit")
     for key in ("units", "assumed"):
@@ -275,7 +273,7 @@ def _settings(document):
         estimator = joined(_read_law(document["law"], inputs), estimator)
     if document["polynomial"] is not None:
         estimator = joined(_read_polynomial(document["polynomial"], estimator, inputs), estimator)
-    return {key: document[key] for key in _KEYS} | checked | {"estimator": estimator}
+    return {key: document[key] for key in _KEYS} | {"inputs": tuple(inputs), "estimator": estimator}
 
 
 def _read_law(document, inputs):

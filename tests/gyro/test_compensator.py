@@ -205,12 +205,22 @@ def test_what_could_not_be_read_is_not_written(compensator, tmp_path):
         estimator.fit(np.random.default_rng(0).random((30, 4)), np.arange(30.0))
         with pytest.raises(TypeError):
             GyroCompensator(estimator, INPUTS).write_json(path)
-    with pytest.raises(ValueError, match="scale_factor, in size: 0"):
-        replace(compensator, scale_factor=0.0).write_json(path)
     assert not path.exists()
-    # This is found out before.
-    with pytest.raises(ValueError, match="inputs is"):
-        replace(compensator, inputs=("temprature",))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "told"),
+    [
+        ("inputs", ("temprature",), "inputs is"),
+        ("scale_factor", 0.0, "scale_factor, in size: 0"),
+        ("time_constant", np.int64(0), "time_constant: 0 is not a number from 1e-50"),
+        ("min_coverage", 2, "min_coverage: 2 is not a number from 0 to 1"),
+    ],
+)
+def test_a_parameter_that_makes_no_sense_is_refused(compensator, name, value, told):
+    with pytest.raises(ValueError, match=told):
+        replace(compensator, **{name: value})
+    assert replace(compensator, scale_factor=np.float32(-2.0)).scale_factor == -2.0
 
 
 def test_what_is_no_json_is_refused(tmp_path):
