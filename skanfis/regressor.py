@@ -678,6 +678,11 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         names : sequence of str or dict
             One name per term, in the order of ``memberships_``: the same for every input, or by
             input, ``{"temperature": ["cold", "hot"]}``; other inputs get their default names.
+
+        Raises
+        ------
+        ValueError, TypeError
+            If an input gets too few or too many names, one twice, or what is no text.
         """
         model = self._fitted_model()
         named = {"term_names": given_term_names(model, names)}
@@ -702,6 +707,11 @@ class ANFISRegressor(CallbackSupportMixin, RegressorMixin, BaseEstimator):
         Returns
         -------
         model : skanfis.model.TSKModel
+
+        Raises
+        ------
+        ValueError, TypeError
+            If there is no such rule, or none would be left.
         """
         model = self._fitted_model()
         if rules is None:

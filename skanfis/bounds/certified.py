@@ -161,6 +161,11 @@ def gradient_bounds(
     bounds : Bounds
         Of the slope, in units of the output per unit of the input.
 
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`bounds`; if ``feature`` is no input.
+
     Examples
     --------
     >>> import numpy as np
@@ -199,6 +204,11 @@ def monotonicity(
     -------
     sign : ndarray of int of shape (n_outputs,)
         1: no prediction falls as the input rises; -1: none rises; 0: neither has been proven.
+
+    Raises
+    ------
+    ValueError, TypeError
+        As :func:`gradient_bounds`.
 
     Examples
     --------
