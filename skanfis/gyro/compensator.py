@@ -216,7 +216,7 @@ def _text_of(compensator):
         "columns": columns,
         "model": json.loads(export_json(rules.model)),
     }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+    return json.dumps(document, indent=1, allow_nan=False, default=float) + "\n"
 
 
 def features(log, inputs, time_constant):

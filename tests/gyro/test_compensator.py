@@ -220,7 +220,13 @@ def test_what_could_not_be_read_is_not_written(compensator, tmp_path):
 def test_a_parameter_that_makes_no_sense_is_refused(compensator, name, value, told):
     with pytest.raises(ValueError, match=told):
         replace(compensator, **{name: value})
-    assert replace(compensator, scale_factor=np.float32(-2.0)).scale_factor == -2.0
+
+
+def test_numbers_of_numpy_are_written_too(compensator, tmp_path):
+    of_numpy = replace(compensator, scale_factor=np.float32(-2.0), time_constant=np.int64(30))
+    of_numpy.write_json(tmp_path / "compensator.json")
+    read = GyroCompensator.read_json(tmp_path / "compensator.json")
+    assert (read.scale_factor, read.time_constant) == (-2.0, 30.0)
 
 
 def test_what_is_no_json_is_refused(tmp_path):
