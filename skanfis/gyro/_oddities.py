@@ -29,11 +29,11 @@ def oddities(log, error, left, name_row):
     """Sentences on what is odd about a log; ``left`` is what a compensation leaves of ``error``."""
     late, part = delay(log, left)
     if part > _MUCH_DELAYED:
-        rows = f"{counted(f'{abs(late):.2g}', 'row')} {'late' if late > 0.0 else 'early'}"
+        rows = counted(f"{abs(late):{'.0f' if abs(late) > 99.0 else '.2g'}}", "row")
         yield (
             f"{percent(part)} of the squared error that is left follows the change of the rate "
-            f"from row to row, as if the output came some {rows}: align the "
-            "two columns, or drop the rows while the rate changes."
+            f"from row to row, as if the output came some {rows} {'late' if late > 0 else 'early'}"
+            ": align the two columns, or drop the rows while the rate changes."
         )
     for run in find_standing_thermometer(log):
         yield (
@@ -67,13 +67,13 @@ def delay(log, left):
         size = curvature @ curvature or 1.0
         error, slope = (each - curvature * (curvature @ each / size) for each in (error, slope))
         both, own, total = error @ slope, slope @ slope or np.inf, error @ error
-        n_rows = len(known) or np.inf
+        n_rows = max(len(known), 1)
         return late - both / own, (total - both**2 / own) / n_rows, total / n_rows, n_rows
 
     _, _, total, n_rows = at_once = beside(0)
-    late, least, *_ = min(
-        at_once, beside(whole_delay(left + log["rate"], log["rate"])), key=lambda found: found[1]
-    )
+    # The rates of other runs, if alike, are no rates so many rows before: few rows are then left.
+    whole = beside(whole_delay(left + log["rate"], log["rate"]))
+    late, least, *_ = min(at_once, whole, key=lambda found: (2 * found[3] < n_rows, found[1]))
     part = 1.0 - least / total if total else 0.0
     # Any slope explains 1 / n of the noise of n rows, and nine times as much once in 300 logs.
     return (late, part) if part * n_rows > 9.0 else (0.0, 0.0)

@@ -213,6 +213,23 @@ def test_a_delay_by_whole_rows_needs_enough_rows_that_agree():
     assert whole_delay(last, first) == whole_delay(np.ones(60), rate) == 0
 
 
+def test_runs_alike_are_no_delay_of_one_by_the_other(rng):
+    rate = np.tile(np.repeat([0.0, 50.0, -50.0, 100.0, -100.0, 0.0], 10), 6)
+    log = pd.DataFrame({"rate": rate, "run": np.arange(6).repeat(60)})
+    log["rate"] *= 1.0 + 0.02 * rng.uniform(size=6).repeat(60)
+    left = 0.01 * rng.normal(size=360)
+    left[:60] = left[-60:] = np.nan  # the coldest and the hottest run are out of range
+    assert abs(whole_delay(left + log["rate"], log["rate"])) == 60
+    assert delay(log, left) == (0.0, 0.0)
+
+
+def test_a_long_delay_is_told_in_whole_rows(rng):
+    log = in_steps(1, 200).assign(temperature=np.linspace(0.0, 50.0, 1600))
+    error = delayed(log, 123.0) - log["rate"].to_numpy() + NOISE * rng.normal(size=1600)
+    late, *_ = oddities(log.assign(output=log["rate"] + error), error, error, "row {}".format)
+    assert "came some 123 rows late: align" in late
+
+
 def test_of_a_delay_one_thing_is_told_and_a_glitch_beside_it(rng):
     log = in_steps(n_rows=20).assign(temperature=lambda log: np.linspace(0.0, 50.0, len(log)))
     for rows in (1.0, 0.5, -3.0):
