@@ -76,7 +76,7 @@ def delay(log, left):
     late, least, *_ = min(at_once, whole, key=lambda found: (2 * found[3] < n_rows, found[1]))
     part = 1.0 - least / total if total else 0.0
     # Any slope explains 1 / n of the noise of n rows, and nine times as much once in 300 logs.
-    return (late, part) if part * n_rows > 9.0 else (0.0, 0.0)
+    return (late, part) if part * n_rows > 9.0 and abs(late) < n_rows else (0.0, 0.0)
 
 
 def whole_delay(output, rate):

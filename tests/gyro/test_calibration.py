@@ -223,6 +223,11 @@ def test_runs_alike_are_no_delay_of_one_by_the_other(rng):
     assert delay(log, left) == (0.0, 0.0)
 
 
+def test_no_delay_is_longer_than_the_log(rng):
+    rate = 50.0 + 1e-9 * rng.normal(size=60)  # one rate of a table, and rounding
+    assert delay(pd.DataFrame({"rate": rate}), -1e9 * np.gradient(rate)) == (0.0, 0.0)
+
+
 def test_a_long_delay_is_told_in_whole_rows(rng):
     log = in_steps(1, 200).assign(temperature=np.linspace(0.0, 50.0, 1600))
     error = delayed(log, 123.0) - log["rate"].to_numpy() + NOISE * rng.normal(size=1600)
