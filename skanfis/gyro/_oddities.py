@@ -5,7 +5,7 @@ import pandas as pd
 from scipy.signal import correlate, correlation_lags
 from scipy.spatial import cKDTree
 
-from ..digits import counted, percent
+from ..digits import counted, in_digits, percent
 from .metrics import rate_columns
 
 LEAST_CORRELATION = 0.9  # of output and rate
@@ -29,7 +29,7 @@ def oddities(log, error, left, name_row):
     """Sentences on what is odd about a log; ``left`` is what a compensation leaves of ``error``."""
     late, part = delay(log, left)
     if part > _MUCH_DELAYED:
-        rows = counted(f"{abs(late):{'.0f' if abs(late) > 99.0 else '.2g'}}", "row")
+        rows = counted(in_digits(abs(late), 2), "row")
         yield (
             f"{percent(part)} of the squared error that is left follows the change of the rate "
             f"from row to row, as if the output came some {rows} {'late' if late > 0 else 'early'}"
