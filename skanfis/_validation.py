@@ -284,10 +284,9 @@ def feature_indices(given, names, parameter):
     """
     if given is None:
         return np.arange(len(names))
-    entries = np.atleast_1d(
-        np.asarray(in_column_order(given, names, parameter), dtype=object)
-    ).tolist()
+    entries = np.atleast_1d(np.asarray(given, dtype=object)).tolist()
     if entries and all(isinstance(entry, bool | np.bool_) for entry in entries):
+        entries = np.asarray(in_column_order(given, names, parameter)).tolist()
         if len(entries) != len(names):
             raise ValueError(
                 f"{parameter} is a mask of the length {len(entries)}: give one entry for each "

@@ -12,7 +12,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 from skanfis import _validation
-from skanfis._validation import check_finite, group_numbers
+from skanfis._validation import check_finite, feature_indices, group_numbers
 from skanfis.exceptions import ConstantInputWarning, OutOfBoundsWarning
 
 from .quick import quick
@@ -100,3 +100,13 @@ def test_a_warning_points_at_the_line_of_the_user_however_deep_it_arises():
     with pytest.warns(OutOfBoundsWarning) as outside:
         search.predict(X + 10.0)
     assert {Path(one.filename) for one in [*told, *outside]} == {Path(__file__)}
+
+
+def test_names_in_a_series_may_have_any_labels_masks_those_of_columns():
+    names = ["a", "b", "c"]
+    given = pd.Series(["c", "a", "b"], index=list("xyz"))
+    assert feature_indices(given, names, "premise_features").tolist() == [0, 1, 2]
+    mask = pd.Series([True, False, False], index=list("cba"))
+    assert feature_indices(mask, names, "premise_features").tolist() == [2]
+    with pytest.raises(ValueError, match="premise_features names 'x'"):
+        feature_indices(mask.set_axis(list("xyz")), names, "premise_features")
