@@ -72,7 +72,8 @@ def delay(log, left):
 
     _, _, total, n_rows = at_once = beside(0)
     # The rates of other runs, if alike, are no rates so many rows before: few rows are then left.
-    whole = beside(whole_delay(left + log["rate"], log["rate"]))
+    late = whole_delay(left + log["rate"], log["rate"])
+    whole = beside(late) if late else at_once
     late, least, *_ = min(at_once, whole, key=lambda found: (2 * found[3] < n_rows, found[1]))
     part = 1.0 - least / total if total else 0.0
     # Any slope explains 1 / n of the noise of n rows, and nine times as much once in 300 logs.
